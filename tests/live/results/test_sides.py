@@ -63,7 +63,9 @@ def test_the_curve_of_the_mean_has_means_and_the_stress_of_the_front() -> None:
         return SideOfTest({}, curve, stress * t)
 
     front, back = side(1e-3, 3e-5, 7e7), side(3e-3, 4e-5, 9e7)
-    found = SidesOfTest.of(front, back, TensileOptions()).curve
+    sides = SidesOfTest.of(front, back, TensileOptions())
+    assert sides.back.Rm.value == sides.both.Rm.value == sides.front.Rm.value == pytest.approx(7e7 * t[-1])
+    found = sides.curve
     assert found.transverse is not None and found.narrowing is not None and found.lens is not None
     np.testing.assert_allclose(found.strain, 2e-3 * t)
     np.testing.assert_allclose(found.stress, 7e7 * t)
