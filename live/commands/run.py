@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic run``."""
     screen, config = TerminalScreen(), configured(arguments)
-    check_alarms(config)
+    check_alarms(config, both_sides=config.camera.back is not None)
     check_folder(config.output.dir)
     check_load_port(config.load.address)
     if config.camera.back is not None:

@@ -16,6 +16,7 @@ from live.config.loading import Config
 from live.config.sides import BACK, FRONT
 from live.pipeline.consumer import Consumer
 from live.pipeline.screen import Screen
+from live.results.sides.channels import JointChannels
 from live.run.outcome import StopSignal
 from live.run.two_cameras import BothRuns, OutcomeOfSides, Side, run_two_cameras
 from live.setup.region import located
@@ -62,17 +63,19 @@ def _run(
     attend: Callable[[BothRuns], None] = lambda runs: None,
 ) -> tuple[OutcomeOfSides, SidesScreen]:
     """Run with signals, keyboard and remote commands; ``consumers`` are of the front."""
-    both, stop = SidesScreen(screen), StopSignal()
+    both, stop, joint = SidesScreen(screen), StopSignal(), JointChannels()
     with ExitStack() as stack:
         sides = {}
         for name, config in configs.items():
             side = both.side(name)
             found = stack.enter_context(located(config, side.print))
-            sides[name] = Side(found, side, standard_consumers(side, consumers if name == FRONT else ()))
+            of_front = (consumers, joint) if name == FRONT else ()
+            sides[name] = Side(found, side, standard_consumers(side, *of_front))
         attach = stack.enter_context(attended(configs[FRONT], screen, stop))
 
         def on_start(runs: BothRuns) -> None:
             both.attach(runs.states)
+            joint.attach(runs.states, live=runs.live)
             attach(runs)
             attend(runs)
 

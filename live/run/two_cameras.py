@@ -157,7 +157,7 @@ def run_two_cameras(
         As ``live.run.live_run.run_live``.
     """
     stop, front = stop or StopSignal(), sides[FRONT].config
-    states = {name: new_run_state(side.config, side.screen) for name, side in sides.items()}
+    states = {name: new_run_state(side.config, side.screen, both_sides=True) for name, side in sides.items()}
     sinks = [state.event_log.record for state in states.values()]
     rigs = open_two_rigs([side.config.camera for side in sides.values()], front.load, sinks)
     with ExitStack() as closing:

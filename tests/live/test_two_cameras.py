@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import json
 import shutil
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -158,6 +161,58 @@ def test_a_camera_that_fails_leaves_the_other_measuring(
     found = table(tmp_path / "test")
     assert np.isfinite(found["mean_axial"]).sum() == 13
     assert len(found["mean_axial"]) == (13 if side == "front" else 28)
+
+
+LIVE = f"sim:?{VIEW}".replace("&lockstep=yes", "")
+BEHIND = "&seed=7&side=back"
+
+
+def listened(folder: Path, *alarm: str, **cameras: str) -> list[dict[str, float | None]]:
+    """What a test sends by UDP; ``alarm``: lines of one in its rig file."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.setblocking(False)
+        rig = folder.with_suffix(".toml")
+        rig.write_text("\n".join([f"[strain_out]\nudp = '127.0.0.1:{listener.getsockname()[1]}'", *alarm]))
+        devices = ["--camera", cameras["front"], "--back", cameras["back"], "--load", "sim:"]
+        main(["run", "--config", str(rig), *devices, *MEASURE, *QUIET, "--out", str(folder)])
+        lines = []
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                lines.append(listener.recv(65536).decode().strip())
+    return [{"line": 1.0} if text == "HALT" else json.loads(text) for text in lines]
+
+
+def test_the_mean_goes_out_with_its_sigma(tmp_path: Path) -> None:
+    lines = listened(tmp_path / "test", front=LIVE, back=LIVE + BEHIND)
+    found, sent = table(tmp_path / "test"), [one for one in lines if one["mean_axial"] is not None]
+    assert len(sent) > len(lines) / 2 > 5
+    for one in sent:
+        k = int(np.argmin(np.abs(found["time_s"] - float(one["mean_time_s"] or 0))))
+        for channel, column in (
+            ("mean_axial",) * 2,
+            ("bending_axial",) * 2,
+            ("sigma_mean_axial", "sigma_axial"),
+        ):
+            assert one[channel] == pytest.approx(found[column][k], rel=1e-6, abs=1e-12)
+
+
+ALARM = "[[alarm]]\nchannel = 'mean_axial'\nabove = 0.02\nend = true\nline = 'HALT'"
+
+
+@pytest.mark.parametrize("side", ["front", "back"])
+def test_a_camera_that_fails_sends_no_mean_and_ends_what_an_alarm_on_it_guards(
+    side: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cameras = {"front": LIVE, "back": LIVE + BEHIND}
+    cameras[side] += "&faults=gone@2"
+    lines = listened(tmp_path / "test", ALARM, **cameras)
+    assert {"line": 1.0} in lines
+    assert f"mean axial is not known, the camera of the {side} has failed" in capsys.readouterr().out
+    after = lines[lines.index({"line": 1.0}) :]
+    assert not [one for one in after if one.get("mean_axial") is not None]
+    with Strain.open(tmp_path / "test" / ("back" if side == "front" else "front") / "strain.h5") as other:
+        assert other.time_s[-1] < 4.5  # the alarm has ended the test of both
 
 
 def test_a_camera_that_is_not_there_refuses_the_test(tmp_path: Path) -> None:

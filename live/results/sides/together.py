@@ -9,7 +9,7 @@ import csv
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,8 +144,17 @@ def two_sides(front: dict[str, Course], back: dict[str, Course], max_gap_s: floa
     return {name: TwoSides.of(one, back[name], max_gap_s) for name, one in front.items() if name in back}
 
 
-def newest(front: RunState, back: RunState) -> dict[str, tuple[float, float, float]]:
-    """Mean, bending and sigma of the axial strain and of each gauge at the newest instant that both sides have."""
+class JointStrain(NamedTuple):
+    """A strain of both sides at one instant: mean, bending, the sigma of either, and the time, s."""
+
+    mean: float
+    bending: float
+    sigma: float
+    t: float
+
+
+def newest(front: RunState, back: RunState) -> dict[str, JointStrain]:
+    """The axial strain and each gauge at the newest instant that both sides have."""
     one, other = _recent(front), _recent(back)
     if not one or not other:
         return {}
@@ -154,7 +163,9 @@ def newest(front: RunState, back: RunState) -> dict[str, tuple[float, float, flo
         known = np.flatnonzero(np.isfinite(both.mean))
         if len(known):
             k = known[-1]
-            found[name] = float(both.mean[k]), float(both.bending[k]), float(both.sigma[k])
+            found[name] = JointStrain(
+                *(float(one[k]) for one in (both.mean, both.bending, both.sigma, both.t))
+            )
     return found
 
 

@@ -41,7 +41,8 @@ class SidesScreen:
         self._snapshots[name] = snapshot
         sides = {side: self._snapshots[side] for side in SIDES if side in self._snapshots}
         both = newest(*(self._states[side] for side in SIDES)) if self._states else {}
-        self.screen.status(sides_line(sides, both, self.screen.width, words))
+        values = {name: (one.mean, one.bending, one.sigma) for name, one in both.items()}
+        self.screen.status(sides_line(sides, values, self.screen.width, words))
 
 
 class _SideScreen(Screen):

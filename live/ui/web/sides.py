@@ -40,8 +40,8 @@ class SidesPanel:
         strains = newest(self._states[FRONT], self._states[BACK])
         return {
             "strains": [
-                {"name": name, "mean": mean, "bending": bending, "sigma": sigma}
-                for name, (mean, bending, sigma) in strains.items()
+                {"name": name, "mean": one.mean, "bending": one.bending, "sigma": one.sigma}
+                for name, one in strains.items()
             ],
             "figures": self._figures,
             "cameras": [self._camera(side, now) for side in (FRONT, BACK)],
