@@ -262,6 +262,8 @@ class SpecimenConfig:
     strain_error_um_m: float | None = key(number(0, 1e5), None,
         "limit of error of the strain that comes with the load over the elastic interval, um/m: motion off the plane"
         " (0.1 mm at 500 mm: 200), lens, alignment; in the interval of E")
+    modulus_GPa: float | None = key(number(1e-6, 1e6), None,
+        "modulus that is expected, GPa: phasedic check shows its budget in GPa too")
     nu: float | None = key(number(0, 0.5), None,
         "Poisson's ratio, where it is known: a warning where strains of an elastic test do not fit it")
     axis: str = key(choice(AUTO, "x", "y"), AUTO,

@@ -248,7 +248,7 @@ class RunFolder(Closing):
     def _strain(self, name: str) -> NDArray[np.float64] | None:
         if name in (AXIAL, TRANSVERSE):
             return self.gauges[name].value
-        found = self.strain.values.get(name)
+        found = self.strain.values.get("blur_px" if name == "blur" else name)
         return None if found is None else np.asarray(found, np.float64)
 
     def field(self, row: int) -> StrainField:

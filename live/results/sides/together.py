@@ -15,12 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from analysis.evaluate import Course, Curve, TensileFigures, TensileOptions, TwoSides, evaluate_test
+from analysis.evaluate import (
+    CONFIDENCE,
+    Course,
+    Curve,
+    TensileFigures,
+    TensileOptions,
+    TwoSides,
+    evaluate_test,
+)
 from live.config.sections import SpecimenConfig
 from live.config.sides import SIDES
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.pipeline.run_state import RunState
-from live.results.figures import headline, tensile_options
+from live.results.figures import beyond_scatter, headline, tensile_options
 from live.results.run_folder import RunFolder
 from live.results.sides.folder import shift_s
 
@@ -132,6 +140,8 @@ class SidesOfTest:
             rows = (row for row in headline(getattr(self, where), stresses=stresses) if row.figure.known)
             known = "  ".join(f"{row.name} = {row.text}" for row in rows) or "no figure is known"
             yield f"{where + ':':<7}{known}"
+        if held := beyond_scatter(self.both):
+            yield f"±: {CONFIDENCE:.0%} interval, of E with {held}"
 
 
 def longest_gap(t: NDArray[np.float64]) -> float:
@@ -193,7 +203,7 @@ def _at_the_front(front: Curve, back: Curve, gap: float) -> Curve:
     return replace(
         back, t=front.t, strain=strain, stress=front.stress, transverse=moved(back.transverse),
         elastic=moved(back.elastic), uneven=moved(back.uneven), misfit=moved(back.misfit),
-        narrowing=moved(back.narrowing), lens=moved(back.lens),
+        narrowing=moved(back.narrowing), lens=moved(back.lens), blur=moved(back.blur),
     )  # fmt: skip
 
 
@@ -210,9 +220,12 @@ def _mean_of(front: Curve, back: Curve) -> Curve:
     narrowing = mean(front.narrowing, back.narrowing)
     known = [lens for lens in (front.lens, back.lens) if lens is not None]
     lens = np.hypot.reduce(known) / 2 if known else None
+    # Errors of the two cameras by their blur are not alike: as variances of independent errors.
+    blurs = [blur for blur in (front.blur, back.blur) if blur is not None]
+    blur = np.sqrt(np.hypot.reduce([one**2 for one in blurs]) / 2) if len(blurs) == 2 else None
     return Curve(
         front.t, strain, front.stress, transverse, elastic, narrowing=narrowing, lens=lens,
-        source=f"mean of both sides: {front.source}", elastic_source=front.elastic_source,
+        source=f"mean of both sides: {front.source}", elastic_source=front.elastic_source, blur=blur,
     )  # fmt: skip
 
 

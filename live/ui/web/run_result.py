@@ -17,7 +17,7 @@ from live.results.figures import TensileRow, evaluate, tensile_table
 from live.results.report.curves import load_unit, strain_unit, stress_strain
 from live.results.report.evaluation import EvaluatedCurve, intercept_of
 from live.results.summary import why_nothing
-from live.ui.web.sides import side_figures
+from live.ui.web.sides import side_figures, sides_of
 
 MAX_TROUBLES = 20
 
@@ -45,10 +45,13 @@ def sides_result(
 ) -> dict[str, Any]:
     """The result of a test with two cameras: figures of the mean and of each side, warnings of both, else the front."""
     results = {side: run_result(state, specimen, folder / side, words) for side, state in states.items()}
-    figures = [
+    sides = sides_of(states, specimen)
+    figures: list[dict[str, Any]] = [
         {"name": f"{one['name']}, {one['side']}", "text": one["text"], "interval": ""}
-        for one in side_figures(states, specimen)
+        for one in ([] if sides is None else side_figures(sides, specimen))
     ]
+    if sides is not None and sides.both.E.known:
+        figures.append(_interval_of_e(sides.both))
     return {
         **results[FRONT],
         "folder": str(folder),
@@ -63,7 +66,15 @@ def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str
         found.append(
             {"name": "strain of E and nu", "text": figures.elastic_strain, "interval": "", "words": True}
         )
+    if figures.E.known:
+        found.append(_interval_of_e(figures))
     return found
+
+
+def _interval_of_e(figures: TensileFigures) -> dict[str, Any]:
+    parts = figures.budget if len(figures.budget) > 1 else ("scatter", "no limits of error are stated")
+    text = "; ".join(parts)
+    return {"name": "interval of E", "text": text, "interval": "", "words": True}
 
 
 def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> list[TensileRow]:

@@ -35,7 +35,8 @@ class SidesPanel:
         """Strains at the newest instant of both, figures of the test so far, and the cameras."""
         now = self._now()
         if now >= self._due:
-            self._figures = side_figures(self._states, self._specimen)
+            sides = sides_of(self._states, self._specimen)
+            self._figures = [] if sides is None else side_figures(sides, self._specimen)
             self._due = max(now + FIGURES_S, self._now() + 10 * (self._now() - now))
         strains = newest(self._states[FRONT], self._states[BACK])
         return {
@@ -55,15 +56,19 @@ class SidesPanel:
         }  # fmt: skip
 
 
-def side_figures(states: Mapping[str, RunState], specimen: SpecimenConfig) -> list[dict[str, str]]:
-    """E, nu and strengths that are known, by the mean of both sides and by each; empty before both have measured."""
+def sides_of(states: Mapping[str, RunState], specimen: SpecimenConfig) -> SidesOfTest | None:
+    """Both sides of a test so far; None before both have measured."""
     if not all(state.history.has_values for state in states.values()):
-        return []
+        return None
     front, back = (SideOfTest.of_state(states[side], specimen) for side in (FRONT, BACK))
-    sides, stresses = SidesOfTest.of(front, back, tensile_options(specimen)), specimen.area_m2 is not None
+    return SidesOfTest.of(front, back, tensile_options(specimen))
+
+
+def side_figures(sides: SidesOfTest, specimen: SpecimenConfig) -> list[dict[str, str]]:
+    """E, nu and strengths that are known, by the mean of both sides and by each."""
     return [
         {"side": where, "name": row.name, "text": row.text}
         for where in ("both", FRONT, BACK)
-        for row in headline(getattr(sides, where), stresses=stresses)
+        for row in headline(getattr(sides, where), stresses=specimen.area_m2 is not None)
         if row.figure.known
     ]

@@ -99,5 +99,7 @@ def test_the_result_has_the_figures_of_both_and_the_warnings_of_each() -> None:
     result = sides_result(states, SPECIMEN, Path("test"), "")
     names = [one["name"] for one in result["figures"]]
     assert {"E, both", "E, front", "E, back"} <= set(names)
+    held = [one["text"] for one in result["figures"] if one["name"] == "interval of E"]
+    assert held == ["scatter; no limits of error are stated"]
     assert result["folder"] == "test"
     assert any(text.startswith("back: ") and "a fault" in text for text in result["troubles"])
