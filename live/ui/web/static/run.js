@@ -3,6 +3,7 @@ import { $, el, fill, put } from "./base.js";
 import { clearCurves, updateCurves } from "./curves.js";
 import { beginMap, showMap } from "./map.js";
 import { chooseStrainUnit, colourOf, fixed, strainText, strainUnit, time, withSigma } from "./numbers.js";
+import { beginViews, received } from "./views.js";
 import { t } from "./words.js";
 
 const WORDS = {
@@ -18,6 +19,7 @@ addEventListener("unit", () => { if (state) showStrains(state); });
 export function beginRun(stage) {
   clearCurves();
   beginMap(stage);
+  beginViews("run", (value) => { if (value.picture) showMap(value.picture, value.side); });
   showRun({ state: "opening", elapsed_s: 0, events: [], alarms: [], gauges: [], recording: null });
 }
 
@@ -41,8 +43,15 @@ export function showRun(value) {
   showStrip(value);
   showEvents(value.events);
   showAlarm(value);
-  if (value.picture) showMap(value.picture);
+  const shown = received("run", { ...value, failed: value.sides?.cameras[0].failed });
+  if (shown?.picture) showMap(shown.picture, shown.side);
   if (value.points) updateCurves(value.points);
+}
+
+// The other one of two cameras has its card, and its map where it is chosen.
+export function showSecond(value) {
+  const shown = received("run", { ...value, failed: state?.sides?.cameras[1].failed }, true);
+  if (shown?.picture) showMap(shown.picture, shown.side);
 }
 
 // Always written: REC or NOT RECORDING.
@@ -67,7 +76,8 @@ const withPart = (text, part) => (part ? `${text} ${t(part)}` : text);
 
 function showStrains(value) {
   const unit = strainUnit(), axial = value.axial, [text, sigma] = withSigma(axial?.value, axial?.sigma, unit);
-  put($("axialname"), withPart(withPart(axial?.name ?? "", axial?.assumed), value.part));
+  const name = value.side ? `${axial?.name ?? ""}, ${t(value.side)}` : axial?.name;
+  put($("axialname"), withPart(withPart(name ?? "", axial?.assumed), value.part));
   put($("axial"), text);
   put($("axialsigma"), sigma ? `± ${sigma} ${unit.name}` : "");
   const gauges = (value.gauges ?? []).map((one, k) => ({ ...one, k })), list = $("others");

@@ -338,7 +338,15 @@ def test_front_and_back_of_a_test_with_two_cameras(browser: Any, tmp_path: Path)
     program = Program(tmp_path, "page", *cameras, "--load", "sim:", *OPTIONS)
     try:
         page = another(browser, program.address)
+        page.until(lambda: page.page.locator("#setupviews [data-view]").count() == 2, "a card of each")
+        page.page.click("#setupviews [data-view=back]")
+        page.until(lambda: "rig-back.toml" in page.text("file"), "the back is set up")
         started(page)
+        page.until(lambda: page.page.locator("#runviews img[src*='side=back']").count() == 1, "its picture")
+        page.page.click("#runviews [data-view=back]")
+        page.until(
+            lambda: "side=back" in (page.page.get_attribute("#map", "src") or ""), "the map of the back"
+        )
         page.until(lambda: "front minus mean" in page.text("sides"), "mean and bending of both")
         rows = page.page.locator("#sides li").all_text_contents()
         assert rows[0].startswith("mean: axial")
@@ -347,6 +355,9 @@ def test_front_and_back_of_a_test_with_two_cameras(browser: Any, tmp_path: Path)
         page.confirm()
         page.until(lambda: page.stage() == "after", "the result")
         page.until(lambda: "Rm, both" in page.page.inner_text("#after"), "the figures of both")
+        page.until(
+            lambda: page.page.is_visible("#peakmap") and page.page.is_visible("#peakmap2"), "both maps"
+        )
         assert not page.errors
         folders = {path.parent.name for path in tmp_path.glob("runs/*/*/strain.h5")}
         assert folders == {"front", "back"}
