@@ -164,7 +164,9 @@ class JointStrain(NamedTuple):
 
 
 def newest(front: RunState, back: RunState) -> dict[str, JointStrain]:
-    """The axial strain and each gauge at the newest instant that both sides have."""
+    """The axial strain and each gauge at the newest instant that both sides have; none once a camera has failed."""
+    if front.health.camera_failed or back.health.camera_failed:
+        return {}
     one, other = _recent(front), _recent(back)
     if not one or not other:
         return {}

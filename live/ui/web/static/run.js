@@ -3,14 +3,14 @@ import { $, el, fill, put } from "./base.js";
 import { clearCurves, updateCurves } from "./curves.js";
 import { beginMap, showMap } from "./map.js";
 import { chooseStrainUnit, colourOf, fixed, strainText, strainUnit, time, withSigma } from "./numbers.js";
-import { beginViews, received } from "./views.js";
+import { beginViews, noteFailed, received } from "./views.js";
 import { t } from "./words.js";
 
 const WORDS = {
   opening: "opening", reference: "reference: keep still", measuring: "measuring", paused: "paused", ended: "closing the files",
 };
 const RECORDING = { on: "REC", off: "NOT RECORDING" };
-let state = null;
+let state = null, firstEnded = false;
 
 $("strainunit").value = strainUnit().name;
 $("strainunit").addEventListener("change", (event) => { chooseStrainUnit(event.target.value); event.target.blur(); });
@@ -24,6 +24,14 @@ export function beginRun(stage) {
 }
 
 export function showRun(value) {
+  firstEnded = value.state === "ended";
+  show(value);
+  noteFailed(value.sides?.cameras);
+  showMapOf(value, false);
+  if (value.points) updateCurves(value.points);
+}
+
+function show(value) {
   state = value;
   const paused = value.state === "paused", ended = value.state === "ended";
   $("state").dataset.word = value.state;
@@ -43,14 +51,16 @@ export function showRun(value) {
   showStrip(value);
   showEvents(value.events);
   showAlarm(value);
-  const shown = received("run", { ...value, failed: value.sides?.cameras[0].failed });
-  if (shown?.picture) showMap(shown.picture, shown.side);
-  if (value.points) updateCurves(value.points);
 }
 
-// The other one of two cameras has its card, and its map where it is chosen.
+// The other one of two cameras has its card, and its map where it is chosen; the figures too once the first has ended.
 export function showSecond(value) {
-  const shown = received("run", { ...value, failed: state?.sides?.cameras[1].failed }, true);
+  if (firstEnded && value.state !== "ended") show({ ...value, sides: state.sides && { ...state.sides, strains: [] } });
+  showMapOf(value, true);
+}
+
+function showMapOf(value, isSecond) {
+  const shown = received("run", value, isSecond);
   if (shown?.picture) showMap(shown.picture, shown.side);
 }
 

@@ -3,10 +3,15 @@ import { $, el, put } from "./base.js";
 import { strainText } from "./numbers.js";
 import { t } from "./words.js";
 
-const latest = { setup: {}, run: {} };
+const latest = { setup: {}, run: {} }, failed = new Set();
 let redraw = () => {};
 
 export const chosen = () => document.body.dataset.side ?? "";
+
+// The cameras that have failed; the card of such a one stays as it was, and says so.
+export function noteFailed(cameras) {
+  for (const one of cameras ?? []) if (one.failed) failed.add(one.side);
+}
 
 // Keeps what came of one camera, the first one first; the one to be shown large, or null where that is another.
 export function received(stage, value, isSecond) {
@@ -21,6 +26,7 @@ export function received(stage, value, isSecond) {
 export function beginViews(stage, again) {
   redraw = again;
   latest[stage] = {};
+  failed.clear();
   $(`${stage}views`).replaceChildren();
   if (stage === "run") delete document.body.dataset.side;
 }
@@ -54,7 +60,7 @@ function showCard(button, stage, value) {
   const [picture, , words] = button.children, n = stage === "run" ? value.picture?.n : value.picture;
   button.setAttribute("aria-pressed", String(value.side === chosen()));
   put(words, stage === "run" ? running(value) : verdict(value));
-  button.classList.toggle("bad", stage === "run" ? value.failed === true : value.go === false || Boolean(value.trouble));
+  button.classList.toggle("bad", stage === "run" ? failed.has(value.side) : value.go === false || Boolean(value.trouble));
   if (!n || picture.dataset.n === String(n) || picture.dataset.busy) return;
   Object.assign(picture.dataset, { n, busy: "1" });
   picture.src = `/picture?side=${value.side}&n=${n}`;
@@ -63,7 +69,7 @@ function showCard(button, stage, value) {
 const verdict = (value) => t(value.trouble) || (value.checking ? t("checking …") : value.go == null ? t("not checked") : value.go ? "GO" : "NO-GO");
 
 function running(value) {
-  if (value.failed) return t("the camera has failed");
+  if (failed.has(value.side)) return t("the camera has failed");
   if (value.zois == null) return "–";
   return `${strainText(value.axial?.value, value.axial?.sigma)} · ${value.valid} / ${value.zois} ${t("ZOIs")}`;
 }

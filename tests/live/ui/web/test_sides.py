@@ -56,6 +56,14 @@ def test_mean_bending_figures_and_cameras() -> None:
     assert front["valid"] == front["zois"] - 1
 
 
+def test_there_is_no_mean_once_a_camera_has_failed() -> None:
+    states = {"front": side(WRONG), "back": side(-WRONG)}
+    states["back"].health.camera_failed = True
+    shown = SidesPanel(states, SPECIMEN, lambda: START + 10).state()
+    assert shown["strains"] == []
+    assert [one["failed"] for one in shown["cameras"]] == [False, True]
+
+
 def test_figures_are_evaluated_now_and_then() -> None:
     states, now = {"front": side(WRONG, PULLED[:9]), "back": side(-WRONG)}, [100.0]
     panel = SidesPanel(states, SPECIMEN, lambda: now[0])

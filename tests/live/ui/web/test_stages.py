@@ -332,6 +332,24 @@ def test_messages_of_devices_and_the_colours_of_gauges(start: Start) -> None:
     assert page.page.evaluate("() => [...untranslated]") == []
 
 
+def test_the_front_fails_and_the_back_goes_on(browser: Any, tmp_path: Path) -> None:
+    camera = CAMERA.format(seconds=60)
+    cameras = ["--camera", f"{camera}&faults=gone@6", "--back", f"{camera}&side=back&seed=3"]
+    program = Program(tmp_path, "run", "--page", *cameras, "--load", "sim:", *OPTIONS[:-2])
+    try:
+        page = Page(browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US").new_page())
+        page.page.goto(program.address)
+        page.until(lambda: page.page.locator("#runviews .bad").count() == 1, "the front has failed")
+        page.until(lambda: page.text("axialname").endswith(", back"), "the figures of the back")
+        assert page.text("word") == "measuring" and "mean" not in page.text("sides")
+        page.press("q")
+        page.confirm()
+        page.until(lambda: page.stage() == "after", "the result")
+        assert "front: " in page.text("troubles") and not page.errors
+    finally:
+        program.kill()
+
+
 def test_front_and_back_of_a_test_with_two_cameras(browser: Any, tmp_path: Path) -> None:
     camera = f"{CAMERA.format(seconds=60)}&bending=5&stand_off_mm=500&settle_mm=0.1"
     cameras = ["--camera", camera, "--back", f"{camera}&side=back&seed=3"]
