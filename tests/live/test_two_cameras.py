@@ -7,6 +7,7 @@ import csv
 import json
 import shutil
 import socket
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -96,6 +97,9 @@ def test_the_mean_has_neither_motion_nor_bending(good: Path) -> None:
     assert sides.both.E.low < specimen.E < sides.both.E.high
     assert sides.front.E.value < 0.85 * specimen.E
     assert sides.back.E.value > 1.2 * specimen.E
+    assert not any("limits" in line for line in sides.figure_lines(stresses=True))
+    stated = replace(sides, both=replace(sides.both, budget={"scatter": 1e-3, "load cell": 3e-3}))
+    assert list(stated.figure_lines(stresses=True))[-1] == "±: 95% interval, of E with limits of load cell"
 
 
 def test_one_clock_and_one_load_cell(good: Path) -> None:
