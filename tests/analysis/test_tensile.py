@@ -100,6 +100,22 @@ def test_stated_limits_of_error_are_in_the_interval_of_e() -> None:
     assert found.nu == plain.nu
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_change_of_sharpness_that_comes_with_the_load_is_in_the_interval_of_e(sign: int) -> None:
+    interval = TensileOptions(free(Interval("strain", 0.0005, 0.0025)))
+    curve = noisy(linear(), 3)
+    noise = np.random.default_rng(5).normal(0, 0.01, len(curve.t))
+    grown = sign * np.sqrt(100 * np.abs(curve.strain)) + noise  # 0.25 px^2 at 0.0025
+    found = evaluate_test(replace(curve, blur=grown), interval)
+    assert list(found.budget) == ["scatter", "blur"]
+    assert found.budget["blur"] == pytest.approx(30e-6 / 0.0025 / math.sqrt(3), rel=0.05)
+    plain = evaluate_test(curve, interval)
+    assert found.E.value == plain.E.value
+    assert found.E.high - found.E.value > 1.5 * (plain.E.high - plain.E.value)
+    still = evaluate_test(replace(curve, blur=0.3 + noise), interval)
+    assert list(still.budget) == ["scatter"] and still.E == plain.E
+
+
 def test_the_uncertainty_of_a_corrected_lens_is_in_the_interval_of_e() -> None:
     interval = TensileOptions(free(Interval("strain", 0.0005, 0.0025)))
     curve = noisy(linear(), 3)

@@ -27,7 +27,8 @@ def test_the_figures_by_value() -> None:
         gauges, specimen__standard="iso527", specimen__area_mm2=10.0, specimen__force_error_percent=1.0,
         scale__stand_off_mm=400.0,
     )  # fmt: skip
-    assert found["scatter"].split() == ["5", "0.2"]  # of 2500 um/m
+    assert found["scatter"].split() == ["5", "0.2"]  # of 2500 um/m, and of E
+    assert found["blur"] == "the test shows it"
     share = 1 / math.sqrt(3)
     assert [float(text) for text in found["load cell"].split()] == pytest.approx(
         [share * 25, share], rel=4e-3
@@ -35,6 +36,13 @@ def test_the_figures_by_value() -> None:
     assert found["section"] == "not stated: specimen.section_error_percent"
     assert found["motion off the plane"] == "not counted: 0.1 mm at 400 mm is 250 µm/m"
     assert float(found["combined"].split()[1]) == pytest.approx(math.hypot(0.2, share), rel=4e-3)
+
+
+def test_in_gpa_where_a_modulus_is_expected() -> None:
+    gauges = (GaugeNoise("axial", 5e-6),)
+    found = lines(gauges, specimen__standard="iso527", specimen__modulus_GPa=70.0)
+    assert found["scatter"].split() == ["5", "0.2", "0.14"]
+    assert found["load cell"] == "not stated: specimen.force_error_percent"
 
 
 def test_the_mean_of_the_region_without_a_gauge_along_the_load() -> None:
