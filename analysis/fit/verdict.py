@@ -18,6 +18,7 @@ from analysis.fit.validity import (
     COLOURED,
     EMPTY_SHARES,
     EMPTY_SIGMA,
+    INFORMATION_OVER_NOISE,
     LOST_SHARE,
     MANY_STEPS,
     MAX_GAIN,
@@ -25,6 +26,7 @@ from analysis.fit.validity import (
     MODEL_SHARE,
     NOISE_FACTOR,
     POOLED_NOISE_FACTOR,
+    QUIETER,
     SLOW_SIGMA,
     UNKNOWN_NOISE_FACTOR,
 )
@@ -73,7 +75,7 @@ def judge(
             out[z] = LOST
         elif found.state[z] != CONVERGED or _slow(found, z, known, expected[z]):
             out[z] = NOT_CONVERGED
-        elif _is_empty(left[z], min(expected[z], error)) and _sigma(known, z, expected[z]) > EMPTY_SIGMA:
+        elif _is_empty(known, z, left[z], expected[z], error) or _is_noise(known, z, left[z], expected[z]):
             out[z] = NO_PATTERN
         elif not (MIN_GAIN < gain < MAX_GAIN and left[z] <= allowed + MODEL_SHARE * pattern):
             out[z] = POOR_MATCH
@@ -93,8 +95,18 @@ def _sigma(known: Any, z: int, variance: Any) -> Any:
 
 
 @helper
-def _is_empty(left: Any, expected: Any) -> Any:
-    return EMPTY_SHARES[0] * expected < left < EMPTY_SHARES[1] * expected
+def _is_empty(known: Any, z: int, left: Any, expected: Any, error: Any) -> Any:
+    """Whether there was nothing to fit."""
+    least = min(expected, error)
+    little = EMPTY_SHARES[0] * least < left < EMPTY_SHARES[1] * least
+    return little and _sigma(known, z, expected) > EMPTY_SIGMA
+
+
+@helper
+def _is_noise(known: Any, z: int, left: Any, expected: Any) -> Any:
+    """Whether u, v or a gradient follows the noise of the reference, which is less where the ZOI leaves less."""
+    by_chance = NOISE_FACTOR + QUIETER * math.sqrt(2 / max(known.pixels[z], 1.0))
+    return known.information[z] * max(1.0, expected / (left * by_chance)) < INFORMATION_OVER_NOISE
 
 
 @helper

@@ -19,7 +19,7 @@ import numpy as np
 from analysis import KernelSettings, NoiseModel, PhaseKernel
 from analysis.evaluate.deconvolution import effect
 from analysis.field.grid import profile
-from tests.accuracy import area, finding, rejection, sharpness, sides
+from tests.accuracy import area, edges, finding, rejection, sharpness, sides
 from tests.accuracy import degraded as not_raw
 from tests.accuracy import gauges as virtual
 from tests.accuracy import means as dense
@@ -309,6 +309,18 @@ def rejected(quick: bool) -> Lines:
     yield _counted("all", total)
 
 
+def edge_only(quick: bool) -> Lines:
+    """Nothing but a black box on even grey, 8 bit: no ZOI may have a value
+
+    190 GL of contrast, sharp and blurred by 0.5, 1 and 3 px, still and moved by 3.3 px.
+    """
+    yield from _table("ZOI", "step", "noise GL", "ZOIs", "valid", "limit")
+    for size, step in ((32, 8), (64, 16)):
+        for noise in edges.NOISES_GL:
+            zois, valid = edges.on_box(size, step, noise, quick)
+            yield _row(size, step, f"{noise:g}", zois, valid, BEYOND if valid else "within")
+
+
 def _counted(name: str, c: rejection.Count) -> str:
     flagged = 100 * c.flagged / max(c.flagged + c.accepted, 1)
     return _row(
@@ -509,7 +521,7 @@ def _numbers(values: np.ndarray, digits: int) -> str:
 
 SECTIONS = (
     shift, noise, resolution, strain, star_image, sample14, illumination, uncertainty, gauges, means, plates,
-    two_cameras, areas, rejected, blurred, reference_noise, found_again, degraded, noise_ratio, films,
+    two_cameras, areas, rejected, edge_only, blurred, reference_noise, found_again, degraded, noise_ratio, films,
 )  # fmt: skip
 
 

@@ -125,6 +125,7 @@ def zois(count: int, left: np.ndarray, signal: np.ndarray) -> tuple[OutArgs, Ref
         np.full(count, 0.01),
         np.array([100.0, 50.0]),
         1.0,
+        np.full(count, 1e3),
     )
     return found, known
 
