@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from analysis.compiled.loops import helper
+from analysis.compiled.loops import helper, inlined
 from analysis.field import Status
 from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, PooledError, ReferenceArgs, VerdictArgs
 from analysis.fit.validity import (
@@ -88,13 +88,13 @@ def judge(
             out[z] = OK if doubt <= 1 else POOR_MATCH if misfit > bent else UNEVEN
 
 
-@helper
+@inlined
 def _sigma(known: Any, z: int, variance: Any) -> Any:
     """Uncertainty of the worse of u and v of ZOI ``z`` if nothing else were sought, px."""
     return math.sqrt(max(known.unit[z, 0], known.unit[z, 1]) * variance)
 
 
-@helper
+@inlined
 def _is_empty(known: Any, z: int, left: Any, expected: Any, error: Any) -> Any:
     """Whether there was nothing to fit."""
     least = min(expected, error)
@@ -102,27 +102,29 @@ def _is_empty(known: Any, z: int, left: Any, expected: Any, error: Any) -> Any:
     return little and _sigma(known, z, expected) > EMPTY_SIGMA
 
 
-@helper
+@inlined
 def _is_noise(known: Any, z: int, left: Any, expected: Any) -> Any:
     """Whether u, v or a gradient follows the noise of the reference, which is less where the ZOI leaves less."""
+    if known.information[z] >= INFORMATION_OVER_NOISE:
+        return False
     by_chance = NOISE_FACTOR + QUIETER * math.sqrt(2 / max(known.pixels[z], 1.0))
-    return known.information[z] * max(1.0, expected / (left * by_chance)) < INFORMATION_OVER_NOISE
+    return known.information[z] * expected / (left * by_chance) < INFORMATION_OVER_NOISE
 
 
-@helper
+@inlined
 def _slow(found: Any, z: int, known: Any, variance: Any) -> Any:
     """Whether a weak pattern was followed in so many small steps that it may have been led away."""
     return found.iterations[z] >= MANY_STEPS and known.centre[z] * math.sqrt(variance) > SLOW_SIGMA
 
 
-@helper
+@inlined
 def _used(value: Any, by_noise: Any, margin: Any) -> Any:
     """The share of the margin beyond what noise makes that a value takes; not less than 0."""
     share = (value - by_noise) / margin
     return 0.0 if share < 0 else share
 
 
-@helper
+@inlined
 def _bent(found: Any, z: int, known: Any, variance: Any, rule: Any) -> Any:
     """How far the displacement bends or jumps, in shares of what is allowed; beyond 1 the centre is wrong.
 
@@ -135,7 +137,7 @@ def _bent(found: Any, z: int, known: Any, variance: Any, rule: Any) -> Any:
     return _used(found.bending[z], (of_u + of_v) * rule.noise[0], BENDING_CHANCE * spread + allowed)
 
 
-@helper
+@inlined
 def _beyond(known: Any, z: int, far: Any) -> Any:
     """How much more counts what is left because the centre lies beyond its pattern; 1 as a rule."""
     return max(1.0, known.centre[z] ** 2 / (far * max(known.unit[z, 0], known.unit[z, 1])))
