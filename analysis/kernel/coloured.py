@@ -184,7 +184,7 @@ def _without_planes(left: Floats) -> Floats:
     x = np.arange(left.shape[1]) - (left.shape[1] - 1) / 2
     along_x, along_y = (np.einsum(f"nij,{k}->n", left, x) / (len(x) * np.sum(x**2)) for k in "ji")
     planes = along_x[:, None, None] * x + along_y[:, None, None] * x[:, None]
-    return left - left.mean(axis=(1, 2), keepdims=True) - planes
+    return np.asarray(left - left.mean(axis=(1, 2), keepdims=True) - planes)
 
 
 def _spectra(zois: NDArray[np.floating], window: Floats) -> NDArray[np.complex64]:
