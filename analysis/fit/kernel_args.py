@@ -206,6 +206,8 @@ class ReferenceArgs(NamedTuple):
         ``white_noise.white_cubic`` of the kernel.
     independent : float
         ZOIs that a ZOI counts for, since neighbours share pixels; at most 1.
+    information : (A,)
+        On the least known of u, v and the gradients, over that which the noise of the reference pretends.
     """
 
     signal: Floats
@@ -214,12 +216,13 @@ class ReferenceArgs(NamedTuple):
     centre: Floats
     white: Floats
     independent: float
+    information: Floats
 
     def at(self, places: NDArray[np.intp] | slice) -> ReferenceArgs:
         """That of some ZOIs."""
         return self._replace(
             signal=self.signal[places], pixels=self.pixels[places], unit=self.unit[places],
-            centre=self.centre[places],
+            centre=self.centre[places], information=self.information[places],
         )  # fmt: skip
 
 

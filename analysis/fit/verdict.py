@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from analysis.compiled.loops import helper
+from analysis.compiled.loops import helper, inlined
 from analysis.field import Status
 from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, PooledError, ReferenceArgs, VerdictArgs
 from analysis.fit.validity import (
@@ -18,6 +18,7 @@ from analysis.fit.validity import (
     COLOURED,
     EMPTY_SHARES,
     EMPTY_SIGMA,
+    INFORMATION_OVER_NOISE,
     LOST_SHARE,
     MANY_STEPS,
     MAX_GAIN,
@@ -25,6 +26,7 @@ from analysis.fit.validity import (
     MODEL_SHARE,
     NOISE_FACTOR,
     POOLED_NOISE_FACTOR,
+    QUIETER,
     SLOW_SIGMA,
     UNKNOWN_NOISE_FACTOR,
 )
@@ -73,7 +75,7 @@ def judge(
             out[z] = LOST
         elif found.state[z] != CONVERGED or _slow(found, z, known, expected[z]):
             out[z] = NOT_CONVERGED
-        elif _is_empty(left[z], min(expected[z], error)) and _sigma(known, z, expected[z]) > EMPTY_SIGMA:
+        elif _is_empty(known, z, left[z], expected[z], error) or _is_noise(known, z, left[z], expected[z]):
             out[z] = NO_PATTERN
         elif not (MIN_GAIN < gain < MAX_GAIN and left[z] <= allowed + MODEL_SHARE * pattern):
             out[z] = POOR_MATCH
@@ -86,31 +88,43 @@ def judge(
             out[z] = OK if doubt <= 1 else POOR_MATCH if misfit > bent else UNEVEN
 
 
-@helper
+@inlined
 def _sigma(known: Any, z: int, variance: Any) -> Any:
     """Uncertainty of the worse of u and v of ZOI ``z`` if nothing else were sought, px."""
     return math.sqrt(max(known.unit[z, 0], known.unit[z, 1]) * variance)
 
 
-@helper
-def _is_empty(left: Any, expected: Any) -> Any:
-    return EMPTY_SHARES[0] * expected < left < EMPTY_SHARES[1] * expected
+@inlined
+def _is_empty(known: Any, z: int, left: Any, expected: Any, error: Any) -> Any:
+    """Whether there was nothing to fit."""
+    least = min(expected, error)
+    little = EMPTY_SHARES[0] * least < left < EMPTY_SHARES[1] * least
+    return little and _sigma(known, z, expected) > EMPTY_SIGMA
 
 
-@helper
+@inlined
+def _is_noise(known: Any, z: int, left: Any, expected: Any) -> Any:
+    """Whether u, v or a gradient follows the noise of the reference, which is less where the ZOI leaves less."""
+    if known.information[z] >= INFORMATION_OVER_NOISE:
+        return False
+    by_chance = NOISE_FACTOR + QUIETER * math.sqrt(2 / max(known.pixels[z], 1.0))
+    return known.information[z] * expected / (left * by_chance) < INFORMATION_OVER_NOISE
+
+
+@inlined
 def _slow(found: Any, z: int, known: Any, variance: Any) -> Any:
     """Whether a weak pattern was followed in so many small steps that it may have been led away."""
     return found.iterations[z] >= MANY_STEPS and known.centre[z] * math.sqrt(variance) > SLOW_SIGMA
 
 
-@helper
+@inlined
 def _used(value: Any, by_noise: Any, margin: Any) -> Any:
     """The share of the margin beyond what noise makes that a value takes; not less than 0."""
     share = (value - by_noise) / margin
     return 0.0 if share < 0 else share
 
 
-@helper
+@inlined
 def _bent(found: Any, z: int, known: Any, variance: Any, rule: Any) -> Any:
     """How far the displacement bends or jumps, in shares of what is allowed; beyond 1 the centre is wrong.
 
@@ -123,7 +137,7 @@ def _bent(found: Any, z: int, known: Any, variance: Any, rule: Any) -> Any:
     return _used(found.bending[z], (of_u + of_v) * rule.noise[0], BENDING_CHANCE * spread + allowed)
 
 
-@helper
+@inlined
 def _beyond(known: Any, z: int, far: Any) -> Any:
     """How much more counts what is left because the centre lies beyond its pattern; 1 as a rule."""
     return max(1.0, known.centre[z] ** 2 / (far * max(known.unit[z, 0], known.unit[z, 1])))

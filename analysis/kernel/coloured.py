@@ -20,6 +20,7 @@ from analysis.fit.validity import AGREES
 from analysis.kernel.lines import inner, left_by_fit, lines_along, some, zois_of
 from analysis.kernel.prepared import PreparedReference
 from analysis.kernel.solve import Solution
+from analysis.kernel.white_noise import halves
 from analysis.picture.blocks import BLOCKS, blockiness
 
 Floats = NDArray[np.float64]
@@ -162,11 +163,30 @@ def _own_error(ready: PreparedReference, left: Pixels, which: Places) -> Floats:
     level, raw = (_spectra(zois_of(ready.images[k], ready.origins[which], size), window) for k in (2, 3))
     response = np.mean((level * raw.conj()).real, axis=0) / np.mean(np.abs(raw) ** 2, axis=0)
     power = np.mean(np.abs(_spectra(left, window)) ** 2, axis=0) / np.sum(window**2)
-    columns = np.arange(size // 2 + 1)
-    share = np.where((columns == 0) | (2 * columns == size), 1, 2) / size**2  # the other half is the same
-    error = power * response * share
+    error = power * response * halves(size) / size**2
     bend = 2 * np.cos(2 * np.pi * np.fft.fftfreq(size)) - 2
-    return np.array([np.sum(error), np.sum(error * bend[: len(columns)]), np.sum(error * bend[:, None])])
+    return np.array([np.sum(error), np.sum(error * bend[: error.shape[1]]), np.sum(error * bend[:, None])])
+
+
+def by_frequency(solution: Solution, ok: NDArray[np.bool_]) -> Floats:
+    """Variance of u, its gradients, v and its over that which the shapes of third degree have by the same error, (6,).
+
+    By the spectrum of what the fits leave.
+    """
+    size = solution.reference.grid.size
+    left = _without_planes(left_by_fit(solution, some(ok, SPECTRA // size**2)))
+    window = np.outer(np.hanning(size + 2)[1:-1], np.hanning(size + 2)[1:-1])
+    power = np.mean(np.abs(_spectra(left, window)) ** 2, axis=0)
+    seen = np.sum(solution.reference.response * power, axis=(1, 2))
+    return np.asarray(seen[:6] / seen[6:].repeat(3))
+
+
+def _without_planes(left: Pixels) -> Pixels:
+    """ZOIs (N, n, n) without level and slopes, which the fit takes for light."""
+    x = np.arange(left.shape[1]) - (left.shape[1] - 1) / 2
+    along_x, along_y = (np.einsum(f"nij,{k}->n", left, x) / (len(x) * np.sum(x**2)) for k in "ji")
+    planes = along_x[:, None, None] * x + along_y[:, None, None] * x[:, None]
+    return np.asarray(left - left.mean(axis=(1, 2), keepdims=True) - planes, np.float32)
 
 
 def _spectra(zois: Pixels, window: Floats) -> NDArray[np.complex64]:

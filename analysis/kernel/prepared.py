@@ -11,13 +11,17 @@ from numpy.typing import NDArray
 from analysis.field import Status, profile
 from analysis.fit.kernel_args import NormalArgs, ReferenceImages, WindowRows
 from analysis.fit.noise_bias import noise_bias
-from analysis.fit.validity import CLIPPED_SHARE, has_pattern
-from analysis.kernel.images import NoiseModel, continue_rim, padded, second_differences
+from analysis.fit.validity import CLIPPED_SHARE, MIN_INFORMATION, SHOWN_SHARE, has_pattern, information
+from analysis.kernel.images import NoiseModel, continue_rim, padded, rounding_variance, second_differences
 from analysis.kernel.settings import KernelSettings
 from analysis.picture.spectrum import Pattern, filtered_pattern
 
 if TYPE_CHECKING:
     from analysis.fit.shapes import Shapes
+
+
+DOUBTFUL = 0.2
+"""Information from which on the picture of a ZOI is not looked at (``validity.MIN_INFORMATION``)."""
 
 
 class PatternError(ValueError):
@@ -50,6 +54,8 @@ class PreparedReference:
         Effective number of pixels less what the fit takes; sum of the weights.
     signal : (A,) float64, GL^2
         Variance of the filtered pattern.
+    information : (A,) float64, GL^2
+        Variance of the noise that would pretend as much as is known of the least known of u, v and the gradients.
     level : (A,) float64, GL
         Mean grey level.
     status : (A,) uint8
@@ -73,6 +79,7 @@ class PreparedReference:
     freedom: NDArray[np.float64]
     weight: float
     signal: NDArray[np.float64]
+    information: NDArray[np.float64]
     level: NDArray[np.float64]
     status: NDArray[np.uint8]
     blur: NDArray[np.float32]
@@ -109,7 +116,11 @@ def prepare_reference(
     by_level = _by_level(channels, pattern, mean, noise)
     out, shapes = _fits(channels, by_level, origins, line, settings.order)
     energy = out.energy
-    status = _measurable(pattern, out.covariance, energy)
+    share, over_noise = information(
+        out.inverse[:-1], energy[:, :2].astype(np.float64), pattern.left_gradient, line
+    )
+    status = _measurable(pattern, out.covariance, energy, rounding_variance(image))
+    status[(share < MIN_INFORMATION) | ~_shown(image, origins, line, energy[:, 2], share)] = Status.NO_PATTERN
     if clipped is not None and clipped.any():
         from analysis.fit.assembly import clipped_share
 
@@ -128,6 +139,7 @@ def prepare_reference(
         freedom=np.maximum(out.freedom.astype(np.float64), 1e-3),
         weight=float(line.sum() ** 2),
         signal=np.maximum(energy[:, 2].astype(np.float64), 0),
+        information=over_noise,
         level=energy[:, 3].astype(np.float64) + mean,
         status=status,
         blur=out.blur,
@@ -167,14 +179,31 @@ def _fits(
 
 
 def _measurable(
-    pattern: Pattern, covariance: NDArray[np.float32], energy: NDArray[np.float32]
+    pattern: Pattern, covariance: NDArray[np.float32], energy: NDArray[np.float32], rounding: float
 ) -> NDArray[np.uint8]:
-    """OK or NO_PATTERN for each ZOI, (A,)."""
+    """OK or NO_PATTERN for each ZOI, (A,); the noise is at least that of rounding, of a variance ``rounding``, GL^2."""
     variances = covariance[:, [0, 15]].astype(np.float64)  # of u and of v among the 21 pairs
-    good = has_pattern(
-        energy[:, :2].astype(np.float64), variances, pattern.noise, pattern.noise**2 * pattern.left_gradient
-    )
+    noise = max(pattern.noise, rounding**0.5)
+    good = has_pattern(energy[:, :2].astype(np.float64), variances, noise, noise**2 * pattern.left_gradient)
     return np.where(good, Status.OK, Status.NO_PATTERN).astype(np.uint8)
+
+
+def _shown(
+    image: NDArray[np.float32],
+    origins: NDArray[np.int64],
+    line: NDArray[np.float64],
+    signal: NDArray[np.float32],
+    share: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Whether ZOIs hold what the filtered pattern has in them, (A,); looked for where little is known."""
+    size, weight = len(line), line / line.sum()
+    out = np.ones(len(origins), bool)
+    for z in np.flatnonzero(share < DOUBTFUL):
+        top, left = origins[z]
+        zoi = image[top : top + size, left : left + size]
+        mean = weight @ zoi @ weight
+        out[z] = weight @ (zoi - mean) ** 2 @ weight > SHOWN_SHARE * signal[z]
+    return out
 
 
 def _by_level(

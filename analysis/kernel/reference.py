@@ -18,7 +18,7 @@ from analysis.kernel.images import Noise, NoiseModel, as_model, check_fit, clipp
 from analysis.kernel.prepared import PatternError, PreparedReference, prepare_reference
 from analysis.kernel.quadrature import Sensors, make_sensors
 from analysis.kernel.settings import KernelSettings
-from analysis.kernel.white_noise import white_cubic
+from analysis.kernel.white_noise import responses, white_cubic
 from analysis.picture.impulses import without_impulses
 from analysis.picture.splines import Box
 
@@ -77,6 +77,8 @@ class ReferencePicture:
         Variance that rounding to whole grey levels leaves.
     white : (2,) float64
         ``white_noise.white_cubic``.
+    response : (8, n, n // 2 + 1) float64
+        ``white_noise.responses``.
     cleaned : bool
         Whether it had wild pixels, which were replaced; later pictures are then cleaned, too.
     period : (A,) float64, px
@@ -100,6 +102,7 @@ class ReferencePicture:
     sums: MeanNoise | None
     rounding: float
     white: Floats
+    response: Floats
     cleaned: bool
     period: Floats
 
@@ -270,6 +273,7 @@ def _laid_out(
         sums=None if sensors is not None else _sums(grid, settings, index, prepared, unit_covariance),
         rounding=rounding_variance(image),
         white=white_cubic(prepared, grid.size, settings.order, share_variance),
+        response=responses(prepared, grid.size, settings.order),
         cleaned=cleaned,
         period=np.full(len(index), np.inf),
     )

@@ -11,9 +11,16 @@ from numpy.typing import NDArray
 
 from analysis.field import Motion, Status, StrainField, stretched
 from analysis.field.picture_error import LIMIT, PictureError
-from analysis.fit.validity import AGREES
+from analysis.fit.validity import AGREES, COLOURED
 from analysis.follow.renewal import UNSHARED, Placement
-from analysis.kernel.coloured import SOME_BLUR, SPECTRA, beside_strain, coloured_bias, error_cause
+from analysis.kernel.coloured import (
+    SOME_BLUR,
+    SPECTRA,
+    beside_strain,
+    by_frequency,
+    coloured_bias,
+    error_cause,
+)
 from analysis.kernel.lines import left_by_fit, some
 from analysis.kernel.solve import Solution
 
@@ -36,10 +43,10 @@ class PredictedMotion(NamedTuple):
 
 
 class _Noise(NamedTuple):
-    """Variances a pixel of the reference and of the image at each ZOI, (A,), GL^2, and their share of u and of v.
+    """Variances a pixel of the reference and of the image at each ZOI, (A,), GL^2, and what they make of the values.
 
-    ``colour`` (2,) is the variance of u and of v over that of white noise, and ``seen`` the same as the shapes show it;
-    ``over`` the standard deviation of both images over that as given, NaN where it was not found.
+    ``colour`` (6,) is the variance of u, its gradients, v and its over that of white noise, ``seen`` (2,) that of u and
+    v as the shapes show it, ``over`` the standard deviation of both images over that as given, NaN where not found.
     """
 
     reference: Floats
@@ -117,7 +124,7 @@ def _corrected(
     p, growth = found.p, found.nuisance[:, 2]
     if np.isnan(noise.over):
         return None, p, growth
-    error = PictureError(noise.over, (float(noise.colour[0]), float(noise.colour[1])))
+    error = PictureError(noise.over, (float(noise.colour[0]), float(noise.colour[3])))
     if not solution.had_lines and noise.over * float(noise.seen.max()) ** 0.5 <= LIMIT:
         return error, p, growth
     which = some(ok, SPECTRA // reference.grid.size**2)
@@ -138,32 +145,33 @@ def _motion(solution: Solution, values: Floats, expected: PredictedMotion) -> Mo
 
 def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     """The noise of the two images: together what the fits leave, of which the reference has what was given."""
-    gain, white = solution.found.nuisance[:, 0], np.ones(2)
+    gain, white = solution.found.nuisance[:, 0], np.ones(6)
     reference, current = solution.variances(np.s_[:], gain)
     common = solution.common
     if common is None or solution.retried or np.count_nonzero(ok) < FEW_REFUSED * len(ok):
         common = solution.pooled(np.flatnonzero(ok))
     if common is not None:
-        colour, ratio = common.colour, common.ratio
-        seen = colour
+        seen, colour, ratio = common.colour, common.colour.repeat(3), common.ratio
         over = common.usual if ok.all() else float(np.median(ratio[ok]))
         doubtful = max(colour.max(), over) > DOUBTFUL and not solution.had_lines
         rest = beside_strain(solution, ok) if doubtful else None
         if rest is not None:
             over = 1.0 if solution.is_given and AGREES[0] < rest < AGREES[1] else rest
-            seen = colour = white
+            seen, colour = white[:2], white
             ratio = np.full(len(ok), over)
         elif colour.min() < 1 and abs(float(np.median(solution.found.nuisance[ok, 2]))) > SOME_BLUR:
             # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
             colour = np.maximum(colour, 1)
+        elif np.abs(np.log(seen)).max() > np.log(COLOURED):
+            colour = colour * by_frequency(solution, ok)
         whole = ratio * solution.expected(np.s_[:], gain)
         return _Noise(*_parted(whole, reference * gain**2, gain, solution), colour, math.sqrt(over), seen)
     if solution.noise is not None or not ok.any():
-        return _Noise(reference, current, white, float("nan"), white)
+        return _Noise(reference, current, white, float("nan"), white[:2])
     left = solution.found.left / solution.reference.prepared.freedom
     found = max(float(np.median(left[ok])), solution.rounding)
     whole = np.full(len(ok), found)
-    return _Noise(*_parted(whole, reference, np.ones(len(ok)), solution), white, float("nan"), white)
+    return _Noise(*_parted(whole, reference, np.ones(len(ok)), solution), white, float("nan"), white[:2])
 
 
 def _parted(whole: Floats, reference: Floats, gain: Floats, solution: Solution) -> tuple[Floats, Floats]:
@@ -205,8 +213,8 @@ def _covariances(
 
 
 def _pairs(colour: Floats) -> NDArray[np.float32]:
-    """Factors of the covariances, (21,), for variances of u and of v that are ``colour`` (2,) times as large."""
-    deviation = np.sqrt(np.repeat(colour, 3))
+    """Factors of the covariances, (21,), for variances that are ``colour`` (6,) times as large."""
+    deviation = np.sqrt(colour)
     return np.array([deviation[i] * deviation[j] for i in range(6) for j in range(i, 6)], np.float32)
 
 

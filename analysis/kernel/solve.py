@@ -255,6 +255,7 @@ class Solution:
             reference.unit_sigma[2],
             reference.white,
             min(1.0, (2 * reference.grid.step / reference.grid.size) ** 2),
+            ready.information / np.maximum(self._noise, max(reference.rounding, 1e-9)),
         )
 
     def _left(self, which: Places, found: OutArgs) -> Floats:

@@ -211,7 +211,10 @@ def _rest() -> None:
     line = profile("gaussian", 32)
     clipped_share(np.zeros((32, 32), np.bool_), np.zeros((1, 2), np.int64), line)
     none, pairs, single = np.empty(0), np.empty((0, 2)), np.empty(0, np.float32)
-    found, known = OutArgs.starting(np.empty((0, 6))), ReferenceArgs(none, none, pairs, none, np.ones(2), 1.0)
+    found, known = (
+        OutArgs.starting(np.empty((0, 6))),
+        ReferenceArgs(none, none, pairs, none, np.ones(2), 1.0, none),
+    )
     rule = VerdictArgs(True, np.empty(2), 1.0, 0.05, 4.0)
     judge(found, none, none, PooledError.none(0), known, rule, np.empty(0, np.uint8))
     explained(found, none, none, known, np.empty(0, np.intp), 1, pairs)

@@ -235,7 +235,13 @@ def verdict(
     found.state[0], found.bending[0], found.nuisance[0, 0] = state, bending, gain
     zoi, rule = (
         ReferenceArgs(
-            one * signal, one * 350, np.full((1, 2), unit), one * np.sqrt(unit * beyond), np.ones(2), 1.0
+            one * signal,
+            one * 350,
+            np.full((1, 2), unit),
+            one * np.sqrt(unit * beyond),
+            np.ones(2),
+            1.0,
+            one * 1e3,
         ),
         VerdictArgs(known, np.array([1.5, 0.5]), 5.0, limit, 4.0),
     )

@@ -125,6 +125,7 @@ def zois(count: int, left: np.ndarray, signal: np.ndarray) -> tuple[OutArgs, Ref
         np.full(count, 0.01),
         np.array([100.0, 50.0]),
         1.0,
+        np.full(count, 1e3),
     )
     return found, known
 
@@ -168,6 +169,24 @@ def test_the_answer_of_the_shapes_to_white_noise_is_that_of_many_pictures() -> N
         found.append(solution.found.cubic / (4 * reference.share_variance))
     expected = white_cubic(reference.prepared, 32, 1, reference.share_variance)
     assert np.median(np.concatenate(found), axis=0) == pytest.approx(expected, rel=0.08)
+
+
+@pytest.mark.parametrize("fine", [True, False])
+def test_an_error_that_is_not_white_counts_by_its_frequencies(fine: bool) -> None:
+    clean = picture(0, 1).astype(np.float32)
+    kernel, rng, observed, predicted = PhaseKernel(clean, GRID, noise=1.3), np.random.default_rng(4), [], []
+    names = ("u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy")
+    for _ in range(6):
+        noise = rng.normal(0, 3, SHAPE)
+        error = (
+            noise - cv2.GaussianBlur(noise, (0, 0), 1.0) if fine else 3 * cv2.GaussianBlur(noise, (0, 0), 2.0)
+        )
+        field = kernel.measure((clean + error).astype(np.float32), noise=2.2 if fine else 1.3)
+        assert field.ok.mean() > 0.99
+        observed.append([np.nanmean(field.value(n) ** 2) for n in names])
+        predicted.append([np.nanmean(field.sigma(n) ** 2) for n in names])
+    ratio = np.sqrt(np.mean(predicted, axis=0) / np.mean(observed, axis=0))
+    assert ratio == pytest.approx(np.ones(6), abs=0.07), ratio
 
 
 def test_noise_is_not_below_the_rounding_of_the_picture() -> None:

@@ -27,7 +27,13 @@ def verdict(left: float, *, gain: float = 1.0, noise_known: bool = True, **chang
     found.left[:], found.bending[:], found.nuisance[:] = left, 0, (gain, 0, 0)
     found.state[:], found.iterations[:] = changed.get("state", CONVERGED), changed.get("iterations", 3)
     known = ReferenceArgs(
-        np.full(1, SIGNAL), np.full(1, PIXELS), np.full((1, 2), 1e-6), np.full(1, 1e-3), np.ones(2), 1.0
+        np.full(1, SIGNAL),
+        np.full(1, PIXELS),
+        np.full((1, 2), 1e-6),
+        np.full(1, 1e-3),
+        np.ones(2),
+        1.0,
+        np.full(1, 1e3),
     )
     rule = VerdictArgs(noise_known, np.array([1.0, 1.0]), 32 / 6, 0.05, 4.0)
     out = np.empty(1, np.uint8)
