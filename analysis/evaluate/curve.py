@@ -48,6 +48,8 @@ class Curve:
         Elongation across the load over the length, where ``transverse`` may be another measure of strain.
     lens : (N,) float64 or None
         Standard uncertainty of the strain by the correction of a lens.
+    blur : (N,) float64 or None, px
+        Width of the blur since the reference; negative: sharper.
     source, elastic_source : str
         What ``strain`` and ``elastic`` are, in words.
     """
@@ -63,11 +65,12 @@ class Curve:
     lens: Floats | None = None
     source: str = ""
     elastic_source: str = ""
+    blur: Floats | None = None
 
     def __post_init__(self) -> None:
         n = len(self.t)
         optional = self.transverse, self.elastic, self.uneven, self.misfit, self.narrowing, self.lens
-        for values in (self.strain, self.stress, *optional):
+        for values in (self.strain, self.stress, *optional, self.blur):
             if values is not None and values.shape != (n,):
                 raise ValueError(f"a curve needs arrays of one length, got {values.shape} beside {n} times")
 
@@ -78,7 +81,7 @@ class Loading:
 
     Attributes
     ----------
-    t, strain, stress, transverse, elastic, uneven, misfit, narrowing, lens : (M,) float64
+    t, strain, stress, transverse, elastic, uneven, misfit, narrowing, lens, blur : (M,) float64
         As of the ``Curve``; NaN where unknown.
     level, course : (M,) float64
         Running means of stress and strain, to find places by; never a figure.
@@ -101,6 +104,7 @@ class Loading:
     misfit: Floats
     narrowing: Floats
     lens: Floats
+    blur: Floats
     level: Floats
     course: Floats
     noise_strain: float
@@ -118,17 +122,17 @@ class Loading:
         narrowing = curve.transverse if curve.narrowing is None else curve.narrowing
         known = np.isfinite(curve.strain[:stop]) & np.isfinite(curve.stress[:stop])
         nothing = np.full(len(curve.t), math.nan)
-        t, strain, stress, across, elastic, uneven, misfit, narrowing, lens = (
+        t, strain, stress, across, elastic, uneven, misfit, narrowing, lens, blur = (
             (nothing if a is None else a)[:stop][known]
             for a in (
                 curve.t, curve.strain, curve.stress, curve.transverse, elastic, curve.uneven, curve.misfit,
-                narrowing, curve.lens,
+                narrowing, curve.lens, curve.blur,
             )
         )  # fmt: skip
         top = int(np.argmax(stress)) if len(stress) else 0
         half = min(top // _PARTS, _WIDEST)
         return cls(
-            t, strain, stress, across, elastic, uneven, misfit, narrowing, lens,
+            t, strain, stress, across, elastic, uneven, misfit, narrowing, lens, blur,
             smoothed(stress, half), smoothed(strain, half),
             noise(strain), noise(stress), half, top, end is not None,
         )  # fmt: skip

@@ -41,6 +41,9 @@ from analysis.evaluate.strengths import (
 ZeroBy = Literal["raw", "toe", "preload"]
 
 _ROUNDS = 8
+BLUR_STRAIN = 30e-6 / 0.5**2
+"""Largest error of a strain by a change of sharpness, over the variance of the blur, 1/px^2 (docs/data/accuracy.md)."""
+_CLEAR_BLUR = 3.0  # standard uncertainties of the rise of that variance with the strain
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,7 +244,9 @@ def _with_line(
     slope = line_through(region, line.first, line.last) or line
     remark = not_uniform(loading, slope)
     strained = float(loading.course[line.last - 1] - loading.course[line.first])
-    shares = options.limits.shares(strained) | _lens_share(loading, line, strained)
+    shares = (
+        options.limits.shares(strained) | _lens_share(loading, line, strained) | _blur_share(loading, line)
+    )
     nu = _poisson(loading, slope, options.standard)
     figures = TensileFigures(
         E=slope.modulus(math.hypot(*shares.values())).remarked(remark),
@@ -280,6 +285,25 @@ def _lens_share(loading: Loading, line: FittedLine, strained: float) -> dict[str
     """
     sigma = loading.lens[line.first : line.last]
     return {"lens": float(np.nanmax(sigma)) / strained} if np.isfinite(sigma).any() else {}
+
+
+def _blur_share(loading: Loading, line: FittedLine) -> dict[str, float]:
+    """What a change of sharpness that comes with the load may make of the strain; nothing where none is clear.
+
+    The error grows with the variance of the blur, to ``BLUR_STRAIN`` at most: a limit, as of ``ErrorLimits``.
+    """
+    part = slice(line.first, line.last)
+    blur, strain = loading.blur[part], loading.strain[part]
+    known = np.isfinite(blur)
+    n = int(known.sum())
+    if n < MIN_POINTS:
+        return {}
+    x, y = (values[known] - values[known].mean() for values in (strain, np.copysign(blur**2, blur)))
+    sxx = float(x @ x)
+    slope = float(x @ y) / sxx
+    rest = y - slope * x
+    sigma = math.sqrt(float(rest @ rest) / (n - 2) / sxx)
+    return {"blur": BLUR_STRAIN * abs(slope) / math.sqrt(3)} if abs(slope) > _CLEAR_BLUR * sigma else {}
 
 
 def _poisson(loading: Loading, line: FittedLine, standard: Standard) -> Figure:

@@ -27,6 +27,7 @@ from live.commands.options import (
 )
 from live.commands.signals import interrupts
 from live.config.loading import Config
+from live.config.sides import names_of, second_camera
 from live.setup.check.budget import budget_lines
 from live.setup.check.check_list import CheckFigures, examine, table_lines
 from live.setup.check.sample import take
@@ -73,8 +74,9 @@ def command(arguments: argparse.Namespace) -> int:
     if arguments.snapshot:
         require_new(Path(arguments.snapshot), *PICTURES)
     check_load_port(config.load.address)
-    if config.camera.back is not None:
-        screen.print(f"this checks the front; check the back on its own: {config.camera.back}")
+    if (second := second_camera(config)) is not None:
+        here, other = names_of(config)
+        screen.print(f"this checks the {here}; check the {other} on its own: {second}")
     target = None if arguments.target is None else arguments.target * 1e-6
     if arguments.watch:
         with interrupts() as stop:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from functools import partial
 
 from acquire.addresses import Options, parse_address
 from acquire.events import EventKind, Level
 from acquire.serial_line.ports import LineSettings
-from live.config.channels import DEFAULT_CHANNELS
+from live.config.channels import DEFAULT_CHANNELS, joint_channels
 from live.config.gauges import outlines
 from live.config.listen_address import ListenAddress, read_token
 from live.config.loading import Config
@@ -16,6 +17,7 @@ from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Compose, Consumer, RunInfo
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
+from live.results.sides.channels import JointChannels
 from live.results.summary import StatusCard
 from live.results.writer import write_results
 from live.run.alarms import ActionMeans, Alarm, AlarmWatch, actions_of
@@ -27,8 +29,10 @@ from live.ui.rerun.view import View, spawn_viewer
 OUTPUT_NAME = "strain out"
 
 
-def signals_of(about: RunInfo, run_state: RunState, screen: Screen) -> list[Consumer]:
-    """Alarms and strain outputs of a live run; none for a replay.
+def signals_of(
+    about: RunInfo, run_state: RunState, screen: Screen, joint: JointChannels | None
+) -> list[Consumer]:
+    """Alarms and strain outputs of a live run; none for a replay. ``joint``: of a test of front and back.
 
     Raises
     ------
@@ -40,7 +44,7 @@ def signals_of(about: RunInfo, run_state: RunState, screen: Screen) -> list[Cons
     outputs: list[StrainOut] = []
     with ExitStack() as opened:
         for make in (_tcp, _udp, _serial):
-            out = make(about.config, _lines(about, run_state))
+            out = make(about.config, _lines(about, run_state, joint))
             if out is not None:
                 opened.callback(out.end)
                 outputs.append(out)
@@ -48,23 +52,34 @@ def signals_of(about: RunInfo, run_state: RunState, screen: Screen) -> list[Cons
         opened.pop_all()
     means = ActionMeans(screen.bell, about.end, outputs)
     alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]
-    return [*_alarm_watch(alarms, about, run_state), *outputs]
+    return [*_alarm_watch(alarms, about, run_state, joint), *outputs]
 
 
-def _alarm_watch(alarms: Sequence[Alarm], about: RunInfo, run_state: RunState) -> list[Consumer]:
+def _alarm_watch(
+    alarms: Sequence[Alarm], about: RunInfo, run_state: RunState, joint: JointChannels | None
+) -> list[Consumer]:
     if not alarms:
         return []
-    values, health = ChannelValues(about.start.monotonic, run_state.snapshot), run_state.health
-    return [AlarmWatch(alarms, values, health.channels, run_state.alarms, run_state.event_log)]
+    values, of_machine = ChannelValues(about.start.monotonic, run_state.snapshot), run_state.health.channels
+    if joint is None:
+        return [AlarmWatch(alarms, values, of_machine, run_state.alarms, run_state.event_log)]
+    both = joint
+
+    def channels(now: float) -> dict[str, float]:
+        return of_machine(now) | both.read(about.start.monotonic)
+
+    return [
+        AlarmWatch(alarms, values, channels, run_state.alarms, run_state.event_log, lost=lambda: both.lost)
+    ]
 
 
-def _lines(about: RunInfo, run_state: RunState) -> LineFormat:
-    config = about.config
+def _lines(about: RunInfo, run_state: RunState, joint: JointChannels | None) -> LineFormat:
+    config, start = about.config, about.start.monotonic
     gauges = tuple(f"{prefix}gauge_{name}" for name in config.gauges for prefix in ("", "sigma_"))
-    channels = config.strain_out.channels or (*DEFAULT_CHANNELS, *gauges)
-    return LineFormat(
-        ChannelValues(about.start.monotonic, run_state.snapshot), channels, config.strain_out.format
-    )
+    both = () if joint is None else joint_channels(config.gauges)
+    channels = config.strain_out.channels or (*DEFAULT_CHANNELS, *gauges, *both)
+    more = dict if joint is None else partial(joint.read, start)
+    return LineFormat(ChannelValues(start, run_state.snapshot, more), channels, config.strain_out.format)
 
 
 def _tcp(config: Config, lines: LineFormat) -> StrainOut | None:
@@ -94,15 +109,19 @@ def _serial(config: Config, lines: LineFormat) -> StrainOut | None:
     return SerialOut(LineSettings(url, baud), lines)
 
 
-def standard_consumers(screen: Screen, more: Sequence[Consumer] = ()) -> Compose:
+def standard_consumers(
+    screen: Screen, more: Sequence[Consumer] = (), joint: JointChannels | None = None
+) -> Compose:
     """The consumers of a configuration, and ``more``, for ``run_live`` and ``replay``.
+
+    ``joint`` gives alarms and strain outputs the channels of front and back together.
 
     The result raises ConfigError or DeviceError if a port is taken or missing, or needs a token, and DataError if a
     file of the results exists already or cannot be made.
     """
 
     def compose(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
-        signals = signals_of(about, run_state, screen)
+        signals = signals_of(about, run_state, screen, joint)
         return [*write_results(about, run_state), *_view_consumers(about, run_state, screen), *more, *signals]
 
     return compose

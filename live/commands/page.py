@@ -18,7 +18,7 @@ from live.commands.report import write_report
 from live.commands.run import OTHER_PROGRAMS, RECORDING, run_with_page
 from live.commands.signals import signals
 from live.config.loading import Config, load_config
-from live.config.sides import side_configs
+from live.config.sides import second_camera, side_configs
 from live.pipeline.screen import Screen
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.web.page_controller import PageController
@@ -85,9 +85,9 @@ def _run(
     controller: PageController, config: Config, given: Mapping[str, Any], screen: Screen
 ) -> tuple[Path, int]:
     """One test, with one camera or two; its folder and exit code."""
-    if config.camera.back is not None:
+    if second_camera(config) is not None:
         from live.commands.two_cameras import run_sides_with_page
 
-        return run_sides_with_page(controller, side_configs(config, given), screen)
+        return run_sides_with_page(controller, side_configs(config, given, controller.second), screen)
     outcome = run_with_page(controller, config, screen)
     return outcome.folder, outcome.exit_code

@@ -46,7 +46,7 @@ def command(arguments: argparse.Namespace) -> int:
     from live.commands.report import write_report
     from live.replay.replay import replay
     from live.replay.source import ReplayRequest
-    from live.results.sides.folder import has_recorded_sides
+    from live.results.sides.folder import recorded_sides_in
 
     request = ReplayRequest(
         source=arguments.source,
@@ -59,8 +59,8 @@ def command(arguments: argparse.Namespace) -> int:
         forces=Path(arguments.forces) if arguments.forces else None,
     )
     screen, stopping = TerminalScreen(), threading.Event()
-    if has_recorded_sides(Path(arguments.source)):
-        return _replay_sides(request, screen, stopping)
+    if names := recorded_sides_in(Path(arguments.source)):
+        return _replay_sides(request, names, screen, stopping)
     with signals(stopping.set, screen.print):
         done = replay(request, screen, stopping, standard_consumers(screen))
     report = done.config.output.report
@@ -88,8 +88,10 @@ def _ended(code: int, screen: Screen) -> int:
     return code
 
 
-def _replay_sides(request: ReplayRequest, screen: Screen, stopping: threading.Event) -> int:
-    """Replay the sides of a test with two cameras, one after the other, and put them together."""
+def _replay_sides(
+    request: ReplayRequest, names: tuple[str, str], screen: Screen, stopping: threading.Event
+) -> int:
+    """Replay both cameras of a test, one after the other; front and back are put together."""
     from live.commands.consumers import standard_consumers
     from live.commands.report import write_report
     from live.replay.replay import replay
@@ -100,7 +102,7 @@ def _replay_sides(request: ReplayRequest, screen: Screen, stopping: threading.Ev
     check_folder(given.get("output.dir"))
     folder = make_folder(given.get("output.dir"), datetime.datetime.now(datetime.UTC))
     with signals(stopping.set, screen.print):
-        for name in SIDES:
+        for name in names:
             side = SidesScreen(screen).side(name)
             own = replace(
                 request,
@@ -110,7 +112,8 @@ def _replay_sides(request: ReplayRequest, screen: Screen, stopping: threading.Ev
             done = replay(own, side, stopping, standard_consumers(side))
             _print(done, side)
             codes.append(done.exit_code)
-    put_together(folder / FRONT, folder / BACK, folder / TABLE, screen)
+    if names == SIDES:
+        put_together(folder / FRONT, folder / BACK, folder / TABLE, screen)
     if report:
         write_report(folder, screen)
     return _ended(max(codes), screen)

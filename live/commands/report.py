@@ -11,16 +11,16 @@ from pathlib import Path
 from acquire.errors import ConfigError, PhasedicError
 from live.commands.more_gauges import add_gauges
 from live.commands.options import add_gauge_option
-from live.config.sides import BACK, FRONT, SIDES
+from live.config.sides import SIDES
 from live.pipeline.screen import Screen
 from live.results.export.atomic_file import check_free, new_file
 from live.results.quantities import Display
 from live.results.report.comparison import compare, tests_of, write_table
 from live.results.report.report import Report, ReportRequest, make_report
 from live.results.report.saving import NO_BROWSER, find_browser, save_figures, save_page, save_pdf
-from live.results.report.sides import report_of_sides
+from live.results.report.sides import report_of_fields, report_of_sides
 from live.results.run_folder import RunFolder, open_run
-from live.results.sides.folder import has_sides
+from live.results.sides.folder import sides_in
 from live.ui.terminal.screen import TerminalScreen
 
 
@@ -55,7 +55,7 @@ def command(arguments: argparse.Namespace) -> int:
     screen = TerminalScreen()
     if arguments.pdf and find_browser() is None:
         raise ConfigError(f"--pdf: {NO_BROWSER}")
-    if arguments.run and not arguments.compare and has_sides(Path(arguments.run)):
+    if arguments.run and not arguments.compare and sides_in(Path(arguments.run)):
         return _of_sides(Path(arguments.run), arguments, screen)
     with ExitStack() as opened:
         found = [opened.enter_context(open_run(run)) for run in runs]
@@ -82,7 +82,8 @@ def _of_sides(folder: Path, arguments: argparse.Namespace, screen: Screen) -> in
     """Report both sides of a test with two cameras, and each side where it has no report yet."""
     if arguments.pdf or arguments.more_gauges or arguments.times or arguments.fields:
         raise ConfigError(
-            f"{folder} has two sides; --pdf, --gauges, --at and --field are for one: {folder / FRONT}"
+            f"{folder} has two cameras; --pdf, --gauges, --at and --field are for one, such as"
+            f" {folder / (sides_in(folder) or SIDES)[0]}"
         )
     out = Path(arguments.out) if arguments.out else _first_free(folder / "report.html", arguments)
     check_free(*_targets(out, arguments))
@@ -91,19 +92,22 @@ def _of_sides(folder: Path, arguments: argparse.Namespace, screen: Screen) -> in
 
 
 def _report_of_sides(folder: Path, out: Path, screen: Screen) -> Report:
-    pages = {side: folder / side / "report.html" for side in SIDES}
+    sides = sides_in(folder) or SIDES
+    pages = {side: folder / side / "report.html" for side in sides}
     for side, page in pages.items():
         if not page.exists():
             write_report(folder / side, screen)
-    with open_run(folder / FRONT) as front, open_run(folder / BACK) as back:
+    with open_run(folder / sides[0]) as one, open_run(folder / sides[1]) as other:
         names = {side: os.path.relpath(page, out.parent) for side, page in pages.items() if page.exists()}
-        return report_of_sides(front, back, names)
+        if sides == SIDES:
+            return report_of_sides(one, other, names)
+        return report_of_fields(dict(zip(sides, (one, other), strict=True)), names)
 
 
 def write_report(folder: Path, screen: Screen) -> str:
     """``report.html`` in the folder of a run; an error is printed, returned, and does not affect the run."""
     try:
-        if has_sides(folder):
+        if sides_in(folder):
             save_page(_report_of_sides(folder, folder / "report.html", screen), folder / "report.html")
             screen.print(f"  {folder / 'report.html'}")
             return ""

@@ -13,7 +13,7 @@ from live.commands.consumers import standard_consumers
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, add_options, configured, overrides
 from live.config.loading import Config
-from live.config.sides import side_configs
+from live.config.sides import second_camera, side_configs
 from live.pipeline.consumer import Consumer
 from live.pipeline.screen import Screen
 from live.results.folder import check_folder
@@ -29,7 +29,19 @@ from live.ui.terminal.summary import print_summary, trouble_lines
 if TYPE_CHECKING:
     from live.ui.web.page_controller import PageController
 
-RECORDING = ("camera", "back", "load", "no-record", "record", "armed", "start-above", "dark", "flat", "crop")
+RECORDING = (
+    "camera",
+    "back",
+    "beside",
+    "load",
+    "no-record",
+    "record",
+    "armed",
+    "start-above",
+    "dark",
+    "flat",
+    "crop",
+)
 VIEWER_OPENS_S = 1.5  # a viewer that cannot open ends sooner
 OTHER_PROGRAMS = ("orders", "strain-out", "strain-format", "strain-channels", "token-file")
 
@@ -48,10 +60,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic run``."""
     screen, config = TerminalScreen(), configured(arguments)
-    check_alarms(config)
+    check_alarms(config, both_sides=config.camera.back is not None)
     check_folder(config.output.dir)
     check_load_port(config.load.address)
-    if config.camera.back is not None:
+    if second_camera(config) is not None:
         from live.commands.two_cameras import run_sides
 
         return run_sides(side_configs(config, overrides(arguments)), screen, page=arguments.page)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +16,7 @@ from live.config.loading import Config
 from live.config.sides import BACK, FRONT
 from live.pipeline.consumer import Consumer
 from live.pipeline.screen import Screen
+from live.results.sides.channels import JointChannels
 from live.run.outcome import StopSignal
 from live.run.two_cameras import BothRuns, OutcomeOfSides, Side, run_two_cameras
 from live.setup.region import located
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def run_sides(configs: Mapping[str, Config], screen: Screen, *, page: bool = False) -> int:
-    """Run both sides, with the operator's page or without, and put them together; the exit code."""
+    """Run both cameras, with the operator's page or without, and put sides together; the exit code."""
     if not page:
         outcome, both = _run(configs, screen)
         return finish(outcome, both)
@@ -41,16 +42,16 @@ def run_sides(configs: Mapping[str, Config], screen: Screen, *, page: bool = Fal
 def run_sides_with_page(
     controller: PageController, configs: Mapping[str, Config], screen: Screen
 ) -> tuple[Path, int]:
-    """One test, its front shown on the page with mean and bending of both; the folder and the exit code."""
+    """One test, both cameras shown on the page, of sides with mean and bending; the folder and the exit code."""
     from live.ui.web.run_result import sides_result
 
     def attend(runs: BothRuns) -> None:
-        controller.attach(runs, runs.states)
+        controller.attach_both(runs, runs.runs)
 
-    outcome, both = _run(configs, screen, [controller.begin(configs[FRONT])], attend)
+    outcome, both = _run(configs, screen, controller.begin_all(configs), attend)
     code = finish(outcome, both)
     states = {name: one.run_state for name, one in outcome.sides.items()}
-    specimen = outcome.sides[FRONT].config.specimen
+    specimen = next(iter(outcome.sides.values())).config.specimen
     controller.end(sides_result(states, specimen, outcome.folder, EXIT_WORDS.get(code, "")))
     return outcome.folder, code
 
@@ -58,21 +59,26 @@ def run_sides_with_page(
 def _run(
     configs: Mapping[str, Config],
     screen: Screen,
-    consumers: Sequence[Consumer] = (),
+    shown: Mapping[str, Consumer] | None = None,
     attend: Callable[[BothRuns], None] = lambda runs: None,
 ) -> tuple[OutcomeOfSides, SidesScreen]:
-    """Run with signals, keyboard and remote commands; ``consumers`` are of the front."""
+    """Run with signals, keyboard and remote commands; ``shown`` are further consumers, by side."""
     both, stop = SidesScreen(screen), StopSignal()
+    first, joint = next(iter(configs)), JointChannels() if FRONT in configs else None
     with ExitStack() as stack:
         sides = {}
         for name, config in configs.items():
             side = both.side(name)
             found = stack.enter_context(located(config, side.print))
-            sides[name] = Side(found, side, standard_consumers(side, consumers if name == FRONT else ()))
-        attach = stack.enter_context(attended(configs[FRONT], screen, stop))
+            more = [] if shown is None else [shown[name]]
+            made = standard_consumers(side, more, joint if name == first else None)
+            sides[name] = Side(found, side, made)
+        attach = stack.enter_context(attended(configs[first], screen, stop))
 
         def on_start(runs: BothRuns) -> None:
             both.attach(runs.states)
+            if joint is not None:
+                joint.attach(runs.states, live=runs.live)
             attach(runs)
             attend(runs)
 
@@ -88,11 +94,12 @@ def finish(outcome: OutcomeOfSides, both: SidesScreen) -> int:
     screen.print()
     code = outcome.exit_code
     try:
-        put_together(folder / FRONT, folder / BACK, folder / TABLE, screen)
+        if FRONT in outcome.sides:
+            put_together(folder / FRONT, folder / BACK, folder / TABLE, screen)
     except PhasedicError as error:
         screen.print(f"warning: front and back were not put together: {error}")
         code = code or LOSS
-    if outcome.sides[FRONT].config.output.report:
+    if next(iter(outcome.sides.values())).config.output.report:
         from live.commands.report import write_report
 
         write_report(folder, screen)

@@ -20,6 +20,14 @@ MEASURED_CHANNELS = {
     "latency_s": "time from the stamp of the last frame to the result, s",
     "noise_GL": "noise of one frame, grey levels",
 }
+JOINT_CHANNELS = {
+    "mean_time_s": "the newest instant that front and back both have, s since the start of the test",
+    "mean_axial": "axial strain then, mean of front and back",
+    "bending_axial": "axial strain of the front then, minus that mean",
+    "sigma_mean_axial": "standard uncertainty of mean_axial and of bending_axial",
+}
+"""Of a test with two cameras, front and back."""
+_JOINT = ("mean_", "bending_", "sigma_mean_")
 SYSTEM_CHANNELS = {
     "silent_s": "time since the last frame, s",
     "load_silent_s": "time since the last sample of the load cell, s",
@@ -41,5 +49,16 @@ DEFAULT_CHANNELS = (
 
 def channel_names(gauges: Iterable[str], *, system: bool = False) -> tuple[str, ...]:
     """All channels of a test with these gauges: ``gauge_NAME`` and ``sigma_gauge_NAME`` as in the files."""
+    gauges = tuple(gauges)
     own = (f"{prefix}gauge_{name}" for name in gauges for prefix in ("", "sigma_"))
-    return (*MEASURED_CHANNELS, *own, *(SYSTEM_CHANNELS if system else ()))
+    return (*MEASURED_CHANNELS, *own, *joint_channels(gauges), *(SYSTEM_CHANNELS if system else ()))
+
+
+def joint_channels(gauges: Iterable[str]) -> tuple[str, ...]:
+    """The channels of front and back together, with those of these gauges."""
+    return (*JOINT_CHANNELS, *(f"{prefix}gauge_{name}" for name in gauges for prefix in _JOINT))
+
+
+def is_joint(channel: str) -> bool:
+    """Whether a channel is of front and back together."""
+    return channel.startswith(_JOINT)

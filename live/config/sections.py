@@ -46,6 +46,9 @@ class CameraConfig:
         "camera behind the specimen: its rig file, whose sections camera, measure, scale, gauges and plate are those of"
         " the back; or its address, with the settings of the front",
         Option("back", "FILE.toml|ADDRESS"))
+    beside: str | None = key(TEXT, None,
+        "camera of another field of the specimen, as back: measured together, without a mean",
+        Option("beside", "FILE.toml|ADDRESS"))
     crop: tuple[int, int, int, int] | None = key(BOX, None,
         "x, y, width, height of the part of the picture to use, px; its corner is the origin of all coordinates",
         Option("crop", "X,Y,W,H", expert=True))
@@ -262,6 +265,8 @@ class SpecimenConfig:
     strain_error_um_m: float | None = key(number(0, 1e5), None,
         "limit of error of the strain that comes with the load over the elastic interval, um/m: motion off the plane"
         " (0.1 mm at 500 mm: 200), lens, alignment; in the interval of E")
+    modulus_GPa: float | None = key(number(1e-6, 1e6), None,
+        "modulus that is expected, GPa: phasedic check shows its budget in GPa too")
     nu: float | None = key(number(0, 0.5), None,
         "Poisson's ratio, where it is known: a warning where strains of an elastic test do not fit it")
     axis: str = key(choice(AUTO, "x", "y"), AUTO,

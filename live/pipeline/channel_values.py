@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from live.pipeline.measurement import Measurement, TimeStep
 from live.pipeline.snapshot import Snapshot
@@ -23,10 +23,17 @@ class ChannelValues:
     snapshot : callable
         Takes a time (s, monotonic) and a TimeStep, gives the Snapshot
         (``live.pipeline.run_state.RunState.snapshot``).
+    more : callable
+        Gives the values of further channels.
     """
 
-    def __init__(self, start: float, snapshot: Callable[[float, TimeStep], Snapshot]) -> None:
-        self._start, self._snapshot = start, snapshot
+    def __init__(
+        self,
+        start: float,
+        snapshot: Callable[[float, TimeStep], Snapshot],
+        more: Callable[[], Mapping[str, float]] = dict,
+    ) -> None:
+        self._start, self._snapshot, self._more = start, snapshot, more
         self._recent: deque[tuple[float, float]] = deque()
 
     def read(self, measurement: Measurement) -> dict[str, float]:
@@ -48,7 +55,7 @@ class ChannelValues:
         }
         for name, gauge in step.gauges.items():
             values |= {f"gauge_{name}": gauge.value, f"sigma_gauge_{name}": gauge.sigma}
-        return values
+        return {**values, **self._more()}
 
     def _rate(self, t: float, axial: float) -> float:
         """The slope of the least-squares line through the last second, three points or more."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Callable, Container, Iterator, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any, Generic, Literal, TypeVar, overload
 
 import numpy as np
@@ -193,13 +193,13 @@ class Thinned(Generic[Item]):
 
 
 def curve_of(
-    strain: Callable[[str], Array | None], gauges: Container[str], axis: str, t: Array, stress: Array
+    column: Callable[[str], Array | None], gauges: Container[str], axis: str, t: Array, stress: Array
 ) -> Curve:
-    """The curve of a test: ``stress`` over its extension, with the strains that E and nu are from.
+    """The curve of a test: ``stress`` over its extension, with the strains that E and nu are from, and the blur.
 
     Parameters
     ----------
-    strain : callable
+    column : callable
         Takes the name of a gauge or of a column of ``TimeStep``; None where there is none.
     gauges : container of str
         Names of the gauges.
@@ -207,6 +207,12 @@ def curve_of(
         Of the load.
     t, stress : (N,) float64
     """
+    return replace(_curve_of(column, gauges, axis, t, stress), blur=column("blur"))
+
+
+def _curve_of(
+    strain: Callable[[str], Array | None], gauges: Container[str], axis: str, t: Array, stress: Array
+) -> Curve:
     axial, transverse = strains_along(gauges, axis)
     elastic, extension = strain(axial), strain(extension_along(gauges, axis))
     lens = strain(f"sigma_lens_e{axis}{axis}")

@@ -107,6 +107,8 @@ class Health:
         What a live run does with its frames; empty in a replay.
     view_port : int or None
         Port of the view; None while there is none.
+    camera_failed : bool
+        The camera has ended with an error.
     """
 
     began_t: float = math.nan
@@ -118,6 +120,7 @@ class Health:
     latency_p95_s: float = math.nan
     state: str = ""
     view_port: int | None = None
+    camera_failed: bool = False
 
     def loaded(self, t: float, force_N: float) -> None:
         """Note a load sample that arrived at ``t`` (s, monotonic)."""

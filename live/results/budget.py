@@ -7,14 +7,14 @@ distributions (4.3.7). What is not stated is named, and is not in the sum.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from live.config.sections import CameraConfig, ScaleConfig
 
 MOTION_MM = 0.1
 """Towards the camera, that the budget gives the strain of."""
-LENS = "lens"
+LENS, BLUR = "lens", "blur"
 _KEYS = {
     "load cell": "specimen.force_error_percent",
     "section": "specimen.section_error_percent",
@@ -31,14 +31,17 @@ class BudgetRow:
     cause : str
     strain : float
         At the end of the elastic interval; NaN where it is not counted.
+    share : float
+        Of E.
     modulus : float
-        In the unit of E.
+        In the unit of E; NaN where E is not known.
     words : str
         Why it is not counted, and which key states it; else empty.
     """
 
     cause: str
     strain: float = math.nan
+    share: float = math.nan
     modulus: float = math.nan
     words: str = ""
 
@@ -56,17 +59,20 @@ class CameraView:
         Plates remove the motion off the plane.
     both_sides : bool
         The strain is the mean of front and back.
+    sharpness : str
+        What is known of a change of sharpness that is not counted, in words.
     """
 
     stand_off_mm: float | None = None
     readout_ms: float | None = None
     plates: bool = False
     both_sides: bool = False
+    sharpness: str = "not known"
 
     @classmethod
     def of(cls, camera: CameraConfig, scale: ScaleConfig, *, plates: bool) -> CameraView:
-        """As configured."""
-        return cls(scale.stand_off_mm, camera.readout_ms, plates)
+        """As configured, before a test."""
+        return cls(scale.stand_off_mm, camera.readout_ms, plates, sharpness="the test shows it")
 
 
 def budget_rows(
@@ -77,34 +83,51 @@ def budget_rows(
     Parameters
     ----------
     shares : mapping of str to float
-        Relative standard uncertainties: scatter, what is stated of load cell, section and strain, and of a lens
-        that is corrected.
+        Relative standard uncertainties: scatter, what is stated of load cell, section and strain, of a lens that is
+        corrected, and of a blur that came with the load.
     strain : float
         End of the elastic interval.
     modulus : float
-        E in any unit.
+        E in any unit; NaN where it is not known.
     view : CameraView
     stresses : bool
         The section is known.
     """
-    left_out = ({"section"} if not stresses else set()) | ({LENS} - shares.keys())
-    causes = [cause for cause in ("scatter", *_KEYS, LENS) if cause not in left_out]
+
+    def row(cause: str, share: float) -> BudgetRow:
+        return BudgetRow(cause, share * strain, share, share * modulus)
+
+    left_out = ({"section"} if not stresses else set()) | ({LENS, BLUR} - shares.keys())
+    causes = [cause for cause in ("scatter", *_KEYS, LENS, BLUR) if cause not in left_out]
     rows = [
-        BudgetRow(cause, shares[cause] * strain, shares[cause] * modulus)
+        row(cause, shares[cause])
         if cause in shares
         else BudgetRow(cause, words=f"not stated: {_KEYS.get(cause, 'not known')}")
         for cause in causes
     ]
-    combined = math.hypot(*shares.values())
     seen = _optics(view, stated="strain" in shares)
     optics = (BudgetRow(cause, words=words) for cause, words in seen if cause not in shares)
-    return [*rows, *optics, BudgetRow("combined", combined * strain, combined * modulus)]
+    return [*rows, *optics, row("combined", math.hypot(*shares.values()))]
+
+
+def budget_cells(rows: Iterable[BudgetRow], unit: str, one: float) -> list[tuple[str, ...]]:
+    """The table of a budget, heads first: um/m, % of E, and E where it is known, in ``unit``, ``one`` in that of E."""
+    rows = list(rows)
+    known = math.isfinite(rows[-1].modulus)
+
+    def cells(row: BudgetRow) -> tuple[str, ...]:
+        numbers = row.strain * 1e6, row.share * 100, row.modulus / one
+        texts = (row.words, "", "") if row.words else tuple(f"{number:.3g}" for number in numbers)
+        return (row.cause, *texts[: 3 if known else 2])
+
+    return [("", "µm/m", "% of E", unit)[: 4 if known else 3], *map(cells, rows)]
 
 
 def _optics(view: CameraView, *, stated: bool) -> Iterator[tuple[str, str]]:
     """What the view adds to strains, in words: removed, in the row strain where that is ``stated``, or not counted."""
     yield "motion off the plane", _motion(view, stated=stated)
     yield LENS, "in strain" if stated else "not stated: --lens, specimen.strain_error_um_m"
+    yield BLUR, view.sharpness
     shutter = "not stated: camera.readout_ms" if view.readout_ms is None else "removed"
     yield "rolling shutter", shutter if view.readout_ms != 0 else "none"
 

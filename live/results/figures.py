@@ -229,10 +229,15 @@ def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str
     rows = _rows(figures, specimen)
     hint = "" if specimen.area_m2 else " (give [specimen] width_mm and thickness_mm for E)"
     of = f" of {figures.elastic_strain}" if figures.elastic_strain else ""
-    stated = [cause for cause in figures.budget if cause != "scatter"]
-    beyond = f", of E with limits of {', '.join(stated)}" if stated else ""
+    beyond = f", of E with {beyond_scatter(figures)}" if beyond_scatter(figures) else ""
     words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, ±: {CONFIDENCE:.0%} interval{beyond})"
     return [_text(rows, "E") + hint + words, _known_texts(rows, _STRENGTHS)]
+
+
+def beyond_scatter(figures: TensileFigures) -> str:
+    """What the interval of E holds beside the scatter, in words; empty where it holds no more."""
+    causes = [cause for cause in figures.budget if cause != "scatter"]
+    return f"limits of {', '.join(causes)}" if causes else ""
 
 
 def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> dict[str, TensileRow]:

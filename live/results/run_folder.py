@@ -28,7 +28,7 @@ from analysis.evaluate import Curve, LoadAxis, load_axis
 from analysis.field import StrainField
 from live.config.loading import from_dict
 from live.config.sections import SpecimenConfig
-from live.config.sides import SIDES
+from live.config.sides import FIELDS, SIDES
 from live.pipeline.history import curve_of
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.results.pictures import Image, Pictures, of_images, of_session
@@ -248,7 +248,7 @@ class RunFolder(Closing):
     def _strain(self, name: str) -> NDArray[np.float64] | None:
         if name in (AXIAL, TRANSVERSE):
             return self.gauges[name].value
-        found = self.strain.values.get(name)
+        found = self.strain.values.get("blur_px" if name == "blur" else name)
         return None if found is None else np.asarray(found, np.float64)
 
     def field(self, row: int) -> StrainField:
@@ -323,8 +323,8 @@ def open_run(path: str | os.PathLike[str]) -> RunFolder:
     path = Path(path)
     file = path / STRAIN if path.is_dir() else path
     if not file.exists():
-        sides = [path / side for side in SIDES if (path / side / STRAIN).exists()]
+        sides = [path / side for side in (*SIDES, *FIELDS) if (path / side / STRAIN).exists()]
         if sides:
-            raise DataError(f"{path}: a test with two cameras; give the folder of one side, {sides[0]}")
+            raise DataError(f"{path}: a test with two cameras; give the folder of one, {sides[0]}")
         raise DataError(f"{path}: no {STRAIN} there; give the folder that phasedic run or replay wrote")
     return RunFolder(file.parent, Strain.open(file))

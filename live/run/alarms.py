@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
-from live.config.channels import SYSTEM_CHANNELS
+from live.config.channels import SYSTEM_CHANNELS, is_joint
 from live.config.loading import Config
 from live.config.sections import AlarmConfig
 from live.pipeline.channel_values import ChannelValues
@@ -29,6 +29,7 @@ log = logging.getLogger(__name__)
 EVERY_S = 0.2
 """The channels of the machine are checked at this interval."""
 _STRAINS = ("axial", "exx", "eyy", "exy", "largest")
+_TWO_CAMERAS = "a camera on each side: give --back"
 _UNITS = {"_N": "N", "_MPa": "MPa", "_s": "s", "_min": "min", "_GL": "GL", "": ""}
 _LABELS = {"silent_s": "no frame for", "load_silent_s": "no force for", "disk_min": "disk full in"}
 
@@ -107,14 +108,18 @@ def actions_of(config: AlarmConfig, means: ActionMeans) -> list[Action]:
     return [kind(config, means) for kind in ACTIONS if not kind.key or getattr(config, kind.key)]
 
 
-def check_alarms(config: Config) -> None:
-    """Refuse alarms on channels that have no value in a test with ``config``.
+def check_alarms(config: Config, *, both_sides: bool = False) -> None:
+    """Refuse alarms, and strain outputs of front and back, on channels that have no value in a test with ``config``.
 
     Raises
     ------
     ConfigError
-        A force without a load cell, a stress without a section, a disk that nothing is written to.
+        A force without a load cell, a stress without a section, a disk that nothing is written to, a mean of front and
+        back where not ``both_sides`` are measured.
     """
+    joint = next((one for one in config.strain_out.channels or () if is_joint(one)), "")
+    if joint and not both_sides:
+        raise ConfigError(f"strain_out.channels: {joint} needs {_TWO_CAMERAS}")
     missing = dict.fromkeys(("force_N", "stress_MPa", "load_silent_s"), "a load cell: give --load ADDRESS")
     if config.load.address != "none:":
         missing.clear()
@@ -122,6 +127,8 @@ def check_alarms(config: Config) -> None:
         missing.setdefault("stress_MPa", "the section: give --section W,T")
     if not config.record.enabled:
         missing["disk_min"] = "a recording: leave --no-record out"
+    if not both_sides:
+        missing |= {one.channel: _TWO_CAMERAS for one in config.alarm if is_joint(one.channel)}
     for number, alarm in enumerate(config.alarm, 1):
         if alarm.channel in missing:
             raise ConfigError(
@@ -132,7 +139,9 @@ def check_alarms(config: Config) -> None:
 
 def in_words(channel: str, value: float, limit: float) -> str:
     """A channel at its value beyond its limit, for a person: ``axial 4450 um/m, limit 4000``."""
-    plain = channel.removeprefix("sigma_")
+    plain = channel
+    for prefix in ("sigma_", "mean_", "bending_"):
+        plain = plain.removeprefix(prefix)
     if plain in _STRAINS or plain.startswith("gauge_"):
         return f"{channel.replace('_', ' ')} {value * 1e6:.0f} µm/m, limit {limit * 1e6:.0f}"
     suffix = next((one for one in _UNITS if plain.endswith(one)), "")
@@ -173,11 +182,22 @@ class Alarm:
         self.on = beyond > 0 or (before and beyond > -self.config.hysteresis)
         return self.on is not before
 
-    def message(self, value: float) -> str:
-        """Its text at ``value``."""
+    def lose(self) -> bool:
+        """Go on because the channel can have no value; whether it did. Only one of two cameras does so."""
+        before, self.on = self.on, self.on or is_joint(self.config.channel)
+        return self.on is not before
+
+    def message(self, value: float, lost: str = "") -> str:
+        """Its text at ``value``, or where there is none because of ``lost``."""
         c = self.config
         named = f"{c.name}: " if c.name else ""
-        return named + in_words(c.channel, value, self._limit)
+        words = f"{c.channel.replace('_', ' ')} is not known, {lost}" if lost else ""
+        return named + (words or in_words(c.channel, value, self._limit))
+
+
+def _is_due_by_itself(channel: str) -> bool:
+    """Whether a channel changes without a measurement."""
+    return channel in SYSTEM_CHANNELS or is_joint(channel)
 
 
 class AlarmWatch(Consumer):
@@ -192,6 +212,8 @@ class AlarmWatch(Consumer):
     active : ActiveAlarms
     on_event : callable taking an Event
     clock : callable giving monotonic seconds
+    lost : callable
+        Why channels of two cameras have no value any more; empty while they have. Alarms on them then come.
     """
 
     name = "alarms"
@@ -206,8 +228,9 @@ class AlarmWatch(Consumer):
         active: ActiveAlarms,
         on_event: EventSink,
         clock: Callable[[], float] = time.monotonic,
+        lost: Callable[[], str] = str,
     ) -> None:
-        self._alarms = alarms
+        self._alarms, self._lost = alarms, lost
         self._values, self._machine, self._active = values, machine, active
         self._on_event, self._clock = on_event, clock
         self._count = 0
@@ -219,22 +242,30 @@ class AlarmWatch(Consumer):
         self._check(self._values.read(measurement), stamp)
 
     def idle(self) -> float:
-        """Check the channels of the machine."""
+        """Check the channels of the machine, and whether those of two cameras still have values."""
         self._check(self._machine(self._clock()), math.nan)
-        return EVERY_S if any(alarm.config.channel in SYSTEM_CHANNELS for alarm in self._alarms) else math.inf
+        self._check_lost()
+        return EVERY_S if any(_is_due_by_itself(alarm.config.channel) for alarm in self._alarms) else math.inf
 
     def end(self) -> str:
-        """How often an alarm came on."""
+        """How often an alarm came on; a camera that has failed ends the test of its side, and may be why."""
+        self._check_lost()
         return f"{self._count} came" if self._count else "none came"
 
     def _check(self, values: Mapping[str, float], stamp: float) -> None:
         for alarm in self._alarms:
             value = values.get(alarm.config.channel, math.nan)
             if alarm.check(value):
-                self._changed(alarm, value, stamp)
+                self._changed(alarm, value, stamp, alarm.message(value))
 
-    def _changed(self, alarm: Alarm, value: float, stamp: float) -> None:
-        now, text = self._clock(), alarm.message(value)
+    def _check_lost(self) -> None:
+        why = self._lost()
+        for alarm in self._alarms:
+            if why and alarm.lose():
+                self._changed(alarm, None, math.nan, alarm.message(math.nan, why))
+
+    def _changed(self, alarm: Alarm, value: float | None, stamp: float, text: str) -> None:
+        now = self._clock()
         if alarm.on:
             self._count += 1
             self._active.set(alarm.name, text)

@@ -114,6 +114,7 @@ class Grabber:
             run_state.frame_counts,
         )
         self._plan, self._on_frame, self._on_burst = plan, on_frame, on_burst
+        self._health = run_state.health
         self.references: queue.SimpleQueue[ReferenceBurst] = queue.SimpleQueue()
         self.bursts: LatestQueue[Burst] = LatestQueue(
             waits=not camera.info.live,
@@ -174,7 +175,7 @@ class Grabber:
             self.bursts.close()
 
     def _ended_by(self, error: Exception, text: str) -> None:
-        self.error = error
+        self.error, self._health.camera_failed = error, True
         self._event_log.emit(EventKind.DEVICE, self._camera.info.address, text, "error")
 
     def _count_open_gap(self, silent_s: float) -> None:

@@ -67,8 +67,8 @@ class PreparedRun:
         yield f"files: {self.folder}"
 
 
-def new_run_state(config: Config, screen: Screen) -> RunState:
-    """The state of a test whose devices are opened next.
+def new_run_state(config: Config, screen: Screen, *, both_sides: bool = False) -> RunState:
+    """The state of a test, or of one side of it (``both_sides``), whose devices are opened next.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def new_run_state(config: Config, screen: Screen) -> RunState:
     """
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (phasedic devices lists what is there)")
-    check_alarms(config)
+    check_alarms(config, both_sides=both_sides)
     run_state = RunState.new(config.load.max_gap_s, config.load.lag_s, config.specimen)
     run_state.event_log.names |= _device_names(config)
     screen.print(f"opening {config.camera.address}")

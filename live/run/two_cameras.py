@@ -1,6 +1,6 @@
-"""A test with two cameras: front and back, each measured as a test of its own, with one load cell and one time zero.
+"""A test with two cameras, of both sides or two fields: each measured as a test of its own, one load cell and clock.
 
-Each side has its threads, its recording and its results, in a folder of its own. The kernel takes all cores for one
+Each has its threads, its recording and its results, in a folder of its own. The kernel takes all cores for one
 picture after the other, of whichever side.
 """
 
@@ -62,7 +62,7 @@ class BothRuns:
     Parameters
     ----------
     runs : mapping of side to LiveRun
-        That have begun.
+        That have begun; the first of them has the load cell, alarms and strain outputs.
     folder : Path
         Of the test.
     stop : StopSignal
@@ -74,9 +74,9 @@ class BothRuns:
 
     @property
     def _running(self) -> list[LiveRun]:
-        """The front first; both again when both have ended."""
-        every = sorted(self.runs.items(), key=lambda one: one[0] != FRONT)
-        return [run for _, run in every if run.grabber.running] or [run for _, run in every]
+        """Those that go on; both again when both have ended."""
+        every = list(self.runs.values())
+        return [run for run in every if run.grabber.running] or every
 
     @property
     def states(self) -> dict[str, RunState]:
@@ -100,8 +100,8 @@ class BothRuns:
 
     @property
     def run_state(self) -> RunState:
-        """Of the front."""
-        return self.runs[FRONT].run_state
+        """Of the first."""
+        return next(iter(self.runs.values())).run_state
 
     def stop(self, reason: str) -> None:
         """End both cleanly, soon."""
@@ -146,7 +146,7 @@ def run_two_cameras(
     stop: StopSignal | None = None,
     on_start: Callable[[BothRuns], object] = lambda both: None,
 ) -> OutcomeOfSides:
-    """Run a test with two cameras; ``on_start`` is called once both have begun.
+    """Run a test with two cameras, the leading one first; ``on_start`` is called once both have begun.
 
     A camera that fails in the test leaves the other side measuring. One that cannot be opened, or gives no reference,
     ends the test: it did not begin.
@@ -156,8 +156,11 @@ def run_two_cameras(
     ConfigError, DeviceError, DataError
         As ``live.run.live_run.run_live``.
     """
-    stop, front = stop or StopSignal(), sides[FRONT].config
-    states = {name: new_run_state(side.config, side.screen) for name, side in sides.items()}
+    stop, front = stop or StopSignal(), next(iter(sides.values())).config
+    are_sides = FRONT in sides
+    states = {
+        name: new_run_state(side.config, side.screen, both_sides=are_sides) for name, side in sides.items()
+    }
     sinks = [state.event_log.record for state in states.values()]
     rigs = open_two_rigs([side.config.camera for side in sides.values()], front.load, sinks)
     with ExitStack() as closing:
@@ -173,18 +176,17 @@ def run_two_cameras(
         def begin(name: str, live: LiveRun) -> None:
             begun[name] = live
             if len(begun) == len(sides):
-                on_start(BothRuns(begun, folder, stop))
+                on_start(BothRuns({name: begun[name] for name in sides}, folder, stop))
 
         return OutcomeOfSides(folder, _run(sides, _from_one_zero(prepared), states, stop, begin))
 
 
 def _from_one_zero(prepared: Mapping[str, PreparedRun]) -> dict[str, PreparedRun]:
-    """The same with the time zero of the front; raises ConfigError where the cameras have different clocks."""
+    """The same with the time zero of the first; raises ConfigError where the cameras have different clocks."""
     if len({run.rig.camera.info.clock == "nominal" for run in prepared.values()}) > 1:
-        raise ConfigError(
-            "front and back: one camera has nominal times and the other a clock; give two of one kind"
-        )
-    return {name: replace(run, start=prepared[FRONT].start) for name, run in prepared.items()}
+        raise ConfigError("two cameras: one has nominal times and the other a clock; give two of one kind")
+    start = next(iter(prepared.values())).start
+    return {name: replace(run, start=start) for name, run in prepared.items()}
 
 
 def _run(

@@ -141,6 +141,7 @@ def test_twelve_hours_at_one_frame_a_second(run: Callable[..., Outcome], tmp_pat
     again(tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_twenty_megapixels(tmp_path: Path) -> None:
     shape = (3648, 5472)
     part = 20 + 200 * Speckle((512, 512), radius=2.0, seed=3).render(Affine(), (512, 512))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from analysis import PhaseKernel
 from analysis.evaluate import AreaGauge, AreaStrain, ExtensionGauge, extension_of, load_axis
 from analysis.evaluate.area.affine import Places, covariance_of
-from analysis.field import Roi, StrainField, ZoiGrid, profile
+from analysis.field import CommonError, Roi, StrainField, ZoiGrid, profile
 from tests.accuracy.truth import Speckle
 from tests.accuracy.truth import pixels as pixel_grid
 
@@ -145,6 +147,42 @@ def test_unevenness_is_that_of_bending_and_about_one_sigma_of_noise() -> None:
         assert one is not None
         misfits.append(one.unevenness().misfit)
     assert np.sqrt(np.mean(np.square(misfits))) == pytest.approx(1, abs=0.15)
+
+
+def test_a_strain_of_the_second_degree_is_uneven() -> None:
+    zois = grid()
+    _, y = np.meshgrid(zois.x, zois.y)
+    area = AreaStrain.of(affine(zois, v=1e-3 * y + 1e-6 * (y - y.mean()) ** 3))
+    assert area is not None
+    expected = 3e-6 * np.std((zois.y - zois.y.mean()) ** 2)
+    assert area.unevenness().eyy == pytest.approx(expected, rel=1e-6)
+
+
+def test_what_all_zois_have_in_common_counts_by_its_affine_part() -> None:
+    zois = grid()
+    shapes = np.zeros((1, 6, *zois.shape))
+    shapes[0, 3], shapes[0, 5] = np.meshgrid(zois.x, zois.y)[1], 1.0  # all are longer along y by one share
+    plain = affine(zois)
+    alone, both = (
+        AreaStrain.of(plain),
+        AreaStrain.of(replace(plain, common=CommonError(shapes, np.array([[4e-8]])))),
+    )
+    assert alone is not None and both is not None
+    assert both.sigma("eyy") == pytest.approx(np.hypot(alone.sigma("eyy"), 2e-4), rel=1e-9)
+    assert both.sigma("exx") == pytest.approx(alone.sigma("exx"), rel=1e-9)
+    assert both.sigma_by(both.field.common, "eyy") == pytest.approx(2e-4, rel=1e-9)
+
+
+def test_shear_of_a_finite_strain() -> None:
+    g = {name: 100 * value for name, value in GRADIENT.items()}
+    zois = grid()
+    x, y = np.meshgrid(zois.x, zois.y)
+    values = {"u": g["du_dx"] * x + g["du_dy"] * y, "v": g["dv_dx"] * x + g["dv_dy"] * y, **g}
+    area = AreaStrain.of(replace(StrainField.from_values(zois, values, 1e-3), measure="green"))
+    assert area is not None
+    expected = g["du_dy"] + g["dv_dx"] + g["du_dx"] * g["du_dy"] + g["dv_dx"] * g["dv_dy"]
+    assert area.value("gamma_xy") == pytest.approx(expected, rel=1e-6)
+    assert area.value("exy") == pytest.approx(expected / 2, rel=1e-6)
 
 
 def test_strips_and_areas_are_gauges() -> None:

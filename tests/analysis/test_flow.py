@@ -118,3 +118,11 @@ def test_a_neck_is_found_where_strain_grows_while_the_rest_rests() -> None:
     assert neck(before, strained(dict.fromkeys(range(12), 0.25)), "y") is None, "an even strain is no neck"
     assert neck(before, strained({8: 0.201}, sigma=1e-2), "y") is None, "nor is noise"
     assert neck(before, strained({8: 0.41}), "x") is None
+
+
+@pytest.mark.parametrize(("sigma", "clear"), [(3.5e-3, True), (4.5e-3, False)])
+def test_a_neck_is_clear_beyond_five_sigmas_of_the_mean_of_its_section(sigma: float, clear: bool) -> None:
+    """A section has 8 ZOIs, each with the noise of two fields: half of ``sigma`` in the mean."""
+    before, after = (strained(rows, sigma=sigma) for rows in ({}, {8: 0.21}))
+    assert float(before.sigma("eyy")[0, 0]) == pytest.approx(sigma)
+    assert (neck(before, after, "y") is not None) is clear

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from analysis.evaluate import (
     GAUGE_KINDS,
     AreaGauge,
     CircleGauge,
+    ExtensionGauge,
     Gauge,
     LineGauge,
     StripGauge,
@@ -202,3 +204,17 @@ def test_a_box_is_drawn_in_whole_px_within_the_picture() -> None:
     corners = ((1.0, 2.0), (9.0, 2.0), (4.0, 8.0))
     assert AreaGauge.from_handles(AreaGauge("g", corners=corners).handles()) == {"corners": corners}
     assert LineGauge.from_handles([(1.234, 5), (9, 7.77)]) == {"start": (1.2, 5), "end": (9, 7.8)}
+
+
+@pytest.mark.parametrize("along", ["x", "y"])
+def test_the_ends_of_a_strip_are_thirds_across_the_load_and_sixths_along_it(along: Literal["x", "y"]) -> None:
+    zois = ZoiGrid.cover(Roi(0, 0, 160, 160), 16, 4)
+    place = np.meshgrid(zois.x, zois.y)["xy".index(along)]
+    across = np.meshgrid(zois.x, zois.y)["yx".index(along)]
+    box = (20.0, 70.0, 120.0, 12.0) if along == "x" else (70.0, 20.0, 12.0, 120.0)
+    inside = (across >= 70) & (across <= 82)
+    for gauge, end in ((TransverseGauge("t", box, along), 40.0), (ExtensionGauge("e", box, along), 20.0)):
+        first, last = gauge.zois(zois)
+        np.testing.assert_array_equal(first, inside & (place >= 20) & (place <= 20 + end))
+        np.testing.assert_array_equal(last, inside & (place >= 140 - end) & (place <= 140))
+    assert ExtensionGauge("e", box, along).length == pytest.approx(100.0)

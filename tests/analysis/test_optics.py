@@ -109,6 +109,16 @@ def test_removal_is_exact_for_a_large_homography_and_keeps_rigid_fields_at_zero(
     np.testing.assert_allclose(motion.removed_from(moved).parameters, 0, atol=1e-11)
 
 
+@pytest.mark.parametrize("model", ["scale", "pose", "homography"])
+def test_a_large_motion_of_plates_is_found_to_the_last_digits(model: Model) -> None:
+    fit, count = fit_of(TWO), {"scale": 4, "pose": 6, "homography": 8}[model]
+    truth = np.array([0.02, -0.03, 0.01, 0.05, 0.004, -0.006, 0.003, 0.002]) * (np.arange(8) < count)
+    motion = ApparentMotion(truth, AXIS, fit.length)
+    values = motion.at(*motion.places(StrainField.from_values(fit.layout.whole, {})))
+    field = StrainField.from_values(fit.layout.whole, dict(zip(NAMES, values, strict=True)), 1e-3)
+    np.testing.assert_allclose(fit.motion(field, model)[0].parameters, truth, atol=1e-9)
+
+
 def noisy(fit: PlateFit, rng: np.random.Generator) -> StrainField:
     """What white noise of the pixels makes of every ZOI, by the moments under its window."""
     grid = fit.layout.whole
@@ -206,6 +216,24 @@ def test_a_loaded_plate_is_named() -> None:
     words, not_rigid = trouble(fit, seen(fit, TWO, replace(settling(0.1, 0.1), plate_strain=0.3)))
     assert not_rigid
     assert "plate left is loaded" in words
+
+
+@pytest.mark.parametrize(("sigmas", "loaded"), [(6.0, True), (3.5, False)])
+def test_a_plate_is_loaded_beyond_four_sigmas(sigmas: float, loaded: bool) -> None:
+    fit = fit_of(TWO)
+    field = seen(fit, TWO, replace(settling(0.1, 0.1), plate_strain=0.3))
+    motion, _ = fit.motion(field, "pose")
+    plate = AreaStrain.of(motion.removed_from(part_of(field, fit.layout.plates["left"])))
+    assert plate is not None
+    stretch = abs(plate.value("exx") - plate.value("eyy")) / 2
+    more = stretch / sigmas / (math.hypot(plate.sigma("exx"), plate.sigma("eyy")) / 2)
+    assert stretch * (1 - 4 / 6) > 5e-5
+    noisier = replace(
+        field,
+        covariance=np.float32(more**2) * field.covariance,
+        covariance_reference=np.float32(more**2) * field.covariance_reference,
+    )
+    assert trouble(fit, noisier)[1] == loaded
 
 
 def test_a_lost_plate_is_named_and_may_come_back() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import fields, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from analysis.evaluate import (
     principal_direction,
 )
 from analysis.evaluate.curve import Loading, broken_at
-from analysis.evaluate.elastic import line_through
+from analysis.evaluate.elastic import _slope, line_through
 from tests.analysis.curves import Truth, composite, linear, lueders, noisy, ramberg_osgood
 
 SEEDS = 60
@@ -97,6 +98,22 @@ def test_stated_limits_of_error_are_in_the_interval_of_e() -> None:
     assert found.E.value == plain.E.value
     assert found.E_chord.high - found.E_chord.value > found.E.high - found.E.value
     assert found.nu == plain.nu
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_change_of_sharpness_that_comes_with_the_load_is_in_the_interval_of_e(sign: int) -> None:
+    interval = TensileOptions(free(Interval("strain", 0.0005, 0.0025)))
+    curve = noisy(linear(), 3)
+    noise = np.random.default_rng(5).normal(0, 0.01, len(curve.t))
+    grown = sign * np.sqrt(100 * np.abs(curve.strain)) + noise  # 0.25 px^2 at 0.0025
+    found = evaluate_test(replace(curve, blur=grown), interval)
+    assert list(found.budget) == ["scatter", "blur"]
+    assert found.budget["blur"] == pytest.approx(30e-6 / 0.0025 / math.sqrt(3), rel=0.05)
+    plain = evaluate_test(curve, interval)
+    assert found.E.value == plain.E.value
+    assert found.E.high - found.E.value > 1.5 * (plain.E.high - plain.E.value)
+    still = evaluate_test(replace(curve, blur=0.3 + noise), interval)
+    assert list(still.budget) == ["scatter"] and still.E == plain.E
 
 
 def test_the_uncertainty_of_a_corrected_lens_is_in_the_interval_of_e() -> None:
@@ -304,6 +321,17 @@ def tracks(
     )
 
 
+def test_the_slope_of_two_noises_is_that_of_total_least_squares() -> None:
+    """In units of the two noises, along the largest eigenvector of the covariance."""
+    for ratio in (0.5, 3.0, 7.0):
+        moments = np.array([[4.0, 9.0], [9.0, 30.0]])
+        scaled = moments / np.outer([1.0, ratio], [1.0, ratio])
+        across, along = np.linalg.eigh(scaled)[1][:, -1]
+        expected = ratio * along / across
+        assert _slope(4.0, 9.0, 30.0, 0.2, 0.2 * ratio) == pytest.approx(expected, rel=1e-9), ratio
+
+
+@cache
 def found(lag: float, **test: float) -> list[Figure]:
     return [find_lag(*tracks(seed, lag, **test)) for seed in range(50)]
 

@@ -28,6 +28,9 @@ CASES: dict[str, list[str]] = {
     "60 fps, burst 4, 945 ZOIs": ["--fps", "60", "--burst", "4"],
     "150 fps, burst 4, 945 ZOIs": ["--fps", "150", "--burst", "4", "--disk"],
     "30 fps, 945 ZOIs, nothing else": ["--bare"],
+    "two cameras, 30 fps, burst 2, 400 ZOIs each": [
+        *("--two", "--burst", "2", "--roi", "320,192,672,672", "--step", "32", "--seconds", "66")
+    ],
     "2448x2048, 75 fps, burst 2, 1,147 ZOIs": [
         *_camera(2448, 2048),
         "--fps",

@@ -1,19 +1,24 @@
 """``python -m tests.bench.soak --minutes 30``: does anything grow in a long run?
 
-The running program as in ``live_case`` (camera from memory, recording, view served and written, load cell), its
-recording rotated and old parts removed here. Every 10 s the memory and the open handles of each of its processes
-are read from /proc; the slopes from the sixth minute on are what counts. ``--csv`` keeps the curve.
+The running program as in ``live_case`` (camera from memory, recording, view served and written, load cell), with
+the page and a client of the strain output, each read in a process of its own. The recording is rotated and its old
+parts are removed here. Every 10 s the memory and the open handles of each of its processes are read from /proc; the
+slopes from the sixth minute on are what counts. ``--csv`` keeps the curve.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
+import multiprocessing
 import os
+import socket
 import sys
 import tempfile
 import threading
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,12 +28,15 @@ from live.commands.consumers import standard_consumers
 from live.config.loading import load_config
 from live.run.live_run import run_live
 from live.ui.terminal.screen import TerminalScreen
+from live.ui.web.page_controller import PageController
 from tests.bench.live_case import Watch, skipped_share
+from tests.live.ui.web.http_page import HttpPage
 
 WARM_S = 300.0
 """Not counted: caches and histories fill."""
 LOOK_S = 10.0
 KEPT_PARTS = 2
+STRAIN_OUT_PORT = 19_877
 
 
 @dataclass
@@ -99,20 +107,53 @@ def attend(folder: Path, curve: Curve, ended: threading.Event) -> None:
             old.unlink(missing_ok=True)
 
 
+def read_page(address: str) -> None:
+    """As a browser: all events, and the whole curve every ``LOOK_S``."""
+    page = HttpPage(address)
+    threading.Thread(target=page.read_all, daemon=True).start()
+    with contextlib.suppress(OSError):  # the program has ended
+        while True:
+            page.points()
+            time.sleep(LOOK_S)
+
+
+def read_strain() -> None:
+    """A client of the strain output."""
+    while True:
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", STRAIN_OUT_PORT)) as client:
+            while client.recv(2**16):
+                pass
+            return
+        time.sleep(0.5)
+
+
+@contextlib.contextmanager
+def beside(target: Callable[..., None], *arguments: str) -> Iterator[None]:
+    """A process of its own for ``target``."""
+    process = multiprocessing.get_context("spawn").Process(target=target, args=arguments, daemon=True)
+    process.start()
+    yield
+    process.terminate()
+    process.join()
+
+
 def run(case: argparse.Namespace, folder: Path) -> tuple[dict[str, object], Curve]:
     """The long run; what it kept up with and what grew."""
     camera = f"bench:?width={case.width}&height={case.height}&fps={case.fps:g}&seconds={case.minutes * 60:g}&buffers=8"
     config = load_config(None, {
-        "camera.address": camera, "load.address": "sim:?rate=80", "measure.zoi": 64, "measure.step": 35,
+        "camera.address": camera, "load.address": "sim:?rate=80", "measure.zoi": 64, "measure.step": case.step,
         "measure.burst": 1, "record.rotate_MB": 1000.0, "view.spawn": False, "output.dir": str(folder / "run"),
+        "strain_out.tcp": str(STRAIN_OUT_PORT),
     })  # fmt: skip
     watch, curve, ended = Watch(), Curve(), threading.Event()
     thread = threading.Thread(target=attend, args=(folder, curve, ended), daemon=True)
     thread.start()
     screen = TerminalScreen(quiet=True)
-    outcome = run_live(config, screen, consumers=standard_consumers(screen, [watch]))
-    ended.set()
-    thread.join()
+    with PageController(None) as page, beside(read_page, page.address), beside(read_strain):
+        consumers = standard_consumers(screen, [watch, page.begin(config)])
+        outcome = run_live(config, screen, consumers=consumers, on_start=page.attach)
+        ended.set()
+        thread.join()
     rows = watch.rows()
     early = rows[(rows[:, 0] > rows[0, 0] + 60) & (rows[:, 0] < rows[0, 0] + WARM_S), 3]
     late = rows[rows[:, 0] > rows[-1, 0] - WARM_S, 3]
@@ -122,6 +163,7 @@ def run(case: argparse.Namespace, folder: Path) -> tuple[dict[str, object], Curv
         "p95 ms of minutes 2 to 5": round(float(np.percentile(early, 95)) * 1e3, 1) if len(early) else None,
         "p95 ms of the last 5": round(float(np.percentile(late, 95)) * 1e3, 1),
         "lost": outcome.run_state.frame_counts.lost, "not recorded": outcome.run_state.frame_counts.unrecorded,
+        "MB of strain.h5": round((folder / "run" / "strain.h5").stat().st_size / 1e6),
         "exit code": outcome.exit_code, "processes": curve.slopes(),
     }  # fmt: skip
     return found, curve
@@ -133,6 +175,7 @@ def main() -> int:
     parser.add_argument("--fps", type=float, default=30.0)
     parser.add_argument("--width", type=int, default=1280)
     parser.add_argument("--height", type=int, default=1024)
+    parser.add_argument("--step", type=int, default=34, help="1,008 ZOIs with a picture of 1280 x 1024")
     parser.add_argument("--csv", type=Path)
     case = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="phasedic-soak-") as name:

@@ -171,6 +171,7 @@ def test_cameras_of_somebody_else_are_listed_with_ours(
     install_example(tmp_path, monkeypatch)
     ours = CameraListing("/dev/video7", "", "this user may not open it")
     monkeypatch.setattr("acquire.v4l2.listing.list_cameras", lambda: [ours])
+    monkeypatch.setattr("acquire.serial_line.ports.list_serial_ports", list)  # those of the machine
     monkeypatch.chdir(tmp_path)
     (tmp_path / "good.raw").write_bytes(bytes(640 * 480 * 2))
     (tmp_path / "odd.raw").write_bytes(bytes(7))

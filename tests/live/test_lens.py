@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from pathlib import Path
 
 import cv2
@@ -71,9 +72,12 @@ def lens(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def corrected(lens: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Its calibration file is gone when it is replayed."""
     out = tmp_path_factory.mktemp("corrected") / "run"
+    used = Path(shutil.copy(lens, out.parent / "used.toml"))
     rig = ["--camera", f"sim:?{VIEW}", "--load", "sim:", "--section", "10,4", "--report"]
-    assert main(["run", *rig, *TEST, "--lens", str(lens), "--out", str(out)]) == 0
+    assert main(["run", *rig, *TEST, "--lens", str(used), "--out", str(out)]) == 0
+    used.unlink()
     return out
 
 

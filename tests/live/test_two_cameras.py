@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import json
 import shutil
+import socket
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +97,9 @@ def test_the_mean_has_neither_motion_nor_bending(good: Path) -> None:
     assert sides.both.E.low < specimen.E < sides.both.E.high
     assert sides.front.E.value < 0.85 * specimen.E
     assert sides.back.E.value > 1.2 * specimen.E
+    assert not any("limits" in line for line in sides.figure_lines(stresses=True))
+    stated = replace(sides, both=replace(sides.both, budget={"scatter": 1e-3, "load cell": 3e-3}))
+    assert list(stated.figure_lines(stresses=True))[-1] == "±: 95% interval, of E with limits of load cell"
 
 
 def test_one_clock_and_one_load_cell(good: Path) -> None:
@@ -138,7 +145,7 @@ def test_the_report_has_both_sides(good: Path, tmp_path: Path, capsys: pytest.Ca
     assert (folder / "sides.csv").read_bytes() == (good / "strain.csv").read_bytes()
     capsys.readouterr()
     assert main(["show", str(folder)]) == 4
-    assert f"give the folder of one side, {folder / 'front'}" in capsys.readouterr().err
+    assert f"give the folder of one, {folder / 'front'}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("side", ["front", "back"])
@@ -158,6 +165,58 @@ def test_a_camera_that_fails_leaves_the_other_measuring(
     found = table(tmp_path / "test")
     assert np.isfinite(found["mean_axial"]).sum() == 13
     assert len(found["mean_axial"]) == (13 if side == "front" else 28)
+
+
+LIVE = f"sim:?{VIEW}".replace("&lockstep=yes", "")
+BEHIND = "&seed=7&side=back"
+
+
+def listened(folder: Path, *alarm: str, **cameras: str) -> list[dict[str, float | None]]:
+    """What a test sends by UDP; ``alarm``: lines of one in its rig file."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.setblocking(False)
+        rig = folder.with_suffix(".toml")
+        rig.write_text("\n".join([f"[strain_out]\nudp = '127.0.0.1:{listener.getsockname()[1]}'", *alarm]))
+        devices = ["--camera", cameras["front"], "--back", cameras["back"], "--load", "sim:"]
+        main(["run", "--config", str(rig), *devices, *MEASURE, *QUIET, "--out", str(folder)])
+        lines = []
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                lines.append(listener.recv(65536).decode().strip())
+    return [{"line": 1.0} if text == "HALT" else json.loads(text) for text in lines]
+
+
+def test_the_mean_goes_out_with_its_sigma(tmp_path: Path) -> None:
+    lines = listened(tmp_path / "test", front=LIVE, back=LIVE + BEHIND)
+    found, sent = table(tmp_path / "test"), [one for one in lines if one["mean_axial"] is not None]
+    assert len(sent) > len(lines) / 2 > 5
+    for one in sent:
+        k = int(np.argmin(np.abs(found["time_s"] - float(one["mean_time_s"] or 0))))
+        for channel, column in (
+            ("mean_axial",) * 2,
+            ("bending_axial",) * 2,
+            ("sigma_mean_axial", "sigma_axial"),
+        ):
+            assert one[channel] == pytest.approx(found[column][k], rel=1e-6, abs=1e-12)
+
+
+ALARM = "[[alarm]]\nchannel = 'mean_axial'\nabove = 0.02\nend = true\nline = 'HALT'"
+
+
+@pytest.mark.parametrize("side", ["front", "back"])
+def test_a_camera_that_fails_sends_no_mean_and_ends_what_an_alarm_on_it_guards(
+    side: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cameras = {"front": LIVE, "back": LIVE + BEHIND}
+    cameras[side] += "&faults=gone@2"
+    lines = listened(tmp_path / "test", ALARM, **cameras)
+    assert {"line": 1.0} in lines
+    assert f"mean axial is not known, the camera of the {side} has failed" in capsys.readouterr().out
+    after = lines[lines.index({"line": 1.0}) :]
+    assert not [one for one in after if one.get("mean_axial") is not None]
+    with Strain.open(tmp_path / "test" / ("back" if side == "front" else "front") / "strain.h5") as other:
+        assert other.time_s[-1] < 4.5  # the alarm has ended the test of both
 
 
 def test_a_camera_that_is_not_there_refuses_the_test(tmp_path: Path) -> None:
@@ -203,7 +262,7 @@ def test_mean_and_bending_while_it_runs(tmp_path: Path) -> None:
     for one in outcome.sides.values():
         kinds = [event.kind for event in one.run_state.event_log.events()]
         assert kinds.count(EventKind.NOTE) == 1
-    mean, bending, sigma = next(values["axial"] for values in reversed(screen.shown) if values)
+    mean, bending, sigma, _ = next(values["axial"] for values in reversed(screen.shown) if values)
     specimen = specimen_from(parse_address(FRONT))
     assert 0 < sigma < 1e-5
     assert 0 <= bending < 0.25 * float(specimen.axial_strain(6.0)) + 5 * sigma
@@ -227,7 +286,7 @@ class FakeRun:
 
 def test_a_command_is_for_both_and_a_tare_is_one() -> None:
     front, back = FakeRun(), FakeRun()
-    runs: Any = {"back": back, "front": front}
+    runs: Any = {"front": front, "back": back}
     both = BothRuns(runs, Path(), StopSignal())
     assert both.command(EventKind.NOTE, "seen") == "done"
     assert both.command(EventKind.TARE) == "done"
@@ -288,8 +347,68 @@ def test_the_configuration_of_each_side(tmp_path: Path) -> None:
     assert plain.camera == CameraConfig(address="/dev/video2")
     assert (plain.measure.mask, plain.measure.zoi, list(plain.gauges)) == (None, 24, ["axial"])
     back.write_text("[camera]\naddress = 'sim:'\nback = 'sim:'\n")
-    with pytest.raises(ConfigError, match=r"no camera\.back"):
+    with pytest.raises(ConfigError, match=r"no camera\.back or camera\.beside"):
         side_configs(load_config(None, front | {"camera.back": str(back)}), {})
+
+
+FIELDS = ["--camera", FRONT, "--beside", FRONT.replace("?", "?seed=11&"), "--load", "sim:"]
+
+
+@pytest.fixture(scope="module")
+def fields(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("fields") / "test"
+    rig = folder.with_suffix(".toml")
+    rig.write_text(
+        "[specimen]\narea_mm2 = 40\nstandard = 'free'\nmodulus_between = [1e-4, 7e-4]\n"
+        "[[alarm]]\nchannel = 'axial'\nabove = 0.5\n"
+    )
+    assert (
+        main(["run", "--config", str(rig), *FIELDS, *MEASURE, *QUIET, "--report", "--out", str(folder)]) == 0
+    )
+    return folder
+
+
+def test_two_fields_have_one_clock_and_each_its_strains(
+    fields: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert not (fields / "strain.csv").exists()  # neither a mean nor bending
+    specimen = specimen_from(parse_address(FRONT))
+    with open_run(fields / "first") as first, open_run(fields / "second") as second:
+        assert first.start_monotonic == second.start_monotonic
+        assert first.load_samples == second.load_samples
+        for run in (first, second):
+            bent = specimen.axial_strain(np.asarray(run.strain.time_s)) * (1 + BENDING)
+            error = np.asarray(run.strain.values["eyy"]) - bent
+            assert 0.5 * MOTION < error[-1] < 1.5 * MOTION  # one camera alone has the motion
+        assert not np.array_equal(first.strain.values["eyy"], second.strain.values["eyy"])
+    text = (fields / "report.html").read_text()
+    assert all(
+        words in text for words in ("two fields of view", "Budget of E, second", 'href="first/report.html"')
+    )
+    assert "Front minus mean" not in text
+    assert main(["show", str(fields)]) == 4
+    assert f"give the folder of one, {fields / 'first'}" in capsys.readouterr().err
+
+
+def test_a_replay_of_two_fields_is_bit_equal(fields: Path, tmp_path: Path) -> None:
+    out = tmp_path / "again"
+    assert main(["replay", str(fields), "--as-measured", "--out", str(out), *QUIET]) == 0
+    for name in ("first", "second"):
+        with Strain.open(fields / name / "strain.h5") as live, Strain.open(out / name / "strain.h5") as again:
+            for column in live.names:
+                np.testing.assert_array_equal(live.maps(column), again.maps(column), err_msg=column)
+
+
+def test_two_fields_have_no_mean(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text("[[alarm]]\nchannel = 'mean_axial'\nabove = 0.02\n")
+    assert (
+        main(["run", "--config", str(rig), *FIELDS, *MEASURE, *QUIET, "--out", str(tmp_path / "test")]) == 2
+    )
+    assert "can never come: it needs a camera on each side" in capsys.readouterr().err
+    both = [*FIELDS, "--back", BACK]
+    assert main(["run", *both, *MEASURE, *QUIET, "--out", str(tmp_path / "test")]) == 2
+    assert "give --back or --beside, not both" in capsys.readouterr().err
 
 
 def test_simulated_cameras_see_one_specimen() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from acquire.errors import DataError
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
-from live.results.budget import CameraView
+from live.results.budget import CameraView, budget_cells
 from live.results.figures import axis_text, budget_of, figure_lines, headline, sharpness_line
 from live.results.report import curves
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
@@ -271,23 +271,19 @@ def _lens_section(run: RunFolder) -> list[Html]:
 
 def budget_table(run: RunFolder, curve: EvaluatedCurve, *, both_sides: bool = False) -> list[Html]:
     """What the interval of E is made of, and what is not stated; ``both_sides``: of the mean of front and back."""
-    view = CameraView(run.stand_off_mm, run.readout_ms, bool(run.section("plate")), both_sides)
+    sharpness = "no change with the load" if "blur_px" in run.strain.values else "not known"
+    view = CameraView(run.stand_off_mm, run.readout_ms, bool(run.section("plate")), both_sides, sharpness)
     rows = budget_of(curve.figures, view, stresses=curve.is_stress)
     if not rows:
         return [paragraph("E is not known, so it has no budget.", "open")]
-    unit, one = ("GPa", 1e9) if curve.is_stress else ("kN", 1e3)
-    cells = [
-        (row.cause, row.words, "")
-        if row.words
-        else (row.cause, f"{row.strain * 1e6:.3g}", f"{row.modulus / one:.3g}")
-        for row in rows
-    ]
+    heads, *cells = budget_cells(rows, *(("GPa", 1e9) if curve.is_stress else ("kN", 1e3)))
+    modulus = headline(curve.figures, stresses=curve.is_stress)[0]
     words = (
         "Standard uncertainties, of the strain at the end of the elastic interval and of E, combined as the GUM"
-        " (JCGM 100:2008) has it; stated limits of error are taken as even distributions. Rows with words are not"
-        " in the sum."
+        " (JCGM 100:2008) has it; limits of error are taken as even distributions. The interval of"
+        f" {CONFIDENCE:.0%} of {modulus.name} = {modulus.text} is that of all together. Rows with words are not in it."
     )
-    return [paragraph(words), table(("", "µm/m", unit), cells, (1, 2))]
+    return [paragraph(words), table(heads, cells, (1, 2, 3))]
 
 
 def _noise_section(content: _Content) -> list[Html]:

@@ -1,6 +1,8 @@
-"""The report of a test with two cameras: mean and bending, the figures by each side, and the budget of the mean."""
+"""The report of a test with two cameras: the figures by each; of sides mean and bending, and the budget of the mean."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -38,7 +40,6 @@ def report_of_sides(front: RunFolder, back: RunFolder, reports: dict[str, str]) 
     sides = SidesOfTest.of_folders(front, back)
     stresses = front.specimen.area_m2 is not None
     figures = _stress_strain(sides, stresses), _over_time(sides, "mean"), _over_time(sides, "bending")
-    links = [element("p", element("a", f"report of the {side}", href=name)) for side, name in reports.items()]
     parts = [
         element("h1", f"{front.title}: front and back"),
         paragraph(f"Test of {front.strain.start_utc}. {ALIKE}", "dim"),
@@ -48,9 +49,41 @@ def report_of_sides(front: RunFolder, back: RunFolder, reports: dict[str, str]) 
         section(
             "Budget of E of the mean", *budget_table(front, _evaluated(sides, stresses), both_sides=True)
         ),
-        section("The sides", *links),
+        section("The sides", *_links(reports)),
     ]
     return Report(page(f"{front.title}: phasedic report of two cameras", parts), figures)
+
+
+def report_of_fields(runs: Mapping[str, RunFolder], reports: Mapping[str, str]) -> Report:
+    """The report of two fields of view, each with its own strains and figures; parameters as of ``report_of_sides``."""
+    first = next(iter(runs.values()))
+    stresses = first.specimen.area_m2 is not None
+    curves = {name: EvaluatedCurve.of(run) for name, run in runs.items()}
+    found = {name: headline(curve.figures, stresses=stresses) for name, curve in curves.items()}
+    e = strain_unit(*(curve.axial for curve in curves.values()))
+    lines = tuple(
+        PlotLine(name, np.asarray(runs[name].strain.time_s, np.float64), curve.axial * e.factor, colour=k)
+        for k, (name, curve) in enumerate(curves.items())
+    )
+    figures = (Plot("strain-time", "Strain along the load", "time, s", f"strain, {e.name}", lines),)
+    heads = ("field", *(row.name for row in next(iter(found.values()))))
+    rows = [(name, *(row.text for row in one)) for name, one in found.items()]
+    budgets = [
+        section(f"Budget of E, {name}", *budget_table(runs[name], curve)) for name, curve in curves.items()
+    ]
+    parts = [
+        element("h1", f"{first.title}: two fields of view"),
+        paragraph(f"Test of {first.strain.start_utc}, with one load cell and one clock.", "dim"),
+        section("Curves", plots(figures)),
+        section("Figures of the test", table(heads, rows)),
+        *budgets,
+        section("The fields", *_links(reports)),
+    ]
+    return Report(page(f"{first.title}: phasedic report of two fields", parts), figures)
+
+
+def _links(reports: Mapping[str, str]) -> list[Html]:
+    return [element("p", element("a", f"report of the {side}", href=name)) for side, name in reports.items()]
 
 
 def _evaluated(sides: SidesOfTest, stresses: bool) -> EvaluatedCurve:

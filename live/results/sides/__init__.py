@@ -1,1 +1,1 @@
-"""Front and back of one specimen: ``together`` puts two runs together, ``folder`` has where they are, and clocks."""
+"""Front and back of one specimen: two runs put together, their folders and clocks, and channels while they run."""

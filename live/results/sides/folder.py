@@ -6,20 +6,26 @@ from datetime import datetime
 from pathlib import Path
 
 from acquire.errors import DataError
-from live.config.sides import SIDES
+from live.config.sides import FIELDS, SIDES
 from live.results.run_folder import SESSION, STRAIN, RunFolder
 
 CLOCKS_AGREE_S = 2.0  # the clock of the day may have been set in between
 
 
-def has_sides(folder: Path) -> bool:
-    """Whether ``folder`` is that of a test with two cameras."""
-    return not (folder / STRAIN).exists() and all((folder / side / STRAIN).is_file() for side in SIDES)
+def sides_in(folder: Path) -> tuple[str, str] | None:
+    """The names of both cameras, where ``folder`` is that of a test with two; else None."""
+    return None if (folder / STRAIN).exists() else _with_both(folder, STRAIN)
 
 
-def has_recorded_sides(folder: Path) -> bool:
-    """Whether ``folder`` has the recordings of both sides."""
-    return all((folder / side / SESSION).is_file() for side in SIDES)
+def recorded_sides_in(folder: Path) -> tuple[str, str] | None:
+    """The names of both cameras, where ``folder`` has the recordings of both; else None."""
+    return _with_both(folder, SESSION)
+
+
+def _with_both(folder: Path, file: str) -> tuple[str, str] | None:
+    return next(
+        (names for names in (SIDES, FIELDS) if all((folder / n / file).is_file() for n in names)), None
+    )
 
 
 def shift_s(front: RunFolder, back: RunFolder) -> float:

@@ -9,18 +9,26 @@ import csv
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from analysis.evaluate import Course, Curve, TensileFigures, TensileOptions, TwoSides, evaluate_test
+from analysis.evaluate import (
+    CONFIDENCE,
+    Course,
+    Curve,
+    TensileFigures,
+    TensileOptions,
+    TwoSides,
+    evaluate_test,
+)
 from live.config.sections import SpecimenConfig
 from live.config.sides import SIDES
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.pipeline.run_state import RunState
-from live.results.figures import headline, tensile_options
+from live.results.figures import beyond_scatter, headline, tensile_options
 from live.results.run_folder import RunFolder
 from live.results.sides.folder import shift_s
 
@@ -132,6 +140,8 @@ class SidesOfTest:
             rows = (row for row in headline(getattr(self, where), stresses=stresses) if row.figure.known)
             known = "  ".join(f"{row.name} = {row.text}" for row in rows) or "no figure is known"
             yield f"{where + ':':<7}{known}"
+        if held := beyond_scatter(self.both):
+            yield f"±: {CONFIDENCE:.0%} interval, of E with {held}"
 
 
 def longest_gap(t: NDArray[np.float64]) -> float:
@@ -144,8 +154,19 @@ def two_sides(front: dict[str, Course], back: dict[str, Course], max_gap_s: floa
     return {name: TwoSides.of(one, back[name], max_gap_s) for name, one in front.items() if name in back}
 
 
-def newest(front: RunState, back: RunState) -> dict[str, tuple[float, float, float]]:
-    """Mean, bending and sigma of the axial strain and of each gauge at the newest instant that both sides have."""
+class JointStrain(NamedTuple):
+    """A strain of both sides at one instant: mean, bending, the sigma of either, and the time, s."""
+
+    mean: float
+    bending: float
+    sigma: float
+    t: float
+
+
+def newest(front: RunState, back: RunState) -> dict[str, JointStrain]:
+    """The axial strain and each gauge at the newest instant that both sides have; none once a camera has failed."""
+    if front.health.camera_failed or back.health.camera_failed:
+        return {}
     one, other = _recent(front), _recent(back)
     if not one or not other:
         return {}
@@ -154,7 +175,9 @@ def newest(front: RunState, back: RunState) -> dict[str, tuple[float, float, flo
         known = np.flatnonzero(np.isfinite(both.mean))
         if len(known):
             k = known[-1]
-            found[name] = float(both.mean[k]), float(both.bending[k]), float(both.sigma[k])
+            found[name] = JointStrain(
+                *(float(one[k]) for one in (both.mean, both.bending, both.sigma, both.t))
+            )
     return found
 
 
@@ -182,7 +205,7 @@ def _at_the_front(front: Curve, back: Curve, gap: float) -> Curve:
     return replace(
         back, t=front.t, strain=strain, stress=front.stress, transverse=moved(back.transverse),
         elastic=moved(back.elastic), uneven=moved(back.uneven), misfit=moved(back.misfit),
-        narrowing=moved(back.narrowing), lens=moved(back.lens),
+        narrowing=moved(back.narrowing), lens=moved(back.lens), blur=moved(back.blur),
     )  # fmt: skip
 
 
@@ -199,9 +222,12 @@ def _mean_of(front: Curve, back: Curve) -> Curve:
     narrowing = mean(front.narrowing, back.narrowing)
     known = [lens for lens in (front.lens, back.lens) if lens is not None]
     lens = np.hypot.reduce(known) / 2 if known else None
+    # Errors of the two cameras by their blur are not alike: as variances of independent errors.
+    blurs = [blur for blur in (front.blur, back.blur) if blur is not None]
+    blur = np.sqrt(np.hypot.reduce([one**2 for one in blurs]) / 2) if len(blurs) == 2 else None
     return Curve(
         front.t, strain, front.stress, transverse, elastic, narrowing=narrowing, lens=lens,
-        source=f"mean of both sides: {front.source}", elastic_source=front.elastic_source,
+        source=f"mean of both sides: {front.source}", elastic_source=front.elastic_source, blur=blur,
     )  # fmt: skip
 
 

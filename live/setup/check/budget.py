@@ -6,7 +6,7 @@ import math
 
 from live.config.loading import Config
 from live.pipeline.measurement import AXIAL
-from live.results.budget import CameraView, budget_rows
+from live.results.budget import CameraView, budget_cells, budget_rows
 from live.results.figures import tensile_options
 from live.setup.check.check_list import CheckFigures
 
@@ -24,13 +24,14 @@ def budget_lines(figures: CheckFigures, config: Config) -> list[str]:
     strain = interval.high if interval.by == "strain" else ELASTIC
     shares = {"scatter": noise / strain, **options.limits.shares(strain)}
     view = CameraView.of(config.camera, config.scale, plates=bool(config.plate))
-    rows = budget_rows(shares, strain, 100.0, view, stresses=config.specimen.area_m2 is not None)
+    expected = config.specimen.modulus_GPa or math.nan
+    rows = budget_rows(shares, strain, expected, view, stresses=config.specimen.area_m2 is not None)
     head = f"budget of E, standard uncertainties, at a strain of {strain:.2%} (scatter: of one value)"
-    found = [head, f"  {'':<22} {'µm/m':>8} {'% of E':>8}"]
-    for row in rows:
-        figure = row.words or f"{row.strain * 1e6:>8.3g} {row.modulus:>8.3g}"
-        found.append(f"  {row.cause:<22} {figure}")
-    return found
+    return [head, *(_line(*cells) for cells in budget_cells(rows, "GPa", 1.0))]
+
+
+def _line(cause: str, first: str, second: str, *more: str) -> str:
+    return f"  {cause:<22} " + (" ".join(f"{one:>8}" for one in (first, second, *more)) if second else first)
 
 
 def _noise(figures: CheckFigures) -> float:

@@ -41,7 +41,15 @@ def sides_line(
     words : str
     """
     first = next(iter(sides.values()))
-    return fitted([*_test(first), (3, words), *_both(both), *_machines(sides)], width)
+    strains = _both(both) if both else _each(sides)
+    return fitted([*_test(first), (3, words), *strains, *_machines(sides)], width)
+
+
+def _each(sides: Mapping[str, Snapshot]) -> Iterator[Item]:
+    """The strain of each camera, where there is no mean."""
+    for name, s in sides.items():
+        if not math.isnan(s.axial):
+            yield 5, f"{name} {strain_text(s.axial, s.sigma_axial)} µm/m"
 
 
 def _both(both: Mapping[str, SideValues]) -> Iterator[Item]:

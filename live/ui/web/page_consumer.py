@@ -66,6 +66,10 @@ class PageConsumer(Consumer):
     now : callable giving monotonic seconds
     picture : bytes
         Shown until there is one of the run, as JPEG.
+    kind : str
+        Of its messages.
+    side : str
+        The name of the camera; empty where there is only one.
 
     Attributes
     ----------
@@ -85,7 +89,10 @@ class PageConsumer(Consumer):
         config: Config,
         now: Callable[[], float] = time.monotonic,
         picture: bytes = b"",
+        kind: str = "run",
+        side: str = "",
     ) -> None:
+        self._kind, self._side = kind, side
         self._broadcaster, self._config, self._now = broadcaster, config, now
         self.map = MapView(config)
         names = list(config.gauges) or ["exx", "eyy", "exy"]
@@ -172,7 +179,7 @@ class PageConsumer(Consumer):
         now = self._now()
         if now >= self._due["state"]:
             self._due["state"] = now + STATE_S
-            self._broadcaster.publish("run", self.state())
+            self._broadcaster.publish(self._kind, self.state())
         if now >= self._due["picture"] and self._fresh and self._broadcaster.open_pages:
             self._draw()
             # Drawing takes at most a fifth of the time, also with large pictures.
@@ -181,7 +188,7 @@ class PageConsumer(Consumer):
 
     def end(self) -> str:
         """Send the last state."""
-        self._broadcaster.publish("run", self.state() | {"state": "ended", "recording": False})
+        self._broadcaster.publish(self._kind, self.state() | {"state": "ended", "recording": False})
         return f"{self._shown} pictures shown"
 
     def at_peak(self) -> dict[str, Any]:
@@ -192,7 +199,7 @@ class PageConsumer(Consumer):
         self.picture, shown = self.map.draw(m)
         self._shown += 1
         words = "at the end" if math.isnan(self._peak_N) else "at the highest force"
-        peak = shown | {"picture": f"/picture?after={self._shown}"}
+        peak = shown | {"picture": f"/picture?side={self._side}&after={self._shown}"}
         return {
             "peak": peak,
             "atpeak": words,
@@ -208,6 +215,7 @@ class PageConsumer(Consumer):
         elapsed_s = now - self._start_t
         s = Snapshot(now, elapsed_s=elapsed_s) if running is None else self._snapshot(running, now)
         values: dict[str, Any] = {
+            "side": self._side,
             "state": self._state_name(s),
             "elapsed_s": s.elapsed_s,
             "recording": None if running is None else running.recording,

@@ -22,18 +22,19 @@ from acquire.errors import PhasedicError
 from acquire.printable import brief, printable
 from analysis.evaluate import GAUGE_KINDS
 from live.config.loading import Config
-from live.pipeline.run_state import RunState
 from live.results.maps.field_maps import FIELD_MAPS
 from live.run.control import ONCE, Controls, answer
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.page_consumer import PageConsumer, Running
 from live.ui.web.painting import RAMP, as_png
+from live.ui.web.run_result import peaks
 from live.ui.web.server import DEFAULT_PORT, REPORT_POLICY, PageServer, Response, jpeg_response, json_response
-from live.ui.web.setup.config_draft import ConfigDraft, next_name
+from live.ui.web.setup.config_draft import ConfigDraft, next_name, second_draft
 from live.ui.web.setup.draft_changes import CHANGES
 from live.ui.web.setup.drawn_region import DrawnRegion
 from live.ui.web.setup.setup_session import SetupSession
+from live.ui.web.setup.setup_sessions import SetupSessions
 
 SET_UP, RUN, AFTER = "setup", "run", "after"
 START, NEXT, AGAIN, QUIT = "start", "next", "again", "quit"
@@ -57,8 +58,10 @@ class PageController:
     Attributes
     ----------
     stage : str
-    session : SetupSession or None
+    sessions : SetupSessions or None
         During set-up.
+    second : Config or None
+        Of the second camera of the test that ``set_up`` has begun.
     server : PageServer
     viewer : callable
         Opens a viewer at the port of the view; returns the answer for the page.
@@ -67,14 +70,17 @@ class PageController:
     def __init__(self, draft: ConfigDraft | None, port: int = DEFAULT_PORT) -> None:
         self.draft = draft
         self.stage = RUN if draft is None else SET_UP
-        self.session: SetupSession | None = None
-        self._drawn: DrawnRegion | None = None
+        self.sessions: SetupSessions | None = None
+        self.second: Config | None = None
+        self._second_draft: ConfigDraft | None = None
+        self._drawn: Mapping[str, DrawnRegion] = {}
         self._broadcaster = Broadcaster()
         self._consumer: PageConsumer | None = None
+        self._consumers: dict[str, PageConsumer] = {}
         self._live: ControlledRun | None = None
         self._report: Path | None = None
         self._result: dict[str, Any] = {}
-        self._stages, self._last_picture = 0, b""
+        self._stages, self._last_pictures = 0, dict[str, bytes]()
         self._requests: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._folder = TemporaryDirectory(prefix="phasedic-")
         self._message = ""
@@ -104,6 +110,11 @@ class PageController:
         """The address that a person opens in a browser."""
         return self.server.address
 
+    @property
+    def session(self) -> SetupSession | None:
+        """The set-up of the first camera; None outside it."""
+        return None if self.sessions is None else self.sessions.first
+
     def quit(self) -> None:
         """End the set-up, or the stage after a test."""
         self._requests.put(QUIT)
@@ -121,15 +132,17 @@ class PageController:
         assert self.draft is not None
         if not self.draft.config.metadata.get("specimen"):
             self.draft.change_all({"metadata.specimen": self._free_name(FIRST)})
-        with SetupSession(self.draft, self._broadcaster, self._drawn) as session:
-            self.session = session
+        self._second_draft = self._second_draft or second_draft(self.draft)
+        with SetupSessions(self.draft, self._second_draft, self._broadcaster, self._drawn) as sessions:
+            self.sessions = sessions
             self._enter(SET_UP, message)
             started = self._requests.get() == START
-        self.session, self._drawn, self._last_picture = None, session.region.drawn, session.picture
-        return self._to_run(session) if started else None
+        self.sessions, self._drawn, self._last_pictures = None, sessions.drawn, sessions.pictures
+        return self._to_run(sessions) if started else None
 
-    def _to_run(self, session: SetupSession) -> Config:
-        config = session.region.config(Path(self._folder.name))
+    def _to_run(self, sessions: SetupSessions) -> Config:
+        config, *others = sessions.configs(Path(self._folder.name))
+        self.second = others[0] if others else None
         wanted = self._folder_of(str(config.metadata["specimen"]))
         tries = (wanted.with_name(f"{wanted.name}_{n}") for n in range(2, 10_000))
         folder = next(one for one in tries if not one.exists()) if wanted.exists() else wanted
@@ -149,21 +162,38 @@ class PageController:
 
     def begin(self, config: Config) -> PageConsumer:
         """Begin the stage of the run; the consumer of its data."""
-        self._consumer, self._live = PageConsumer(self._broadcaster, config, picture=self._last_picture), None
-        self._enter(RUN, "")
-        return self._consumer
+        return self.begin_all({"": config})[""]
 
-    def attach(self, live: ControlledRun, sides: Mapping[str, RunState] | None = None) -> None:
-        """Pass commands to ``live`` from now on; ``sides`` are those of a test with two cameras."""
+    def begin_all(self, configs: Mapping[str, Config]) -> Mapping[str, PageConsumer]:
+        """Begin the stage of a run with these cameras, by name; the consumers of their data."""
+        self._consumers, self._live = {}, None
+        for name, config in configs.items():
+            kind, picture = "second" if self._consumers else "run", self._last_pictures.get(name, b"")
+            self._consumers[name] = PageConsumer(
+                self._broadcaster, config, picture=picture, kind=kind, side=name
+            )
+        self._consumer = next(iter(self._consumers.values()))
+        self._enter(RUN, "")
+        return self._consumers
+
+    def attach(self, live: ControlledRun) -> None:
+        """Pass commands to ``live`` from now on."""
         self._live = live
         if self._consumer is not None:
-            self._consumer.attach(live, sides)
+            self._consumer.attach(live)
+
+    def attach_both(self, both: ControlledRun, runs: Mapping[str, Running]) -> None:
+        """Pass commands to ``both`` from now on, whose cameras are ``runs``."""
+        self._live = both
+        states = {name: run.run_state for name, run in runs.items()}
+        for name, consumer in self._consumers.items():
+            first = consumer is self._consumer
+            consumer.attach(both if first else runs[name], states if first else None)
 
     def end(self, result: Mapping[str, Any]) -> None:
         """Begin the stage after the run and show its ``result``."""
         self._live, self._report = None, None
-        shown = {} if self._consumer is None else self._consumer.at_peak()
-        self._result = {**shown, **result, "report": None, **self._names()}
+        self._result = {**peaks(self._consumers), **result, "report": None, **self._names()}
         self._broadcaster.publish("after", self._result)
         self._enter(AFTER, "")
         if self.draft is None:
@@ -220,15 +250,18 @@ class PageController:
         return json_response(self._consumer.curve.since(int(edition), int(count)))
 
     def _picture(self, query: Mapping[str, str]) -> Response:
-        source = self.session or self._consumer
+        side = query.get("side", "")
+        source: SetupSession | PageConsumer | None = self._consumers.get(side, self._consumer)
+        if self.sessions is not None:
+            source = self.sessions.of(side)
         if source is not None and source.picture:
             return jpeg_response(source.picture)
         return Response(as_png(np.zeros((1, 1), np.uint8)), "image/png")
 
     def _mask(self, query: Mapping[str, str]) -> Response:
-        if self.session is None:
+        if self.sessions is None:
             raise HttpError(404, "nothing is set up")
-        return Response(self.session.region.shade(), "image/png")
+        return Response(self.sessions.of(query.get("side")).region.shade(), "image/png")
 
     def _value(self, query: Mapping[str, str]) -> Response:
         """The value of the map at a place of the picture, px."""
@@ -240,7 +273,12 @@ class PageController:
             raise HttpError(400, "x and y are numbers, in px") from None
         if not (abs(x) < 1e6 and abs(y) < 1e6):
             raise HttpError(400, "x and y are numbers, in px")
-        return json_response(self._consumer.map.value_at(x, y))
+        return json_response(self._consumers[self._side(query)].map.value_at(x, y))
+
+    def _side(self, query: Mapping[str, Any]) -> str:
+        """The camera that a request names, else the first."""
+        side = query.get("side")
+        return side if side in self._consumers else next(iter(self._consumers))
 
     def _show_report(self, query: Mapping[str, str]) -> Response:
         if self._report is None:
@@ -250,7 +288,7 @@ class PageController:
     def _map(self, request: Mapping[str, Any]) -> dict[str, str]:
         if self._consumer is None:
             return {"answer": "no: nothing is measured"}
-        refusal = self._consumer.select_map(request)
+        refusal = next(filter(None, [one.select_map(request) for one in self._consumers.values()]), "")
         return {"answer": f"no: {refusal}" if refusal else "ok"}
 
     def _viewer(self, request: Mapping[str, Any]) -> dict[str, str]:
@@ -274,14 +312,14 @@ class PageController:
         if live is not None:
             # Two pages must not confirm one another: the page that asks forces the tare.
             return answer(f"{command} {ONCE}" if command in ("t", "tare") else line, live)
-        if self.stage == RUN or (self.stage == SET_UP and self.session is None):
+        if self.stage == RUN or (self.stage == SET_UP and self.sessions is None):
             return "no: the test is being opened"
         allowed = (START, QUIT) if self.stage == SET_UP else (NEXT, AGAIN, QUIT)
         if command not in allowed or self.draft is None:
             return f"no: the commands of this stage are {', '.join(allowed)}"
         try:
-            if command == START and self.session is not None:
-                self.session.ready(Path(self._folder.name))
+            if command == START and self.sessions is not None:
+                self.sessions.ready(Path(self._folder.name))
         except PhasedicError as error:
             return f"no: {printable(brief(error))}"
         self._requests.put(command)
@@ -289,15 +327,18 @@ class PageController:
 
     def _change(self, request: Mapping[str, Any]) -> dict[str, str]:
         """Run a change of the set-up."""
-        session = self.session
-        if session is None:
+        sessions, do = self.sessions, str(request.get("do"))
+        if sessions is None:
             return {"answer": "no: nothing is set up now"}
-        change = CHANGES.get(str(request.get("do")))
-        if change is None:
-            return {"answer": f"no: the changes are {', '.join(CHANGES)}"}
+        change, of_all = CHANGES.get(do), {"check": sessions.check, "save": sessions.save}
+        if change is None and do not in of_all:
+            return {"answer": f"no: the changes are {', '.join((*CHANGES, *of_all))}"}
         try:
-            change(session, request)
+            if change is None:
+                of_all[do]()
+            else:
+                change(sessions.of(request.get("side")), request)
         except PhasedicError as error:
             return {"answer": f"no: {printable(brief(error))}"}
-        session.refresh()
+        sessions.refresh()
         return {"answer": "ok"}

@@ -10,14 +10,14 @@ import numpy as np
 
 from analysis.evaluate import TensileFigures
 from live.config.sections import SpecimenConfig
-from live.config.sides import FRONT
 from live.pipeline.event_log import sentence
 from live.pipeline.run_state import RunState
 from live.results.figures import TensileRow, evaluate, tensile_table
 from live.results.report.curves import load_unit, strain_unit, stress_strain
 from live.results.report.evaluation import EvaluatedCurve, intercept_of
 from live.results.summary import why_nothing
-from live.ui.web.sides import side_figures
+from live.ui.web.page_consumer import PageConsumer
+from live.ui.web.sides import figures_of, side_figures
 
 MAX_TROUBLES = 20
 
@@ -43,18 +43,28 @@ def run_result(run_state: RunState, specimen: SpecimenConfig, folder: Path, word
 def sides_result(
     states: Mapping[str, RunState], specimen: SpecimenConfig, folder: Path, words: str
 ) -> dict[str, Any]:
-    """The result of a test with two cameras: figures of the mean and of each side, warnings of both, else the front."""
+    """The result of a test with two cameras: figures of the mean and of each, warnings of both, else the first."""
     results = {side: run_result(state, specimen, folder / side, words) for side, state in states.items()}
-    figures = [
-        {"name": f"{one['name']}, {one['side']}", "text": one["text"], "interval": ""}
-        for one in side_figures(states, specimen)
-    ]
+    found = figures_of(states, specimen)
+    figures: list[dict[str, Any]] = [{**one, "interval": ""} for one in side_figures(found, specimen)]
+    figures += [_interval_of_e(one) for one in list(found.values())[:1] if one.E.known]
     return {
-        **results[FRONT],
+        **next(iter(results.values())),
         "folder": str(folder),
         "figures": figures,
         "troubles": [f"{side}: {text}" for side, one in results.items() for text in one["troubles"]],
     }
+
+
+def peaks(consumers: Mapping[str, PageConsumer]) -> dict[str, Any]:
+    """The maps and gauges at the highest force: those of the first camera, and of another one by its name."""
+    if not consumers:
+        return {}
+    (name, first), *others = ((name, consumer.at_peak()) for name, consumer in consumers.items())
+    if not others:
+        return first
+    gauges = [{**gauge, "side": side} for side, one in ((name, first), *others) for gauge in one["gauges"]]
+    return {**first, "gauges": gauges, "side": name, "second": {**others[0][1], "side": others[0][0]}}
 
 
 def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str, Any]]:
@@ -63,7 +73,15 @@ def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str
         found.append(
             {"name": "strain of E and nu", "text": figures.elastic_strain, "interval": "", "words": True}
         )
+    if figures.E.known:
+        found.append(_interval_of_e(figures))
     return found
+
+
+def _interval_of_e(figures: TensileFigures) -> dict[str, Any]:
+    parts = figures.budget if len(figures.budget) > 1 else ("scatter", "no limits of error are stated")
+    text = "; ".join(parts)
+    return {"name": "interval of E", "text": text, "interval": "", "words": True}
 
 
 def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> list[TensileRow]:

@@ -1,14 +1,15 @@
-"""Front and back on the page while a test with two cameras runs: mean and bending, E, and what each camera does."""
+"""Two cameras on the page while a test runs: of sides mean and bending, E, and what each camera does."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from analysis.evaluate import TensileFigures
 from live.config.sections import SpecimenConfig
 from live.config.sides import BACK, FRONT
 from live.pipeline.run_state import RunState
-from live.results.figures import headline, tensile_options
+from live.results.figures import evaluate, headline, tensile_options
 from live.results.sides.together import SideOfTest, SidesOfTest, newest
 
 FIGURES_S = 2.0
@@ -35,35 +36,48 @@ class SidesPanel:
         """Strains at the newest instant of both, figures of the test so far, and the cameras."""
         now = self._now()
         if now >= self._due:
-            self._figures = side_figures(self._states, self._specimen)
+            self._figures = side_figures(figures_of(self._states, self._specimen), self._specimen)
             self._due = max(now + FIGURES_S, self._now() + 10 * (self._now() - now))
-        strains = newest(self._states[FRONT], self._states[BACK])
+        strains = newest(self._states[FRONT], self._states[BACK]) if FRONT in self._states else {}
         return {
             "strains": [
-                {"name": name, "mean": mean, "bending": bending, "sigma": sigma}
-                for name, (mean, bending, sigma) in strains.items()
+                {"name": name, "mean": one.mean, "bending": one.bending, "sigma": one.sigma}
+                for name, one in strains.items()
             ],
             "figures": self._figures,
-            "cameras": [self._camera(side, now) for side in (FRONT, BACK)],
+            "cameras": [self._camera(side, now) for side in self._states],
         }
 
     def _camera(self, side: str, now: float) -> dict[str, Any]:
-        s = self._states[side].snapshot(now)
+        state = self._states[side]
+        s = state.snapshot(now)
         return {
-            "side": side, "valid": s.valid, "zois": s.zois, "fps": s.fps, "skipped": s.frames["skipped"],
+            "side": side,
+            "failed": state.health.camera_failed,
+            "valid": s.valid,
+            "zois": s.zois,
+            "fps": s.fps,
+            "skipped": s.frames["skipped"],
             "lost": s.lost,
-        }  # fmt: skip
+        }
 
 
-def side_figures(states: Mapping[str, RunState], specimen: SpecimenConfig) -> list[dict[str, str]]:
-    """E, nu and strengths that are known, by the mean of both sides and by each; empty before both have measured."""
+def figures_of(states: Mapping[str, RunState], specimen: SpecimenConfig) -> dict[str, TensileFigures]:
+    """The figures of a test so far, by the mean ("both") and by each side; of fields by each. None before strains."""
     if not all(state.history.has_values for state in states.values()):
-        return []
+        return {}
+    if FRONT not in states:
+        return {name: evaluate(state.history, state.loads, specimen) for name, state in states.items()}
     front, back = (SideOfTest.of_state(states[side], specimen) for side in (FRONT, BACK))
-    sides, stresses = SidesOfTest.of(front, back, tensile_options(specimen)), specimen.area_m2 is not None
+    sides = SidesOfTest.of(front, back, tensile_options(specimen))
+    return {"both": sides.both, FRONT: sides.front, BACK: sides.back}
+
+
+def side_figures(found: Mapping[str, TensileFigures], specimen: SpecimenConfig) -> list[dict[str, str]]:
+    """E, nu and strengths that are known."""
     return [
         {"side": where, "name": row.name, "text": row.text}
-        for where in ("both", FRONT, BACK)
-        for row in headline(getattr(sides, where), stresses=stresses)
+        for where, figures in found.items()
+        for row in headline(figures, stresses=specimen.area_m2 is not None)
         if row.figure.known
     ]

@@ -132,8 +132,11 @@ def test_calibrating_in_simulation_without_a_terminal(
     assert [path.name for path in tmp_path.iterdir()] == ["b.toml"]
 
 
-def test_the_simulated_rig_is_at_rest_before_a_run(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_simulated_rig_is_at_rest_before_a_run(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It began to pull after two seconds, and the checks of the README ended with NO-GO."""
+    monkeypatch.setattr("live.commands.check.LISTEN_S", 0.5)
     moving = "sim:?seconds=4&hold=0.01"
     assert main(["load-check", "--load", moving, "--seconds", "1"]) == 0
     small = ["--roi", "all", "--zoi", "48", "--step", "48", "--reference-burst", "8"]

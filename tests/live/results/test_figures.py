@@ -15,7 +15,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
 from live.pipeline.run_state import FrameCounts, RunState
-from live.results.budget import CameraView, budget_rows
+from live.results.budget import CameraView, budget_cells, budget_rows
 from live.results.figures import alignment_line, budget_of, elastic_lines, evaluate, figure_lines, lag_line
 from live.results.summary import summary_lines
 from tests.analysis.curves import Truth, composite, noisy, ramberg_osgood
@@ -74,13 +74,18 @@ def test_the_interval_of_e_names_the_limits_in_it() -> None:
     figures = evaluate(history, loads, stated)
     assert "interval, of E with limits of load cell, strain)" in figure_lines(figures, stated)[0]
     *rows, combined = budget_of(figures, CameraView(), stresses=True)
-    optics = ["motion off the plane", "lens", "rolling shutter"]
+    optics = ["motion off the plane", "lens", "blur", "rolling shutter"]
     assert [row.cause for row in rows] == ["scatter", "load cell", "section", "strain", *optics]
     assert figures.span is not None
     assert rows[1].modulus == pytest.approx(0.01 / 3**0.5 * figures.E.value)
     assert rows[1].strain == pytest.approx(0.01 / 3**0.5 * figures.span.strain[1])
     assert math.isnan(rows[2].modulus)
     assert rows[2].words == "not stated: specimen.section_error_percent"
+    heads, first, *_ = budget_cells([*rows, combined], "GPa", 1e9)
+    share = figures.budget["scatter"]
+    numbers = share * figures.span.strain[1] * 1e6, share * 100, share * figures.E.value / 1e9
+    assert heads == ("", "µm/m", "% of E", "GPa") and first[0] == "scatter"
+    assert [float(cell) for cell in first[1:]] == pytest.approx(numbers, rel=5e-3)
     assert combined.modulus == pytest.approx(
         math.hypot(*(row.modulus for row in (rows[0], rows[1], rows[3])))
     )
@@ -106,6 +111,15 @@ def test_what_the_budget_says_of_motion_off_the_plane(view: CameraView, stated: 
     assert rows["motion off the plane"].words == words
     assert rows["combined"].modulus == pytest.approx(70 * (0.005 if stated else 0.003))
     assert rows["combined"].strain == pytest.approx(5e-6 if stated else 3e-6)
+
+
+def test_a_blur_that_came_with_the_load_is_counted_and_else_named() -> None:
+    view = CameraView(sharpness="no change with the load")
+    rows = budget_rows({"scatter": 3e-3, "blur": 4e-3}, 1e-3, 70.0, view, stresses=True)
+    assert [row.strain for row in rows if row.cause == "blur"] == [pytest.approx(4e-6)]
+    assert rows[-1].modulus == pytest.approx(0.35)
+    rows = budget_rows({"scatter": 3e-3}, 1e-3, 70.0, view, stresses=True)
+    assert [row.words for row in rows if row.cause == "blur"] == ["no change with the load"]
 
 
 def test_the_budget_names_the_shutter() -> None:

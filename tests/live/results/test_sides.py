@@ -7,18 +7,20 @@ import math
 from collections.abc import Mapping
 from datetime import timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from acquire.errors import DataError
-from analysis.evaluate import Course, TwoSides, evaluate_test
+from analysis.evaluate import Course, Curve, TensileOptions, TwoSides, evaluate_test
 from live.cli import main
+from live.pipeline.measurement import AXIAL
+from live.pipeline.run_state import RunState
 from live.results.figures import tensile_options
 from live.results.run_folder import open_run
 from live.results.sides.folder import shift_s
-from live.results.sides.together import SidesOfTest
+from live.results.sides.together import SideOfTest, SidesOfTest, longest_gap, newest
 from tests.live import made_run
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run, noisy
 
@@ -45,6 +47,42 @@ def test_between_instants_by_lines_and_nothing_across_gaps() -> None:
     np.testing.assert_allclose(found.value, [np.nan, 0, 1, np.nan, np.nan, np.nan])
     assert found.sigma[2] == pytest.approx(2.5)
     assert np.isnan(Course(np.zeros(1), np.zeros(1), np.zeros(1)).at(np.zeros(3), 1.0).value).all()
+
+
+def test_a_gap_is_five_times_the_usual_distance_of_instants() -> None:
+    assert longest_gap(np.array([0.0, 0.2, 0.4, 0.6, 9.0])) == pytest.approx(1.0)
+    assert longest_gap(np.zeros(1)) == 0.0
+
+
+def test_the_curve_of_the_mean_has_means_and_the_stress_of_the_front() -> None:
+    """The errors of two lenses are independent: half of their root sum of squares is in the mean."""
+    t, ones = np.arange(60) / 10, np.ones(60)
+
+    def side(strain: float, lens: float, stress: float) -> SideOfTest:
+        curve = Curve(t, strain * t, stress * t, -strain * t / 4, narrowing=-strain * t, lens=lens * ones)
+        return SideOfTest({}, curve, stress * t)
+
+    front, back = side(1e-3, 3e-5, 7e7), side(3e-3, 4e-5, 9e7)
+    sides = SidesOfTest.of(front, back, TensileOptions())
+    assert sides.back.Rm.value == sides.both.Rm.value == sides.front.Rm.value == pytest.approx(7e7 * t[-1])
+    found = sides.curve
+    assert found.transverse is not None and found.narrowing is not None and found.lens is not None
+    np.testing.assert_allclose(found.strain, 2e-3 * t)
+    np.testing.assert_allclose(found.stress, 7e7 * t)
+    np.testing.assert_allclose(found.transverse, -5e-4 * t)
+    np.testing.assert_allclose(found.narrowing, -2e-3 * t)
+    np.testing.assert_allclose(found.lens, 2.5e-5)
+
+
+def test_the_newest_values_are_those_of_the_newest_instant_of_both(monkeypatch: pytest.MonkeyPatch) -> None:
+    def recent(last: int) -> dict[str, Course]:
+        t = np.arange(last + 1.0)
+        return {AXIAL: Course(t, 1e-3 * t * last, np.zeros(last + 1))}
+
+    monkeypatch.setattr("live.results.sides.together._recent", recent)
+    front, back = cast(RunState, 6), cast(RunState, 4)
+    mean, bending, _ = newest(front, back)[AXIAL]
+    assert mean == pytest.approx(4e-3 * (6 + 4) / 2) and bending == pytest.approx(4e-3 * (6 - 4) / 2)
 
 
 def test_mean_bending_and_their_sigma() -> None:

@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from live.replay.batch.row import _figures as batch_figures
 from live.results.figures import TensileRow, evaluate, figure_lines, headline, tensile_table
 from live.results.report import comparison
 from live.results.report.evaluation import EvaluatedCurve as RunCurve
-from live.results.report.report import tensile
+from live.results.report.report import budget_table, tensile
 from live.results.run_folder import open_run
 from live.results.summary import summary_lines
 from live.ui.web.run_result import run_result
@@ -126,6 +127,23 @@ def test_without_a_modulus_the_summary_has_the_strength_and_the_reason() -> None
     text = "\n".join(summary_lines(RunState(EventLog(), FrameCounts(), loads, few), FLAT))
     assert "Rm = " in text
     assert "not known: E, " in text
+
+
+def test_what_the_interval_of_e_holds_is_named_wherever_e_shows(tmp_path: Path) -> None:
+    stated = {**CONFIG, "specimen": {**CONFIG["specimen"], "force_error_percent": 1.0}}  # type: ignore[dict-item]
+    with open_run(make_run(tmp_path / "run", config=stated)) as run:
+        curve = RunCurve.of(run)
+        words, table = "".join(budget_table(run, curve)), "\n".join(figure_lines(curve.figures, run.specimen))
+        assert f"95 % of E = {tensile(curve)['E']} is that of all together".replace("95 %", "95%") in words
+    assert "95% interval, of E with limits of load cell)" in table
+    history, loads = kept(ramberg_osgood())
+    for specimen, text in (
+        (FLAT, "scatter; no limits of error are stated"),
+        (replace(FLAT, force_error_percent=1.0), "scatter; load cell"),
+    ):
+        state = RunState(EventLog(), FrameCounts(), loads, history)
+        page = run_result(state, specimen, Path("runs"), "")["figures"]
+        assert [one["text"] for one in page if one["name"] == "interval of E"] == [text]
 
 
 def test_the_strain_of_e_is_named_wherever_e_shows(tmp_path: Path) -> None:

@@ -55,6 +55,7 @@ def test_without_hysteresis_the_limit_itself_is_off() -> None:
         ("stress_MPa", {"specimen.area_mm2": 40.0}, "a load cell"),
         ("stress_MPa", {"load.address": "sim:"}, "the section"),
         ("disk_min", {"record.enabled": False}, "a recording"),
+        ("mean_axial", {}, "a camera on each side"),
         ("force_N", {"load.address": "sim:"}, ""),
         ("stress_MPa", {"load.address": "sim:", "specimen.area_mm2": 40.0}, ""),
         ("axial", {}, ""),
@@ -94,7 +95,7 @@ class WatchSetup:
     def __init__(self, *alarms: AlarmConfig) -> None:
         self.events: list[Event] = []
         self.active, self.values, self.now = ActiveAlarms(), dict[str, float](), 100.0
-        self.rung, self.ended, self.sent = 0, list[str](), Kept()
+        self.rung, self.ended, self.sent, self.lost = 0, list[str](), Kept(), ""
         means = ActionMeans(self._ring, self.ended.append, [self.sent])  # type: ignore[list-item]
         self.watch = AlarmWatch(
             [Alarm(config, actions_of(config, means)) for config in alarms],
@@ -103,6 +104,7 @@ class WatchSetup:
             self.active,
             self.events.append,
             lambda: self.now,  # type: ignore[arg-type]
+            lambda: self.lost,
         )
 
     def _ring(self) -> None:
@@ -161,6 +163,25 @@ def test_an_alarm_does_only_what_it_is_asked_for() -> None:
 def test_every_key_of_an_alarm_is_what_it_looks_at_or_an_action() -> None:
     looked_at = {"channel", "above", "below", "hysteresis", "name"}
     assert {field.name for field in fields(AlarmConfig)} == looked_at | {kind.key for kind in ACTIONS} - {""}
+
+
+def test_an_alarm_on_two_cameras_comes_when_there_is_no_value_any_more() -> None:
+    bench = WatchSetup(
+        AlarmConfig(channel="mean_axial", above=2e-3, line="HALT", end=True),
+        AlarmConfig(channel="axial", above=1.0),
+    )
+    assert bench.check(mean_axial=1e-3) == [] and bench.check() == []
+    bench.lost = "the camera of the back has failed"
+    assert bench.check() == [
+        {"alarm": "mean_axial above 0.002", "on": True, "value": None, "line": "HALT", "end": True}
+    ]
+    text = "mean axial is not known, the camera of the back has failed"
+    assert bench.active.texts == (text,)
+    assert (bench.sent.lines, bench.ended, bench.check()) == (["HALT"], [f"ALARM {text}"], [])
+    bench.lost = ""
+    assert [data["on"] for data in bench.check(mean_axial=1e-3)] == [False]
+    bench.lost = "the camera of the front has failed"
+    assert bench.watch.end() == "2 came"  # the front ends, and its alarms with it
 
 
 def test_an_action_that_fails_keeps_nothing_else_from_being_done() -> None:

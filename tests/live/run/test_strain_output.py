@@ -27,6 +27,7 @@ from live.config.loading import load_config
 from live.config.sections import SpecimenConfig
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.run_state import RunState
+from live.run.alarms import check_alarms
 from live.run.strain_output import LineFormat, SerialOut, TcpOut, UdpOut
 from tests.live.made_up import START, make_measurement
 from tests.live.run.test_tcp_lines import Caller
@@ -55,6 +56,15 @@ def test_a_measurement_as_json_and_as_csv() -> None:
     assert lines.heading == ",".join(CHANNELS)
     row = dict(zip(CHANNELS, lines.of(m).split(","), strict=True))
     assert row["axial"] == "0.0015" and row["frame"] == "16" and row["latency_s"] == "nan"
+
+
+def test_front_and_back_need_two_cameras() -> None:
+    config = load_config(
+        None, {"strain_out.channels": ["axial", "mean_gauge_left"], "gauges.left": {"at": [9, 9]}}
+    )
+    check_alarms(config, both_sides=True)
+    with pytest.raises(ConfigError, match=r"mean_gauge_left needs a camera on each side: give --back"):
+        check_alarms(config)
 
 
 def test_a_value_has_eight_digits() -> None:
@@ -211,6 +221,7 @@ def test_the_table_can_be_followed_while_the_test_runs(tmp_path: Path) -> None:
 RATE, UNTIL = 5e-4, 4e-3
 
 
+@pytest.mark.slow
 @pytest.mark.timed
 def test_the_strain_rate_is_held_through_yield(tmp_path: Path) -> None:
     """Within the 20 % of ISO 6892-1 over a second, where the machine alone would be 40 % off."""

@@ -15,10 +15,12 @@ from acquire.errors import ConfigError, DataError
 from acquire.files.picture import write_picture
 from live.config.loading import Config, from_dict, load_config, settings_in
 from live.config.rig_file import write_rig
+from live.config.sides import second_camera, side_configs
 
 CHANGEABLE = frozenset(
     {
-        "camera.address", "load.address", "measure.zoi", "measure.step", "measure.burst", "measure.roi",
+        "camera.address", "camera.back", "camera.beside", "load.address",
+        "measure.zoi", "measure.step", "measure.burst", "measure.roi",
         "measure.mask", "measure.gauges",
         "specimen.width_mm", "specimen.thickness_mm", "specimen.diameter_mm", "specimen.area_mm2",
         "specimen.gauge_length_mm", "specimen.axis", "specimen.standard", "metadata.specimen", "metadata.operator",
@@ -50,10 +52,11 @@ class ConfigDraft:
     ----------
     changes : dict of "section.key" to value
         Not saved yet; None removes a key.
+    overrides : mapping of "section.key" to value
     """
 
     def __init__(self, given: Config, path: Path, overrides: Mapping[str, Any]) -> None:
-        self.path = path
+        self.path, self.overrides = path, overrides
         self._transient = {key: value for key, value in overrides.items() if key.startswith(TRANSIENT)}
         in_file = settings_in(path) if path.exists() else {}
         permanent = {key: value for key, value in overrides.items() if key not in self._transient}
@@ -104,6 +107,25 @@ class ConfigDraft:
         except DataError as error:
             raise ConfigError(str(error)) from None
         return path
+
+
+def second_draft(first: ConfigDraft) -> ConfigDraft | None:
+    """That of a second camera, with a rig file of its own; None where there is one camera. Raises ConfigError."""
+    address = second_camera(first.config)
+    if address is None:
+        return None
+    name, own = list(side_configs(first.config, first.overrides).items())[1]
+    if address.lower().endswith(".toml"):
+        return ConfigDraft(own, Path(address), {})
+    given, usual = own.as_dict(), Config().as_dict()
+    taken = {
+        f"{section}.{key}": value
+        for section in ("measure", "scale", "gauges")
+        for key, value in given[section].items()
+        if value != usual[section].get(key)
+    }
+    path = first.path.with_stem(f"{first.path.stem}-{name}")
+    return ConfigDraft(own, path, {"camera.address": address, **taken})
 
 
 def next_name(name: str) -> str:

@@ -1,4 +1,4 @@
-"""The changes that a page can request during set-up: one function each; a refusal is a ConfigError or DataError."""
+"""The changes that a page can request during the set-up of a camera, one function each; a refusal is an exception."""
 
 from __future__ import annotations
 
@@ -120,7 +120,8 @@ def set_key(session: SetupSession, request: Request) -> None:
         or key in ("measure.roi", "measure.mask")
     ):
         raise ConfigError(f"{key} cannot be changed like this")
-    session.draft.change_all({key: None if value == "" else value})
+    of_specimen = key.startswith(("specimen.", "metadata.")) and key != "specimen.axis"
+    (session.shared if of_specimen else session.draft).change_all({key: None if value == "" else value})
     if key.startswith("measure."):
         session.region.changed()
 
@@ -207,19 +208,9 @@ def _number(what: str, value: object, low: float = -math.inf, high: float = math
         raise ConfigError(f"{what} is {allowed}") from None
 
 
-def check(session: SetupSession, request: Request) -> None:
-    """Run the whole check, with its table."""
-    session.check.begin()
-
-
 def reset_peak(session: SetupSession, request: Request) -> None:
     """Reset the peak of the sharpness."""
     session.check.reset_peak()
-
-
-def save(session: SetupSession, request: Request) -> None:
-    """Save the rig file."""
-    session.region.save()
 
 
 CHANGES: dict[str, Callable[[SetupSession, Request], None]] = {
@@ -241,7 +232,5 @@ CHANGES: dict[str, Callable[[SetupSession, Request], None]] = {
     "place": place,
     "scale": scale,
     "board": board,
-    "check": check,
     "forget": reset_peak,
-    "save": save,
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -45,6 +46,10 @@ class SetupSession:
         Gets the state for the pages.
     drawn : DrawnRegion, optional
         The region of the last specimen.
+    side : str
+        The name of the camera; empty where there is only one.
+    first : SetupSession, optional
+        That of the first of two cameras, which has the load cell and the specimen.
 
     Attributes
     ----------
@@ -58,34 +63,44 @@ class SetupSession:
     """
 
     def __init__(
-        self, draft: ConfigDraft, broadcaster: Broadcaster, drawn: DrawnRegion | None = None
+        self,
+        draft: ConfigDraft,
+        broadcaster: Broadcaster,
+        drawn: DrawnRegion | None = None,
+        side: str = "",
+        first: SetupSession | None = None,
     ) -> None:
         self.draft, self._broadcaster = draft, broadcaster
+        self.side, self._first = side, first
         self.picture = b""
         self.overlays = {"saturated": True, "quality": False}
         self._remarks: list[str] = []
         self._shown = 0
         self._folder = TemporaryDirectory(prefix="phasedic-")
         self._lock = threading.Lock()
-        self.devices = DeviceLists(lambda: Path(draft.config.output.dir or "runs"))
-        self.load = LoadPreview(draft)
+        known = DeviceLists(lambda: Path(draft.config.output.dir or "runs"))
+        self.devices: DeviceLists = known if first is None else first.devices
+        self.load: LoadPreview = LoadPreview(draft) if first is None else first.load
         self.preview = CameraPreview(
             draft, self._opened, self._show, lambda info: self.check.frames_needed(info)
         )
         self.region = SpecimenRegion(draft, drawn, lambda: self.check.discard())
-        self.check = SpecimenCheck(
-            draft, self.preview, self.load, self.region, Path(self._folder.name), self.refresh
+        load = self.load if first is None else None
+        self.check: SpecimenCheck = SpecimenCheck(
+            draft, self.preview, load, self.region, Path(self._folder.name), self.refresh
         )
 
     def __enter__(self) -> SetupSession:
         self.preview.start()
-        self.load.start()
+        if self._first is None:
+            self.load.start()
         self.check.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self.preview.close()
-        self.load.close()
+        if self._first is None:
+            self.load.close()
         self.check.close()
         self._folder.cleanup()
 
@@ -94,7 +109,12 @@ class SetupSession:
     def refresh(self) -> None:
         """Send the state to the pages."""
         with self._lock:
-            self._broadcaster.publish("setup", self.state())
+            self._broadcaster.publish("setup" if self._first is None else "second", self.state())
+
+    @property
+    def shared(self) -> ConfigDraft:
+        """The draft that has load cell, specimen and metadata."""
+        return self.draft if self._first is None else self._first.draft
 
     def find(self) -> None:
         """Find the specimen in the last frames; raises DataError where there is no picture or no specimen."""
@@ -113,7 +133,7 @@ class SetupSession:
 
     def open_load(self, address: str) -> None:
         """Read another load cell; its zero is its own. Raises ConfigError for an invalid address."""
-        self.draft.change_all({"load.address": address, "load.zero_N": 0.0})
+        self.shared.change_all({"load.address": address, "load.zero_N": 0.0})
         self.check.discard()
         self.load.reopen()
 
@@ -124,10 +144,11 @@ class SetupSession:
     def state(self) -> dict[str, Any]:
         """The state of the set-up, as the page shows it."""
         info, config, drawn = self.preview.info, self.draft.config, self.region.drawn
-        m, specimen = config.measure, config.specimen
+        m, specimen = config.measure, replace(self.shared.config.specimen, axis=config.specimen.axis)
         region = drawn and {"words": drawn.origin, "box": drawn.box, "edition": self.region.edition}
         return {
             **self.check.values,
+            "side": self.side,
             "remarks": self._remarks,
             "trouble": self.preview.trouble,
             "camera": None if info is None else camera_values(info),
@@ -141,7 +162,7 @@ class SetupSession:
             "plates": plate_shapes(config),
             "measure": {"zoi": m.zoi, "step": m.step, "burst": m.burst or DEFAULT_BURST},
             "specimen": {key: getattr(specimen, key) for key in SPECIMEN_KEYS},
-            "metadata": dict(config.metadata),
+            "metadata": dict(self.shared.config.metadata),
             "scale": {"px_per_mm": config.scale.px_per_mm, "sigma": config.scale.sigma_mm_per_px},
             "unsaved": sorted(self.draft.changes),
             "file": str(self.draft.path),

@@ -47,7 +47,8 @@ class SpecimenCheck:
     ----------
     draft : ConfigDraft
     preview : CameraPreview
-    load : LoadPreview
+    load : LoadPreview or None
+        None: another camera of the test has it.
     region : SpecimenRegion
     folder : Path
         For masks.
@@ -66,7 +67,7 @@ class SpecimenCheck:
         self,
         draft: ConfigDraft,
         preview: CameraPreview,
-        load: LoadPreview,
+        load: LoadPreview | None,
         region: SpecimenRegion,
         folder: Path,
         refresh: Callable[[], None],
@@ -169,7 +170,8 @@ class SpecimenCheck:
 
     def _check(self, frames: list[Frame], info: CameraInfo) -> None:
         edition, config = self._region.edition, self._region.config(self._folder)
-        figures = examine(frame_stack(frames, info), config, self._load.report())
+        load = None if self._load is None else self._load.report()
+        figures = examine(frame_stack(frames, info), config, load)
         shift = config.measure.reference_shift_px
         lines = [*check_lines(figures, None, shift), *self._load_lines(), self._gauge_line()]
         self._keep_figures(figures)
@@ -181,6 +183,8 @@ class SpecimenCheck:
 
     def _load_lines(self) -> Iterator[CheckLine]:
         """What the report on the load cell does not have: a cell that is missing, and none."""
+        if self._load is None:
+            return
         if self._load.address == NONE:
             yield CheckLine("load cell", "none: force, stress and modulus are not measured", measured=False)
         elif self._load.report() is None and not self._load.trouble:

@@ -26,7 +26,9 @@ function show() {
   put($("next"), result.next ?? "");
   put($("again"), result.again ?? "");
   finishCurve(result.lines ?? []);
-  showPeak(result.peak);
+  showPeak(result, result.side ?? "", document.querySelector(".peak"), "");
+  showPeak(result.second ?? {}, result.second?.side ?? "", document.querySelector(".peak.second"), "2");
+  document.body.classList.toggle("two", Boolean(result.second));
   showReport(result.report);
 }
 
@@ -35,27 +37,28 @@ const heads = (head) => el("tr", {}, ...head.map((text) => el("th", { text: t(te
 // One line for a figure: its name, its value with unit, its interval; or why it is not known.
 function row(one) {
   if (one.head) return heads(one.head);
-  const name = el("th", { text: one.name.includes(" ") ? t(one.name) : one.name, scope: "row" });
+  const name = el("th", { text: ofSide(one.name.includes(" ") ? t(one.name) : one.name, one), scope: "row" });
   if (one.text == null) return el("tr", { class: "unknown" }, name, el("td", { text: t(one.why), title: t(one.why), colSpan: 2 }));
   return el("tr", {}, name, el("td", { text: one.words ? t(one.text) : withRemark(one) }), el("td", { text: one.interval }));
 }
 
+const ofSide = (name, one) => (one.side ? `${name}, ${t(one.side)}` : name);
 const withRemark = (one) => (one.remark ? `${one.text} (${t(one.remark)})` : one.text);
 
 function gaugeRow(one) {
   if (one.head) return heads(one.head);
   const text = one.value == null ? t(one.reason || "lost") : strainText(one.value, one.sigma);
-  return el("tr", {}, el("th", { text: one.name, scope: "row" }), el("td", { text, colSpan: 2 }));
+  return el("tr", {}, el("th", { text: ofSide(one.name, one), scope: "row" }), el("td", { text, colSpan: 2 }));
 }
 
-function showPeak(peak) {
-  document.querySelector(".peak").hidden = !peak;
+function showPeak({ peak, atpeak }, side, section, suffix) {
+  section.hidden = !peak;
   if (!peak) return;
-  const factor = peak.strain ? strainUnit().factor : 1, unit = peak.strain ? strainUnit().name : peak.unit;
-  put($("peakwords"), `${t(peak.of)}, ${t(result.atpeak)}`);
-  if (!$("peakmap").src.endsWith(peak.picture)) $("peakmap").src = peak.picture;
-  drawGauges($("peakgauges"), peak.gauges, peak.width, peak.height);
-  put($("peakscale"), peak.high == null ? "" : `${short(peak.low * factor)} … ${short(peak.high * factor)} ${unit}`);
+  const of = (name) => $(name + suffix), factor = peak.strain ? strainUnit().factor : 1, unit = peak.strain ? strainUnit().name : peak.unit;
+  put(of("peakwords"), `${side ? `${t(side)}: ` : ""}${t(peak.of)}, ${t(atpeak)}`);
+  if (!of("peakmap").src.endsWith(peak.picture)) of("peakmap").src = peak.picture;
+  drawGauges(of("peakgauges"), peak.gauges, peak.width, peak.height);
+  put(of("peakscale"), peak.high == null ? "" : `${short(peak.low * factor)} … ${short(peak.high * factor)} ${unit}`);
 }
 
 // The report opens in a window of its own, or the page shows why there is none.

@@ -3,7 +3,7 @@ import { $, change, command, el, post, put } from "./base.js";
 import { ask, pause } from "./press.js";
 import { language, setLanguage, t } from "./words.js";
 import { themeChanged } from "./curves.js";
-import { beginRun, showRun } from "./run.js";
+import { beginRun, showRun, showSecond } from "./run.js";
 import { beginSetup, showSetup } from "./setup.js";
 import { setupKeys } from "./drawing.js";
 import { showAfter } from "./after.js";
@@ -32,6 +32,7 @@ const handlers = {
   },
   setup: (value) => { if (stage.stage === "setup") showSetup(value); },
   run: (value) => { if (stage.stage === "run") showRun(value); },
+  second: (value) => { if (stage.stage === "run") showSecond(value); else if (stage.stage === "setup") showSetup(value, true); },
   after: showAfter,
   beat() {},
   gone() {

@@ -52,4 +52,4 @@ function showAnswer(answer) {
 }
 
 export const command = (line) => post("/order", { line, stage: document.body.dataset.stage });
-export const change = (value) => post("/setup", value);
+export const change = (value) => post("/setup", { side: document.body.dataset.side ?? "", ...value });

@@ -40,6 +40,14 @@ function hint(words) {
   put($("hint"), t(words));
 }
 
+// Another picture is shown: what was begun on the last one is discarded.
+export function forgetDrawing() {
+  points = [];
+  drag = pending = cross = scaled = null;
+  asking = false;
+  sketch();
+}
+
 // A button for each kind of gauge; the first ones have the keys 5 to 8.
 export function beginDrawing(stage) {
   kinds = Object.fromEntries(stage.kinds.map((one) => [one.kind, one]));

@@ -6,19 +6,19 @@ import { t } from "./words.js";
 
 const READ_MS = 150;
 const svg = $("gaugemap");
-let loading = false, shownPicture = 0, picture = null, reading = 0, cross = null;
+let loading = false, shownPicture = "", picture = null, side = "", reading = 0, cross = null;
 const reset = zoomable(svg.parentElement, () => cross);
 svg.addEventListener("dblclick", reset);
 
 export function beginMap(stage) {
-  shownPicture = 0;
+  shownPicture = side = "";
   loading = false;
   reset();
   if (!$("component").children.length) {
     for (const name of stage.components) $("component").append(el("option", { value: name, t: name }));
   }
   $("ramp").style.background = `linear-gradient(to left, ${stage.ramp.join(", ")})`;
-  load(++shownPicture);
+  load("1");
 }
 
 let choosing = false; // "fixed" is chosen and waits for its limit: the range of the program does not take its place
@@ -40,12 +40,13 @@ function load(n) {
   loading = true;
   const image = $("map");
   image.onload = image.onerror = () => { loading = false; };
-  image.src = `/picture?run=${n}`;
+  image.src = `/picture?side=${side}&run=${n}`;
 }
 
-export function showMap(value) {
-  if (value.n !== shownPicture && !loading) { shownPicture = value.n; load(value.n); }
-  const mark = picture?.n !== value.n;
+export function showMap(value, of) {
+  const name = `${of} ${value.n}`, mark = name !== `${side} ${picture?.n}`;
+  side = of;
+  if (name !== shownPicture && !loading) { shownPicture = name; load(value.n); }
   picture = value;
   if (mark) showLegend();
   if (!value.width) return;
@@ -78,7 +79,7 @@ async function read(x, y) {
   const now = performance.now();
   if (!picture?.width || now - reading < READ_MS) return;
   reading = now;
-  const response = await fetch(`/value?x=${x.toFixed(1)}&y=${y.toFixed(1)}`);
+  const response = await fetch(`/value?side=${side}&x=${x.toFixed(1)}&y=${y.toFixed(1)}`);
   if (!response.ok) return;
   const found = await response.json(), place = `x ${x.toFixed(0)}, y ${y.toFixed(0)} px`;
   put($("readout"), found.value == null ? `${place}: ${t(found.status)}` : `${place}: ${picture.strain ? strainText(found.value, found.sigma) : `${fixed(found.value, 4)} ${picture.unit ?? ""}`}`);

@@ -3,13 +3,14 @@ import { $, el, fill, put } from "./base.js";
 import { clearCurves, updateCurves } from "./curves.js";
 import { beginMap, showMap } from "./map.js";
 import { chooseStrainUnit, colourOf, fixed, strainText, strainUnit, time, withSigma } from "./numbers.js";
+import { beginViews, noteFailed, received } from "./views.js";
 import { t } from "./words.js";
 
 const WORDS = {
   opening: "opening", reference: "reference: keep still", measuring: "measuring", paused: "paused", ended: "closing the files",
 };
 const RECORDING = { on: "REC", off: "NOT RECORDING" };
-let state = null;
+let state = null, firstEnded = false;
 
 $("strainunit").value = strainUnit().name;
 $("strainunit").addEventListener("change", (event) => { chooseStrainUnit(event.target.value); event.target.blur(); });
@@ -18,10 +19,19 @@ addEventListener("unit", () => { if (state) showStrains(state); });
 export function beginRun(stage) {
   clearCurves();
   beginMap(stage);
+  beginViews("run", (value) => { if (value.picture) showMap(value.picture, value.side); });
   showRun({ state: "opening", elapsed_s: 0, events: [], alarms: [], gauges: [], recording: null });
 }
 
 export function showRun(value) {
+  firstEnded = value.state === "ended";
+  show(value);
+  noteFailed(value.sides?.cameras);
+  showMapOf(value, false);
+  if (value.points) updateCurves(value.points);
+}
+
+function show(value) {
   state = value;
   const paused = value.state === "paused", ended = value.state === "ended";
   $("state").dataset.word = value.state;
@@ -41,8 +51,17 @@ export function showRun(value) {
   showStrip(value);
   showEvents(value.events);
   showAlarm(value);
-  if (value.picture) showMap(value.picture);
-  if (value.points) updateCurves(value.points);
+}
+
+// The other one of two cameras has its card, and its map where it is chosen; the figures too once the first has ended.
+export function showSecond(value) {
+  if (firstEnded && value.state !== "ended") show({ ...value, sides: state.sides && { ...state.sides, strains: [] } });
+  showMapOf(value, true);
+}
+
+function showMapOf(value, isSecond) {
+  const shown = received("run", value, isSecond);
+  if (shown?.picture) showMap(shown.picture, shown.side);
 }
 
 // Always written: REC or NOT RECORDING.
@@ -67,7 +86,8 @@ const withPart = (text, part) => (part ? `${text} ${t(part)}` : text);
 
 function showStrains(value) {
   const unit = strainUnit(), axial = value.axial, [text, sigma] = withSigma(axial?.value, axial?.sigma, unit);
-  put($("axialname"), withPart(withPart(axial?.name ?? "", axial?.assumed), value.part));
+  const name = value.side ? `${axial?.name ?? ""}, ${t(value.side)}` : axial?.name;
+  put($("axialname"), withPart(withPart(name ?? "", axial?.assumed), value.part));
   put($("axial"), text);
   put($("axialsigma"), sigma ? `± ${sigma} ${unit.name}` : "");
   const gauges = (value.gauges ?? []).map((one, k) => ({ ...one, k })), list = $("others");

@@ -1,9 +1,10 @@
 // Set-up: the live picture and its figures, the fields of the rig, the list of gauges.
 import { $, change, el, fill, put } from "./base.js";
-import { beginDrawing, showDrawing } from "./drawing.js";
-import { showCheck } from "./check.js";
+import { beginDrawing, forgetDrawing, showDrawing } from "./drawing.js";
+import { showCheck, showStart } from "./check.js";
 import { showDevices } from "./devices.js";
 import { colourOf, fixed, percent, short, strainText } from "./numbers.js";
+import { all, beginViews, received } from "./views.js";
 import { t } from "./words.js";
 
 let busy = false, shownPicture = -1, edition = -1;
@@ -36,9 +37,13 @@ export function beginSetup(stage) {
   busy = false;
   shownPicture = edition = -1;
   beginDrawing(stage);
+  beginViews("setup", (value) => { busy = false; shownPicture = edition = -1; forgetDrawing(); showSetup(value); });
 }
 
-export function showSetup(value) {
+export function showSetup(state, isSecond) {
+  const value = received("setup", state, isSecond), both = all("setup");
+  showStart(both.length ? both : [state]);
+  if (!value) return;
   put($("trouble"), t(value.trouble || value.doubt));
   put($("busy"), t(value.busy));
   put($("sharpness"), fixed(value.sharpness, 3));
@@ -65,11 +70,11 @@ function showPicture(value) {
     shownPicture = value.picture;
     const image = $("live");
     image.onload = image.onerror = () => { busy = false; };
-    image.src = `/picture?setup=${value.picture}`;
+    image.src = `/picture?side=${value.side}&setup=${value.picture}`;
   }
   if (value.region && value.region.edition !== edition) {
     edition = value.region.edition;
-    $("mask").src = `/mask?edition=${edition}-${Date.now()}`;
+    $("mask").src = `/mask?side=${value.side}&edition=${edition}-${Date.now()}`;
   }
 }
 

@@ -74,6 +74,7 @@ def working(out: Path) -> list[Path]:
     return [part for place in out.glob(".*.chunks") for part in parts(place)]
 
 
+@pytest.mark.slow
 def test_killed_in_the_middle(long: Path, tmp_path: Path) -> None:
     """The chunks that are whole are not done again."""
     out = tmp_path / "out"

@@ -14,6 +14,7 @@ from acquire.events import EventKind
 from acquire.files.picture import write_picture
 from acquire.frame import Frame
 from live.config.loading import Config, load_config
+from live.config.sides import side_configs
 from live.pipeline.run_state import RunState
 from live.setup.devices import at_rest, open_rig
 from live.ui.web.broadcaster import Broadcaster
@@ -30,10 +31,10 @@ CAMERA = "sim:uniform?width=256&height=192&fps=15&seconds=30"
 class PageSession:
     """A page controller with a rig, set up by a thread as ``phasedic page`` does it."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, camera: str = "") -> None:
         self.rig = folder / "rig.toml"
         self.rig.write_text(
-            f'# bench 3\n[camera]\naddress = "{CAMERA}"\n[measure]\nzoi = 32\ngauges = "auto"\n'
+            f'# bench 3\n[camera]\naddress = "{CAMERA}"\n{camera}[measure]\nzoi = 32\ngauges = "auto"\n'
         )
         said = {"output.dir": str(folder)}
         self.controller = PageController(ConfigDraft(load_config(self.rig, said), self.rig, said), port=0)
@@ -131,6 +132,57 @@ def test_set_up_changed_saved_and_started(at: PageSession, tmp_path: Path) -> No
     config = at.has_ended()
     assert config is not None and config.output.dir == str(tmp_path / "specimen-1")
     assert at.command("start").startswith("no:"), "it has been started"
+
+
+def test_two_cameras_are_set_up_checked_saved_and_started_together(tmp_path: Path) -> None:
+    at = PageSession(tmp_path, f'back = "{CAMERA}&side=back&seed=3"\n')
+    try:
+        sessions = at.controller.sessions
+        assert sessions is not None and list(sessions.by_name) == ["front", "back"]
+        front, back = sessions.by_name.values()
+        until(lambda: front.region.drawn is not None and back.region.drawn is not None)
+        box = {"tool": "rectangle", "points": [[20, 20], [200, 170]]}
+        assert at.change(do="draw", side="back", strokes=[box]) == "ok"
+        assert front.region.drawn != back.region.drawn
+        assert at.change(do="place", side="back") == "ok"
+        assert (
+            at.change(do="gauge", side="back", name="behind", kind="line", points=[[60, 40], [60, 130]])
+            == "ok"
+        )
+        assert at.change(do="set", side="back", key="specimen.width_mm", value=12.5) == "ok"
+        assert at.change(do="set", side="back", key="measure.step", value=12) == "ok"
+        assert (front.draft.config.specimen.width_mm, back.state()["specimen"]["width_mm"]) == (12.5, 12.5)
+        assert (front.draft.config.measure.step, back.draft.config.measure.step) == (16, 12)
+        assert at.change(do="load", side="back", value="sim:") == "ok"
+        assert front.draft.config.load.address == "sim:" and back.state()["load"]["address"] == "sim:"
+        pictures = {side: fetch(at.controller.server, f"/mask?side={side}").body for side in sessions.by_name}
+        assert pictures["front"] != pictures["back"]
+        assert at.change(do="check") == "ok"
+        until(lambda: all(one.check.values["go"] is not None for one in sessions.by_name.values()))
+        assert any(line["what"] == "load cell" for line in front.check.values["lines"])
+        assert not any(line["what"] == "load cell" for line in back.check.values["lines"])
+        assert at.change(do="save") == "ok"
+        own = load_config(tmp_path / "rig-back.toml", {})
+        assert load_config(at.rig, {}).camera.back == str(tmp_path / "rig-back.toml")
+        assert (own.camera.address, own.measure.zoi, own.measure.step) == (
+            f"{CAMERA}&side=back&seed=3",
+            32,
+            12,
+        )
+        assert own.measure.roi == (20, 20, 181, 151) and "behind" in own.gauges
+        assert at.command("start") == "ok"
+        config, second = at.has_ended(), at.controller.second
+        assert config is not None and second is not None
+        configs = side_configs(config, {}, second)
+        assert configs["back"].measure.roi == (20, 20, 181, 151) and configs["back"].load.address == "sim:"
+        assert configs["back"].specimen.width_mm == 12.5 and configs["front"].measure.roi != (
+            20,
+            20,
+            180,
+            150,
+        )
+    finally:
+        at.end()
 
 
 def test_a_camera_setting_that_is_refused_leaves_the_camera_as_it_was(at: PageSession) -> None:

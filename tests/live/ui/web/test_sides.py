@@ -56,6 +56,14 @@ def test_mean_bending_figures_and_cameras() -> None:
     assert front["valid"] == front["zois"] - 1
 
 
+def test_there_is_no_mean_once_a_camera_has_failed() -> None:
+    states = {"front": side(WRONG), "back": side(-WRONG)}
+    states["back"].health.camera_failed = True
+    shown = SidesPanel(states, SPECIMEN, lambda: START + 10).state()
+    assert shown["strains"] == []
+    assert [one["failed"] for one in shown["cameras"]] == [False, True]
+
+
 def test_figures_are_evaluated_now_and_then() -> None:
     states, now = {"front": side(WRONG, PULLED[:9]), "back": side(-WRONG)}, [100.0]
     panel = SidesPanel(states, SPECIMEN, lambda: now[0])
@@ -85,6 +93,16 @@ class Run:
         self.run_state = state
 
 
+def test_two_fields_have_figures_of_their_own_and_no_mean() -> None:
+    states = {"first": side(WRONG), "second": side(-WRONG)}
+    shown = SidesPanel(states, SPECIMEN, lambda: START + 10).state()
+    assert shown["strains"] == []
+    found = {one["side"]: float(one["text"].split()[0]) for one in shown["figures"] if one["name"] == "E"}
+    assert found["first"] == pytest.approx(E_PA / 1e9 / (1 + WRONG), rel=2e-3)
+    assert found["second"] == pytest.approx(E_PA / 1e9 / (1 - WRONG), rel=2e-3)
+    assert [one["side"] for one in shown["cameras"]] == ["first", "second"]
+
+
 def test_the_page_gets_both_sides() -> None:
     states = {"front": side(WRONG), "back": side(-WRONG)}
     consumer = PageConsumer(Broadcaster(), load_config(None, {}), lambda: START + 10)
@@ -97,7 +115,8 @@ def test_the_result_has_the_figures_of_both_and_the_warnings_of_each() -> None:
     states = {"front": side(WRONG), "back": side(-WRONG)}
     states["back"].event_log.emit(EventKind.DEVICE, "camera", "a fault", "error")
     result = sides_result(states, SPECIMEN, Path("test"), "")
-    names = [one["name"] for one in result["figures"]]
-    assert {"E, both", "E, front", "E, back"} <= set(names)
+    assert [one["side"] for one in result["figures"] if one["name"] == "E"] == ["both", "front", "back"]
+    held = [one["text"] for one in result["figures"] if one["name"] == "interval of E"]
+    assert held == ["scatter; no limits of error are stated"]
     assert result["folder"] == "test"
     assert any(text.startswith("back: ") and "a fault" in text for text in result["troubles"])

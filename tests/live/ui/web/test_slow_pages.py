@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
-import socket
-import struct
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import h5py
 import numpy as np
@@ -21,9 +17,10 @@ from live.pipeline.consumer_thread import ConsumerThread
 from live.ui.web.broadcaster import MAX_PAGES
 from live.ui.web.page_controller import PageController
 from tests.live.ui.web.browser import ROOT, Program
+from tests.live.ui.web.http_page import HttpPage
 from tests.live.ui.web.test_page_consumer import costs_of, measurement
 
-CAMERA = "sim:uniform?width=256&height=192&fps=20&seconds=12"
+CAMERA = "sim:uniform?width=256&height=192&fps=20&seconds=8"
 RUN = [
     "run",
     "--page",
@@ -39,55 +36,6 @@ RUN = [
     "32",
 ]
 TIMINGS = ("latency_s", "kernel_s")  # of the machine, not of the specimen
-
-
-class Browser:
-    """A page at the level of HTTP: the cookie, then the events, which are read or not."""
-
-    def __init__(self, address: str) -> None:
-        url = urlsplit(address)
-        self.port = url.port or 0
-        answer = self._ask(f"/?{url.query}", "")
-        cookie = answer.partition("Set-Cookie: ")[2].partition(";")[0]
-        assert cookie, answer
-        self.socket = self._opened()
-        self.socket.sendall(self._request("/events", cookie))
-        assert self.socket.recv(12) == b"HTTP/1.1 200"
-
-    def _opened(self) -> socket.socket:
-        opened = socket.socket()
-        opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)  # soon full
-        opened.settimeout(10)
-        opened.connect(("127.0.0.1", self.port))
-        return opened
-
-    def _request(self, path: str, cookie: str) -> bytes:
-        return f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}\r\nCookie: {cookie}\r\n\r\n".encode()
-
-    def _ask(self, path: str, cookie: str) -> str:
-        with self._opened() as one:
-            one.sendall(self._request(path, cookie))
-            return one.recv(4096).decode()
-
-    def read_for(self, seconds: float) -> int:
-        """Number of bytes read in this time."""
-        end, got = time.monotonic() + seconds, 0
-        while time.monotonic() < end:
-            got += len(self.socket.recv(2**16))
-        return got
-
-    def rest(self) -> bytes:
-        """Read to the end."""
-        found = b""
-        with self.socket as one, contextlib.suppress(ConnectionResetError):
-            while piece := one.recv(2**16):
-                found += piece
-        return found
-
-    def kill(self) -> None:
-        """Reset the connection, as a killed browser does."""
-        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-        self.socket.close()
 
 
 def numbers(folder: Path) -> dict[str, np.ndarray]:
@@ -130,7 +78,7 @@ def program(tmp_path: Path) -> Iterator[Program]:
 
 
 def test_eight_pages_that_do_not_read_change_no_result(program: Program, tmp_path: Path) -> None:
-    pages = [Browser(program.address) for _ in range(MAX_PAGES)]
+    pages = [HttpPage(program.address) for _ in range(MAX_PAGES)]
     ended_well(program)
     for page in pages:
         assert b"event: gone" not in page.rest(), "it read nothing"
@@ -145,7 +93,7 @@ def test_eight_pages_that_do_not_read_cost_under_a_millisecond_a_measurement() -
         watching = controller.begin(config)
         worker = ConsumerThread(watching, lambda *told: pytest.fail(str(told)))
         worker.start()
-        pages = [Browser(controller.address) for _ in range(MAX_PAGES)]
+        pages = [HttpPage(controller.address) for _ in range(MAX_PAGES)]
         streams = list(controller._broadcaster._subscribers)
         controller._broadcaster.publish("large", "x" * 200_000)
         until = time.monotonic() + 10
@@ -161,10 +109,10 @@ def test_eight_pages_that_do_not_read_cost_under_a_millisecond_a_measurement() -
 
 def test_a_browser_that_is_killed_changes_no_result(program: Program, tmp_path: Path) -> None:
     for seconds in (1.0, 0.5, 0.0):
-        page = Browser(program.address)
+        page = HttpPage(program.address)
         page.read_for(seconds)
         page.kill()
-    page = Browser(program.address)
+    page = HttpPage(program.address)
     assert page.read_for(2.0) > 1000, "a later page gets everything"
     page.kill()
     ended_well(program)

@@ -332,13 +332,39 @@ def test_messages_of_devices_and_the_colours_of_gauges(start: Start) -> None:
     assert page.page.evaluate("() => [...untranslated]") == []
 
 
+def test_the_front_fails_and_the_back_goes_on(browser: Any, tmp_path: Path) -> None:
+    camera = CAMERA.format(seconds=60)
+    cameras = ["--camera", f"{camera}&faults=gone@6", "--back", f"{camera}&side=back&seed=3"]
+    program = Program(tmp_path, "run", "--page", *cameras, "--load", "sim:", *OPTIONS[:-2])
+    try:
+        page = Page(browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US").new_page())
+        page.page.goto(program.address)
+        page.until(lambda: page.page.locator("#runviews .bad").count() == 1, "the front has failed")
+        page.until(lambda: page.text("axialname").endswith(", back"), "the figures of the back")
+        assert page.text("word") == "measuring" and "mean" not in page.text("sides")
+        page.press("q")
+        page.confirm()
+        page.until(lambda: page.stage() == "after", "the result")
+        assert "front: " in page.text("troubles") and not page.errors
+    finally:
+        program.kill()
+
+
 def test_front_and_back_of_a_test_with_two_cameras(browser: Any, tmp_path: Path) -> None:
     camera = f"{CAMERA.format(seconds=60)}&bending=5&stand_off_mm=500&settle_mm=0.1"
     cameras = ["--camera", camera, "--back", f"{camera}&side=back&seed=3"]
     program = Program(tmp_path, "page", *cameras, "--load", "sim:", *OPTIONS)
     try:
         page = another(browser, program.address)
+        page.until(lambda: page.page.locator("#setupviews [data-view]").count() == 2, "a card of each")
+        page.page.click("#setupviews [data-view=back]")
+        page.until(lambda: "rig-back.toml" in page.text("file"), "the back is set up")
         started(page)
+        page.until(lambda: page.page.locator("#runviews img[src*='side=back']").count() == 1, "its picture")
+        page.page.click("#runviews [data-view=back]")
+        page.until(
+            lambda: "side=back" in (page.page.get_attribute("#map", "src") or ""), "the map of the back"
+        )
         page.until(lambda: "front minus mean" in page.text("sides"), "mean and bending of both")
         rows = page.page.locator("#sides li").all_text_contents()
         assert rows[0].startswith("mean: axial")
@@ -347,6 +373,9 @@ def test_front_and_back_of_a_test_with_two_cameras(browser: Any, tmp_path: Path)
         page.confirm()
         page.until(lambda: page.stage() == "after", "the result")
         page.until(lambda: "Rm, both" in page.page.inner_text("#after"), "the figures of both")
+        page.until(
+            lambda: page.page.is_visible("#peakmap") and page.page.is_visible("#peakmap2"), "both maps"
+        )
         assert not page.errors
         folders = {path.parent.name for path in tmp_path.glob("runs/*/*/strain.h5")}
         assert folders == {"front", "back"}
