@@ -138,7 +138,9 @@ def effect(grid: ZoiGrid, steps: int = 7, sharpened: int = 0) -> Effect:
 
 def _check(grid: ZoiGrid, steps: int, sharpened: int) -> None:
     if steps < 0 or sharpened < 0:
-        raise ValueError(f"the numbers of steps and of sharpenings must not be negative, got {min(steps, sharpened)}")
+        raise ValueError(
+            f"the numbers of steps and of sharpenings must not be negative, got {min(steps, sharpened)}"
+        )
     if 6 * grid.step > grid.size:
         raise ValueError(
             f"ZOIs of {grid.size} px at a step of {grid.step} px are too far apart to be deconvolved; "

@@ -23,7 +23,7 @@ from tests.accuracy.truth import Speckle, digitise, field, pixels
 RADIUS = 2.25
 """Of the speckle, px: 5.3 px across at half of its height."""
 NOISE = 0.080
-"""Of each picture over the rms gradient of the pattern, px: there a uniform subset of order 1 has 0.45 px^2 by theory."""
+"""Of each picture over the rms gradient of the pattern, px. Uniform subsets of order 1 then have 0.45 px^2."""
 AMPLITUDE = 0.1
 """Of the sines, px."""
 BITS, STEP, MARGIN = 12, 5, 64

@@ -67,7 +67,9 @@ def star(field: StrainField, steps: int = 0, sharpened: int = 0) -> StarResult:
     # Attenuation at long periods is not noise: take off what a smooth response explains.
     loss = _loss(LONG / period[area], truth[area], v[area], (2, 4))
     rest = v[area] - truth[area] * (1 - sum(c * (LONG / period[area]) ** n for n, c in loss.items()))
-    predicted = np.sqrt(np.mean(field.sigma_v[area] ** 2)) * (effect(grid, steps, sharpened).noise if steps else 1)
+    predicted = np.sqrt(np.mean(field.sigma_v[area] ** 2)) * (
+        effect(grid, steps, sharpened).noise if steps else 1
+    )
     return StarResult(l10, error, float(rest.std()), float(predicted))
 
 
@@ -102,7 +104,9 @@ def _l10_in_bands(length: NDArray, truth: NDArray, v: NDArray, parts: int = 10) 
     """
     part = np.arange(len(v)) * parts // len(v)
     l10 = _crossing_in_bands(length, truth, v)
-    one_less = [_crossing_in_bands(length[keep], truth[keep], v[keep]) for keep in (part != p for p in range(parts))]
+    one_less = [
+        _crossing_in_bands(length[keep], truth[keep], v[keep]) for keep in (part != p for p in range(parts))
+    ]
     return l10, float(np.sqrt((parts - 1) * np.var(one_less)))
 
 
@@ -110,7 +114,9 @@ def _crossing_in_bands(length: NDArray, truth: NDArray, v: NDArray) -> float:
     centres = np.log(LONG / 10) + np.arange(0, np.log(7), BAND_WIDTH / 3)
     order = np.argsort(length)
     sums = np.cumsum([truth[order] * v[order], truth[order] ** 2], axis=1)
-    first, last = (np.searchsorted(np.log(length[order]), centres + side) for side in (-BAND_WIDTH / 2, BAND_WIDTH / 2))
+    first, last = (
+        np.searchsorted(np.log(length[order]), centres + side) for side in (-BAND_WIDTH / 2, BAND_WIDTH / 2)
+    )
     kept, whole = sums[:, last - 1] - sums[:, np.maximum(first, 1) - 1]
     kept = kept / np.maximum(whole, 1e-9)
     low = int(np.flatnonzero(kept < 0.9)[-1])

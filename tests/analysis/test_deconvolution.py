@@ -65,7 +65,7 @@ def test_a_sharpened_response_is_the_smooth_step_of_the_other(
 
 
 def test_sharpening_lowers_the_product_of_resolution_and_noise_towards_its_least() -> None:
-    """In noise over gradient; sqrt(2 pi) is that of a disc of frequencies, which nothing of full height passes below."""
+    """In noise over gradient; sqrt(2 pi) is that of a disc of frequencies, which no flat response undercuts."""
     unit = 0.399 / SIGMA
     products = [
         (e := effect(GRID, steps, sharpened)).l10 * e.noise * unit
@@ -117,7 +117,9 @@ def test_planes_stay_as_they_are_even_beside_gaps(steps: int, sharpened: int) ->
 
 
 @pytest.mark.parametrize(("steps", "sharpened"), [(7, 0), (15, 0), (2, 4), (7, 2)])
-def test_beside_gaps_no_noise_grows_more_than_the_worst_wave_of_a_whole_map(steps: int, sharpened: int) -> None:
+def test_beside_gaps_no_noise_grows_more_than_the_worst_wave_of_a_whole_map(
+    steps: int, sharpened: int
+) -> None:
     worst = max(design(kept, steps) / kept for kept in np.linspace(0.01, 1, 100))
     values = RNG.normal(size=(60, *GRID.shape))
     values[:, ragged(0.6)] = np.nan
