@@ -5,6 +5,7 @@ depends neither on threads nor on neighbours. Tried and rejected (of 75 wrong ZO
 added, 34 are left):
 
 - squares of the two shares, or powers of 1.5: found 14 and 28 of the 75, their sum 39;
+- further limits on what is left and on bending (of 43 wrong ZOIs accepted, 17 at 0.16 % of the good ones refused);
 - half of MODEL_SHARE: found 46, but real pictures (an open hole, noise estimated) come to 0.87 of the present one;
 - a fixed share (3 %) of the variance of the pattern: accepted one in seven wrong ZOIs at cracks, holes and edges;
 - refusing all with more than 4 times the variance of a full pattern: 5 to 8 % of a real open hole, most of them right;
