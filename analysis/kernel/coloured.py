@@ -17,17 +17,19 @@ from numpy.typing import NDArray
 
 from analysis.field.picture_error import Cause
 from analysis.fit.validity import AGREES
-from analysis.kernel.lines import inner, left_by_fit, lines_along, some
+from analysis.kernel.lines import inner, left_by_fit, lines_along, some, zois_of
 from analysis.kernel.prepared import PreparedReference
 from analysis.kernel.solve import Solution
 from analysis.picture.blocks import BLOCKS, blockiness
 
 Floats = NDArray[np.float64]
+Pixels = NDArray[np.float32]
+Places = NDArray[np.intp]
 
 BLUR, SOME_BLUR, NEIGHBOURS = 0.25, 0.1, 0.12
 """Limits: growth of the variance of the blur that is the cause of an error, and that acts on u and v, px^2;
 correlation of neighbouring pixels."""
-SAMPLE, SPECTRA = 30, 300 * 32**2
+SAMPLE, SPECTRA = 30, 150 * 32**2
 """ZOIs that are looked at, and pixels of those whose spectra are averaged."""
 FEWEST, PART = 8, 8
 """ZOIs at least, and px of a square in them, in which a strain that varies is looked for."""
@@ -38,12 +40,14 @@ BOTH_ALIKE = ("compression", "filter")
 """Causes that spoil the reference as much as the picture."""
 
 
-def error_cause(solution: Solution, ok: NDArray[np.bool_]) -> Cause:
-    """What the error of the deformed picture looks like; ``ok`` (A,) are the ZOIs that have a value."""
+def error_cause(solution: Solution, ok: NDArray[np.bool_], left: Pixels) -> Cause:
+    """What the error of the deformed picture looks like.
+
+    ``ok`` (A,) are the ZOIs that have a value, and ``left`` (N, n, n) is what the fits leave of some of them.
+    """
     if blockiness(solution.image) > BLOCKS:
         return "compression"
-    which = some(ok, SAMPLE)
-    left = left_by_fit(solution, which)
+    left = left[:: max(1, len(left) // SAMPLE)]
     if lines_along(left) is not None:
         return "bands"
     if abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR:
@@ -73,8 +77,7 @@ def beside_strain(solution: Solution, ok: NDArray[np.bool_]) -> float | None:
     which = some(ok, max(FEWEST, SAMPLE * 32**2 // size**2))
     left = _in_parts(left_by_fit(solution, which))
     ready = solution.reference.prepared
-    places = [np.s_[top : top + size, column : column + size] for top, column in ready.origins[which]]
-    dx, dy = (_in_parts(np.stack([ready.images[k][at] for at in places])) for k in (0, 1))
+    dx, dy = (_in_parts(zois_of(ready.images[k], ready.origins[which], size)) for k in (0, 1))
     rest = left - _shifts(left, dx, dy)
     noise = float(np.median(solution.expected(which, solution.found.nuisance[which, 0])))
     free = 2 * left[..., 0].size
@@ -115,21 +118,22 @@ def _joined(parts: Floats) -> Floats:
     return squares.reshape(len(parts), PART * parts.shape[1], -1)
 
 
-def _is_white(left: Floats) -> bool:
+def _is_white(left: NDArray[np.floating]) -> bool:
     within = inner(left)
     beside = (np.mean(within[:, 1:] * within[:, :-1]) + np.mean(within[:, :, 1:] * within[:, :, :-1])) / 2
     return bool(abs(beside) < NEIGHBOURS * np.mean(within**2))
 
 
 def coloured_bias(
-    solution: Solution, ok: NDArray[np.bool_], cause: Cause, share: float
+    solution: Solution, which: Places, left: Pixels, cause: Cause, share: float
 ) -> tuple[Floats, Floats]:
     """What to add to the parameters (A, modes) and to the growth of the variance of the blur (A,), px^2.
 
     Parameters
     ----------
     solution : Solution
-    ok : (A,) bool
+    which, left : (N,), (N, n, n), GL
+        Some ZOIs, and what the fits leave of them.
     cause : str
         Of the error.
     share : float
@@ -139,8 +143,7 @@ def coloured_bias(
 
     reference, ready, found = solution.reference, solution.reference.prepared, solution.found
     modes = reference.modes
-    which = some(ok, SPECTRA // reference.grid.size**2)
-    own = _own_error(ready, left_by_fit(solution, which), which)
+    own = _own_error(ready, left, which)
     own *= 0.5 if cause in BOTH_ALIKE else share
     more = ready.weight * (own - solution.noise_taken[:, None] * ready.pattern.own_noise)
     inverse = ready.inverse[:-1, :, [modes, -3, -2]]  # with the columns f, f_xx and f_yy
@@ -149,15 +152,14 @@ def coloured_bias(
     return moved, step[:, -3] + step[:, -2]
 
 
-def _own_error(ready: PreparedReference, left: Floats, which: NDArray[np.intp]) -> Floats:
+def _own_error(ready: PreparedReference, left: Pixels, which: Places) -> Floats:
     """What the error of a pixel, times f, f_xx and f_yy of its own part in them, is on average, (3,), GL^2.
 
     The filter that makes f shows in the cross spectrum of f and the reference as it was recorded.
     """
     size = left.shape[1]
     window = np.outer(np.hanning(size + 2)[1:-1], np.hanning(size + 2)[1:-1])
-    places = [np.s_[top : top + size, column : column + size] for top, column in ready.origins[which]]
-    level, raw = (_spectra(np.stack([ready.images[k][at] for at in places]), window) for k in (2, 3))
+    level, raw = (_spectra(zois_of(ready.images[k], ready.origins[which], size), window) for k in (2, 3))
     response = np.mean((level * raw.conj()).real, axis=0) / np.mean(np.abs(raw) ** 2, axis=0)
     power = np.mean(np.abs(_spectra(left, window)) ** 2, axis=0) / np.sum(window**2)
     columns = np.arange(size // 2 + 1)
@@ -167,9 +169,8 @@ def _own_error(ready: PreparedReference, left: Floats, which: NDArray[np.intp]) 
     return np.array([np.sum(error), np.sum(error * bend[: len(columns)]), np.sum(error * bend[:, None])])
 
 
-def _spectra(zois: NDArray[np.floating], window: Floats) -> NDArray[np.complex64]:
+def _spectra(zois: Pixels, window: Floats) -> NDArray[np.complex64]:
     """Of ZOIs (N, n, n) without their means, under a window: the half with columns from 0, (N, n, n // 2 + 1)."""
     from scipy.fft import rfft2
 
-    level = zois.astype(np.float32)
-    return np.asarray(rfft2((level - level.mean(axis=(1, 2), keepdims=True)) * window.astype(np.float32)))
+    return np.asarray(rfft2((zois - zois.mean(axis=(1, 2), keepdims=True)) * window.astype(np.float32)))

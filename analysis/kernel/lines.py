@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from analysis.field import Status
@@ -60,7 +61,7 @@ def without_lines(solution: Solution, ok: NDArray[np.bool_]) -> Pixels | None:
     return out
 
 
-def lines_along(left: Floats) -> int | None:
+def lines_along(left: Pixels) -> int | None:
     """Whether what is left of ZOIs (N, n, n) is one value a row (0) or a column (1); None: neither."""
     within = inner(left)
     variance = max(float(np.mean(within**2)), 1e-12)
@@ -68,7 +69,7 @@ def lines_along(left: Floats) -> int | None:
     return int(np.argmax(shares)) if max(shares) > LINES else None
 
 
-def inner(left: Floats) -> Floats:
+def inner(left: NDArray[np.floating]) -> NDArray[np.floating]:
     """What is left without the rims of the ZOIs and the mean of each, (N, m, m)."""
     rim = left.shape[1] // 8
     part = left[:, rim:-rim, rim:-rim]
@@ -81,17 +82,24 @@ def some(ok: NDArray[np.bool_], count: int) -> Places:
     return which[:: max(1, len(which) // count)]
 
 
-def left_by_fit(solution: Solution, which: Places) -> Floats:
+def left_by_fit(solution: Solution, which: Places) -> Pixels:
     """What displacement and gain leave of some ZOIs, (N, n, n), GL."""
     from analysis.fit.iteration import warp_zois
 
     ready, size = solution.reference.prepared, solution.reference.grid.size
+    origins = ready.origins[which]
     p = np.ascontiguousarray(solution.found.p[which][:, solution.reference.affine])
-    warped = np.empty((len(which), size, size), np.float32)
-    warp_zois(solution.picture, solution.table, ready.origins[which], size, p, warped)
-    places = [np.s_[top : top + size, left : left + size] for top, left in ready.origins[which]]
-    raw, level = (np.stack([ready.images[k][place] for place in places]).astype(np.float64) for k in (3, 2))
-    return np.asarray(warped - raw - (solution.found.nuisance[which, 0][:, None, None] - 1) * level)
+    left = np.empty((len(which), size, size), np.float32)
+    warp_zois(solution.picture, solution.table, origins, size, p, left)
+    left -= zois_of(ready.images[3], origins, size)
+    gain = solution.found.nuisance[which, 0].astype(np.float32)
+    left -= (gain[:, None, None] - 1) * zois_of(ready.images[2], origins, size)
+    return left
+
+
+def zois_of(image: Pixels, origins: Places, size: int) -> Pixels:
+    """The ZOIs of an image whose first pixels are ``origins`` (N, 2: row, column), (N, n, n)."""
+    return np.asarray(sliding_window_view(image, (size, size))[origins[:, 0], origins[:, 1]])
 
 
 def _profile(solution: Solution, which: Places, left: Floats, axis: int) -> Floats:

@@ -13,7 +13,8 @@ from analysis.field import Motion, Status, StrainField, stretched
 from analysis.field.picture_error import LIMIT, PictureError
 from analysis.fit.validity import AGREES
 from analysis.follow.renewal import UNSHARED, Placement
-from analysis.kernel.coloured import SOME_BLUR, beside_strain, coloured_bias, error_cause
+from analysis.kernel.coloured import SOME_BLUR, SPECTRA, beside_strain, coloured_bias, error_cause
+from analysis.kernel.lines import left_by_fit, some
 from analysis.kernel.solve import Solution
 
 Floats = NDArray[np.float64]
@@ -82,8 +83,7 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         whole,
     )
     parts = _covariances(solution, ok, noise, first, whole)
-    error = _picture_error(solution, ok, noise)
-    local, growth = _unbiased(solution, ok, error, noise)
+    error, local, growth = _corrected(solution, ok, noise)
     blur = np.stack([growth, growth]).astype(np.float32)
     blur[0, ~ok] = np.nan
     weigh_blur(reference.prepared.blur, whole, blur[1])
@@ -109,26 +109,24 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
     )
 
 
-def _unbiased(
-    solution: Solution, ok: NDArray[np.bool_], error: PictureError | None, noise: _Noise
-) -> tuple[Floats, Floats]:
-    """Parameters, and growth of the variance of the blur, without what an error that is not noise adds on average."""
-    found = solution.found
-    if error is None or not error.cause or solution.reference.sensors is not None:
-        return found.p, found.nuisance[:, 2]
-    share = noise.share(found.nuisance[:, 0], ok)
-    moved, sharper = coloured_bias(solution, ok, error.cause, share)
-    return found.p + moved, found.nuisance[:, 2] + sharper
-
-
-def _picture_error(solution: Solution, ok: NDArray[np.bool_], noise: _Noise) -> PictureError | None:
+def _corrected(
+    solution: Solution, ok: NDArray[np.bool_], noise: _Noise
+) -> tuple[PictureError | None, Floats, Floats]:
+    """The error of the picture; parameters, and growth of the variance of the blur, without what it adds on average."""
+    found, reference = solution.found, solution.reference
+    p, growth = found.p, found.nuisance[:, 2]
     if np.isnan(noise.over):
-        return None
+        return None, p, growth
     error = PictureError(noise.over, (float(noise.colour[0]), float(noise.colour[1])))
-    if solution.had_lines:
-        return replace(error, cause="bands")
-    found = noise.over * float(noise.seen.max()) ** 0.5
-    return replace(error, cause=error_cause(solution, ok)) if found > LIMIT else error
+    if not solution.had_lines and noise.over * float(noise.seen.max()) ** 0.5 <= LIMIT:
+        return error, p, growth
+    which = some(ok, SPECTRA // reference.grid.size**2)
+    left = left_by_fit(solution, which)
+    error = replace(error, cause="bands" if solution.had_lines else error_cause(solution, ok, left))
+    if reference.sensors is not None:
+        return error, p, growth
+    moved, sharper = coloured_bias(solution, which, left, error.cause, noise.share(found.nuisance[:, 0], ok))
+    return error, p + moved, growth + sharper
 
 
 def _motion(solution: Solution, values: Floats, expected: PredictedMotion) -> Motion:

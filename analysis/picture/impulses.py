@@ -31,10 +31,10 @@ def without_impulses(image: NDArray[Any]) -> NDArray[Any] | None:
     ----------
     image : (H, W) uint8, uint16 or float32, GL
     """
-    pixels = image.astype(np.float32)
-    usual, share = _sampled(pixels)
+    usual, share = _sampled(image)
     if share < SHARES[0] / 2:
         return None
+    pixels = image.astype(np.float32)
     clearly = len(_beyond(pixels, OVER_PATTERN * usual, OVER_NEIGHBOURS)[0])
     if not SHARES[0] * image.size < clearly < SHARES[1] * image.size:
         return None
@@ -67,16 +67,29 @@ def _above_second(pixels: Pixels, rows: NDArray[np.intp], columns: NDArray[np.in
     return neighbours, np.maximum(centre - neighbours[:, 6], neighbours[:, 1] - centre)
 
 
-def _sampled(pixels: Pixels) -> tuple[float, float]:
+def _sampled(image: NDArray[Any]) -> tuple[float, float]:
     """In some rows: median height of the tops and bottoms of the pattern over their second neighbour, GL, and the
     share of wild pixels."""
-    height, width = pixels.shape
-    grid = np.meshgrid(
-        np.arange(0, height - 2, 1 + height // SAMPLE_ROWS), np.arange(width - 2), indexing="ij"
-    )
-    neighbours, above = _above_second(pixels, grid[0].ravel(), grid[1].ravel())
-    if not (above > 0).any():
+    height = len(image)
+    rows = np.arange(0, height - 2, 1 + height // SAMPLE_ROWS)
+    three = [image[rows + i].astype(np.float32) for i in range(3)]
+    width = image.shape[1] - 2
+    around = [three[i][:, j : j + width] for i in range(3) for j in range(3) if (i, j) != (1, 1)]
+    high, low = _second_highest(around), -_second_highest([-n for n in around])
+    centre = three[1][:, 1:-1]
+    above = np.maximum(centre - high, low - centre)
+    tops = above[above > 0]
+    if not len(tops):
         return 0.0, 0.0
-    usual = float(np.median(above[above > 0]))
-    apart = neighbours[:, 6] - neighbours[:, 1]
-    return usual, float(np.mean((above > OVER_PATTERN * usual) & (above > OVER_NEIGHBOURS * apart)))
+    usual = float(np.median(tops))
+    wild = (above > OVER_PATTERN * usual) & (above > OVER_NEIGHBOURS * (high - low))
+    return usual, float(np.mean(wild))
+
+
+def _second_highest(values: list[Pixels]) -> Pixels:
+    """The second highest of several arrays of one shape, element by element."""
+    highest, second = np.maximum(*values[:2]), np.minimum(*values[:2])
+    for value in values[2:]:
+        second = np.maximum(second, np.minimum(highest, value))
+        highest = np.maximum(highest, value)
+    return np.asarray(second)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -12,8 +12,10 @@ from analysis.field import Blur
 from analysis.field.picture_error import LIMIT, PictureError
 from analysis.optics import alike, keystones
 from live.pipeline.measurement import TimeStep
+from live.pipeline.reference import repetition_text
 
 if TYPE_CHECKING:
+    from analysis import PhaseKernel
     from analysis.field import Measure, StrainField
 
 MAX_ELASTIC, FALSE_STRAIN, NU_DOUBT = 1e-3, 2e-5, 0.02
@@ -22,6 +24,32 @@ MAX_ROTATION, MAX_STRAIN = math.radians(0.5), 0.02
 """Limits of small strains, rad and 1: the error is then 40 um/m by the rotation and 200 um/m by the strain."""
 MAX_BLUR_PX, CERTAIN, CALM = 0.5, 3.0, 0.8
 """A blur beyond this gives an event, by so many of its sigmas; below this share of it the picture is well again."""
+
+
+class Guard(Protocol):
+    """Looks at every measurement."""
+
+    def check(self, field: StrainField, step: TimeStep) -> None:
+        """Check a field and its means; an event where it is not valid as it stands."""
+
+
+class RepetitionGuard:
+    """Warns at the first field where the pattern of the reference repeats.
+
+    Parameters
+    ----------
+    kernel : PhaseKernel
+    on_event : callable taking an Event
+    """
+
+    def __init__(self, kernel: PhaseKernel, on_event: EventSink) -> None:
+        self._text, self._on_event = repetition_text(kernel.period), on_event
+
+    def check(self, field: StrainField, step: TimeStep) -> None:
+        """Warn once, at the time of ``step``."""
+        if self._text:
+            self._on_event(Event(step.t, EventKind.MEASUREMENT, "pattern", self._text, "warning"))
+            self._text = ""
 
 
 class StrainGuard:
@@ -40,8 +68,8 @@ class StrainGuard:
     def __init__(self, measure: Measure, on_event: EventSink) -> None:
         self._on_event, self._warned = on_event, measure != "small"
 
-    def check(self, field: StrainField, t: float) -> None:
-        """Check a field, measured at ``t`` (s)."""
+    def check(self, field: StrainField, step: TimeStep) -> None:
+        """Check the strains and rotations of a field."""
         if self._warned or not field.ok.any():
             return
         turned = abs(float(np.nanmedian(field.rotation)))
@@ -53,7 +81,7 @@ class StrainGuard:
                 f" about {(turned**2 + strained**2) / 2 * 1e6:.0f} µm/m; measure with --strain engineering"
             )
             data = {"rotation": turned, "strain": strained}
-            self._on_event(Event(t, EventKind.MEASUREMENT, "strain", text, "warning", data))
+            self._on_event(Event(step.t, EventKind.MEASUREMENT, "strain", text, "warning", data))
 
 
 class DilatationGuard:
@@ -75,7 +103,7 @@ class DilatationGuard:
         self._nu, self._stand_off_mm, self._on_event = nu, stand_off_mm, on_event
         self._warned = False
 
-    def check(self, step: TimeStep) -> None:
+    def check(self, field: StrainField, step: TimeStep) -> None:
         """Check the strains of the region at one time."""
         if self._warned or self._nu is None:
             return
@@ -180,16 +208,16 @@ class PictureGuard:
     def __init__(self, on_event: EventSink) -> None:
         self._on_event, self._cause = on_event, ""
 
-    def check(self, field: StrainField, t: float) -> None:
-        """Check a field, measured at ``t`` (s); one of too few ZOIs changes nothing."""
+    def check(self, field: StrainField, step: TimeStep) -> None:
+        """Check one field; one of too few ZOIs changes nothing."""
         error = field.picture
         if error is None or not field.ok.any():
             return
         if error.cause not in ("", "blur") and not self._cause:
-            self._emit(t, picture_words(field), "warning", error)
+            self._emit(step.t, picture_words(field), "warning", error)
             self._cause = error.cause
         elif self._cause and not error.cause and error.factor < 0.85 * LIMIT:
-            self._emit(t, "the picture leaves what its noise explains again", "info", error)
+            self._emit(step.t, "the picture leaves what its noise explains again", "info", error)
             self._cause = ""
 
     def _emit(self, t: float, text: str, level: Level, error: PictureError) -> None:
@@ -230,7 +258,7 @@ class BlurGuard:
         self._on_event, self._limit = on_event, limit_px
         self._changed = False
 
-    def check(self, step: TimeStep, field: StrainField | None = None) -> None:
+    def check(self, field: StrainField, step: TimeStep) -> None:
         """Check one time step; one whose blur is not known changes nothing. ``field`` shows what the blur costs."""
         blur, size = Blur(step.blur, step.sigma_blur), abs(step.blur)
         if not self._changed and size - CERTAIN * blur.sigma > self._limit:
@@ -245,12 +273,22 @@ class BlurGuard:
         self._on_event(Event(step.t, EventKind.MEASUREMENT, "sharpness", text, level, data))
 
 
-def _blur_words(blur: Blur, field: StrainField | None) -> str:
-    error = None if field is None else field.picture
-    if field is None or error is None or error.factor <= LIMIT:
+def _blur_words(blur: Blur, field: StrainField) -> str:
+    error = field.picture
+    if error is None or error.factor <= LIMIT:
         return f"the picture is {blur.text} since the reference: look at focus, distance and exposure"
     sigma = _usual_sigma(field)
     return (
         f"the picture is {blur.text} since the reference: look at focus, distance and exposure;"
         f" strain of a ZOI is uncertain by {sigma:.0f} µm/m in place of {sigma / error.factor:.0f}"
     )
+
+
+def standard_guards(kernel: PhaseKernel, strain: Measure, on_event: EventSink) -> list[Guard]:
+    """Those of every measurement, whatever is known of specimen and camera."""
+    return [
+        RepetitionGuard(kernel, on_event),
+        StrainGuard(strain, on_event),
+        PictureGuard(on_event),
+        BlurGuard(on_event),
+    ]

@@ -2,7 +2,7 @@
 
 ``measure`` takes bursts (and commands among them) and gives measurements. It uses no thread, file,
 device or clock, so a replay of the same bursts is bit-equal to the live run. ``Tracker`` holds the kernel
-and renews its reference; the guards warn where a measurement is not valid as it stands.
+and renews its reference, ``Corrections`` the optics, and guards warn where a measurement is not valid as it stands.
 """
 
 from __future__ import annotations
@@ -27,25 +27,41 @@ from analysis.optics import (
     choose_model,
     trouble,
 )
-from live.pipeline.guards import BlurGuard, DilatationGuard, PictureGuard, StrainGuard, TiltGuard
+from live.pipeline.guards import Guard
 from live.pipeline.measurement import Measurement, PlateReading
-from live.pipeline.reference import Correction, averaged, repetition_text, unchanged
+from live.pipeline.reference import Correction, averaged, unchanged
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel
     from analysis.evaluate import Gauge
     from analysis.field import Measure, StrainField
-    from analysis.optics import Model
+    from analysis.optics import LensReading, Model
 
 
 class Tracker:
     """The current kernel, the last field, and the renewal of the reference.
 
     All depend on the bursts only, so that a replay of the same bursts does the same.
+
+    Parameters
+    ----------
+    kernel : PhaseKernel
+        Prepared on the reference.
+    noise_GL : float or None, GL
+        Noise of one frame (``frame_noise``); None: estimated by the kernel from the residual.
+    renew_at : float
+        The reference is renewed when more than this share of the ZOIs is lost from one burst to
+        the next, and renewing finds most of them again; 1 for never.
+    on_event : callable taking an Event
+        Called when the reference is renewed.
     """
 
     def __init__(
-        self, kernel: PhaseKernel, noise_GL: float | None, renew_at: float, on_event: EventSink
+        self,
+        kernel: PhaseKernel,
+        noise_GL: float | None = None,
+        renew_at: float = 1.0,
+        on_event: EventSink = ignore_event,
     ) -> None:
         self._kernel, self._noise_GL, self._renew_at, self._on_event = kernel, noise_GL, renew_at, on_event
         self._field: StrainField | None = None
@@ -167,6 +183,39 @@ class PlateCorrection:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Corrections:
+    """What is corrected, in this order; None where there is nothing to correct.
+
+    Attributes
+    ----------
+    sensor : callable
+        Removes the fixed pattern of the sensor from a burst.
+    shutter : ShutterCorrection or None
+    lens : LensCorrection or None
+    plates : PlateCorrection or None
+    """
+
+    sensor: Correction = unchanged
+    shutter: ShutterCorrection | None = None
+    lens: LensCorrection | None = None
+    plates: PlateCorrection | None = None
+
+    def applied(
+        self, whole: StrainField, burst: Burst, measure: Measure
+    ) -> tuple[StrainField, PlateReading | None, LensReading | None]:
+        """The field of the specimen, corrected, in a measure of strain, and what plates and lens made of it."""
+        upright = whole if self.shutter is None else self.shutter.apply(whole, burst.t)
+        straight, of_lens = (upright, None) if self.lens is None else self.lens.apply(upright)
+        if self.plates is None:
+            return replace(straight, measure=measure), None, of_lens
+        field, of_plates = self.plates.apply(straight, burst, measure)
+        return field, of_plates, of_lens
+
+
+UNCORRECTED = Corrections()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class NewReference:
     """A command among the bursts: this burst becomes the reference; results stay composed."""
 
@@ -178,20 +227,13 @@ Timer = Callable[[], float]
 
 def measure(
     bursts: Iterable[Burst | NewReference],
-    kernel: PhaseKernel,
+    tracker: Tracker,
     loads: LoadLog,
     *,
-    noise_GL: float | None = None,
-    correct: Correction = unchanged,
+    corrections: Corrections = UNCORRECTED,
     gauges: Sequence[Gauge] = (),
-    shutter: ShutterCorrection | None = None,
-    lens: LensCorrection | None = None,
-    plates: PlateCorrection | None = None,
-    renew_at: float = 1.0,
     strain: Measure = "small",
-    dilatation: DilatationGuard | None = None,
-    tilt: TiltGuard | None = None,
-    on_event: EventSink = ignore_event,
+    guards: Sequence[Guard] = (),
     timer: Timer = lambda: 0.0,
 ) -> Iterator[Measurement]:
     """Measure one burst after the other.
@@ -199,31 +241,18 @@ def measure(
     Parameters
     ----------
     bursts : iterable of Burst or NewReference
-    kernel : PhaseKernel
-        Prepared on the reference.
+    tracker : Tracker
+        With the kernel, prepared on the reference.
     loads : LoadLog
         Gives the force at the time of a burst.
-    noise_GL : float or None, GL
-        Noise of one frame (``frame_noise``); None: estimated by the kernel from the residual.
-    correct : callable
-        Removes the fixed pattern of the sensor from a burst.
+    corrections : Corrections
+        Of every burst and field; ``tracker`` measures the ZOIs of plates too where there are some.
     gauges : sequence of Gauge
         Read on every field.
-    shutter : ShutterCorrection, optional
-        Corrects every field, before lens and plates.
-    lens : LensCorrection, optional
-        Corrects every field, before the plates.
-    plates : PlateCorrection, optional
-        Corrects every field; ``kernel`` then measures the ZOIs of its plates too.
-    renew_at : float
-        The reference is renewed when more than this share of the ZOIs is lost from one burst to
-        the next, and renewing finds most of them again; 1 for never.
     strain : "small", "engineering", "green" or "hencky"
         The measure of strain of the fields and means.
-    dilatation : DilatationGuard, optional
-    tilt : TiltGuard, optional
-    on_event : callable taking an Event
-        Called when the reference is renewed, and where a guard warns.
+    guards : sequence of Guard
+        Check every field (``standard_guards``).
     timer : callable
         Gives seconds; only for ``Measurement.measure_s``.
 
@@ -232,33 +261,18 @@ def measure(
     Measurement
         One for each burst, in order.
     """
-    tracker = Tracker(kernel, noise_GL, renew_at, on_event)
-    guards = StrainGuard(strain, on_event), PictureGuard(on_event)
-    sharpness = BlurGuard(on_event)
-    number, repeats = 0, repetition_text(kernel.period)
+    number = 0
     for item in bursts:
         if isinstance(item, NewReference):
-            tracker.renew_on_demand(correct(item.burst))
+            tracker.renew_on_demand(corrections.sensor(item.burst))
             continue
-        if number == 0 and repeats:
-            on_event(Event(item.t, EventKind.MEASUREMENT, "pattern", repeats, "warning"))
         began = timer()
-        whole, reading = tracker.measure(correct(item)), None
-        upright = whole if shutter is None else shutter.apply(whole, item.t)
-        straight, of_lens = (upright, None) if lens is None else lens.apply(upright)
-        if plates is None:
-            field = replace(straight, measure=strain)
-        else:
-            field, reading = plates.apply(straight, item, strain)
+        whole = tracker.measure(corrections.sensor(item))
+        field, of_plates, of_lens = corrections.applied(whole, item, strain)
         took = timer() - began
-        for guard in guards:
-            guard.check(field, item.t)
-        measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, reading)
+        measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, of_plates)
         measurement = replace(measurement.with_lens(of_lens), as_measured=whole)
-        sharpness.check(measurement.time_step, field)
-        if dilatation is not None:
-            dilatation.check(measurement.time_step)
-        if tilt is not None:
-            tilt.check(field, measurement.time_step)
+        for guard in guards:
+            guard.check(field, measurement.time_step)
         yield measurement
         number += 1

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
 from live.pipeline.history import History
-from live.pipeline.measure import measure
+from live.pipeline.measure import Tracker, measure
 from live.pipeline.reference import ReferenceBurst, ReferenceTaker, motion_between, on_fit_machine, prepare
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def dry_run(camera: CameraInfo, grid: ZoiGrid, settings: KernelSettings, bursts:
         motion_between(kernel, *reference.halves)
     bursts_again: list[Burst] = [reference.burst, reference.burst]
     history = History()
-    for measurement in measure(bursts_again, kernel, LoadLog(), noise_GL=noise_GL):
+    for measurement in measure(bursts_again, Tracker(kernel, noise_GL), LoadLog()):
         history.add(measurement.time_step)
 
 

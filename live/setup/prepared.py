@@ -16,8 +16,8 @@ from acquire.load_cell import LoadLog
 from analysis.optics import LensCorrection, LensModel, PlateFit, ShutterCorrection
 from live.config.gauges import gauges_for
 from live.config.loading import Config
-from live.pipeline.guards import DilatationGuard, TiltGuard
-from live.pipeline.measure import NewReference, PlateCorrection, measure
+from live.pipeline.guards import DilatationGuard, TiltGuard, standard_guards
+from live.pipeline.measure import Corrections, NewReference, PlateCorrection, Tracker, measure
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import Correction, prepare
 from live.pipeline.warm_up import picture_kinds
@@ -141,23 +141,23 @@ class PreparedKernel:
         self, bursts: Iterable[Burst | NewReference], loads: LoadLog, on_event: EventSink
     ) -> Iterator[Measurement]:
         """The measurement of each burst (``live.pipeline.measure.measure``)."""
-        config, plates = self.plan.config, self.plan.plates
-        settings, stand_off = config.measure, config.scale.stand_off_mm
+        plan, config = self.plan, self.plan.config
+        settings, nu = config.measure, config.specimen.nu
+        strain = cast(Any, settings.strain)
+        guards = [
+            *standard_guards(self.kernel, strain, on_event),
+            DilatationGuard(nu, config.scale.stand_off_mm, on_event),
+            TiltGuard(_focal_px(config), on_event, dilatation=nu is None),
+        ]
+        plates = None if plan.plates is None else PlateCorrection(plan.plates, plan.focal_px, on_event)
         return measure(
             bursts,
-            self.kernel,
+            Tracker(self.kernel, self.noise_GL, settings.renew_at, on_event),
             loads,
-            noise_GL=self.noise_GL,
-            correct=self.plan.correct,
-            gauges=self.plan.gauges,
-            shutter=self.plan.shutter,
-            lens=self.plan.lens_correction,
-            plates=None if plates is None else PlateCorrection(plates, self.plan.focal_px, on_event),
-            renew_at=settings.renew_at,
-            strain=cast(Any, settings.strain),
-            dilatation=DilatationGuard(config.specimen.nu, stand_off, on_event),
-            tilt=TiltGuard(_focal_px(config), on_event, dilatation=config.specimen.nu is None),
-            on_event=on_event,
+            corrections=Corrections(plan.correct, plan.shutter, plan.lens_correction, plates),
+            gauges=plan.gauges,
+            strain=strain,
+            guards=guards,
             timer=self.timer,
         )
 

@@ -16,15 +16,15 @@ from acquire.events import Event, EventKind
 from acquire.frame import Burst
 from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
-from analysis import KernelSettings, Roi, StrainField, ZoiGrid
+from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
 from analysis.evaluate import GaugeValue
 from analysis.field.picture_error import PictureError
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
-from live.pipeline.guards import BlurGuard, PictureGuard
+from live.pipeline.guards import BlurGuard, PictureGuard, standard_guards
 from live.pipeline.history import SHORT, AxisFinder, History, curve_of
-from live.pipeline.measure import NewReference, measure
-from live.pipeline.measurement import HOLD_S, ForceMatching, TimeStep, ordered_mean
+from live.pipeline.measure import NewReference, Tracker, measure
+from live.pipeline.measurement import HOLD_S, ForceMatching, Measurement, TimeStep, ordered_mean
 from live.pipeline.reference import averaged, frame_noise, motion_between, prepare
 from live.run.measuring import SmearGuard
 from tests.live.fakes import frame
@@ -68,7 +68,7 @@ def test_each_burst_with_its_force(speckle: Speckle) -> None:
     kernel, noise = prepare(burst(picture(speckle), 0, 8, 1.0), GRID, KernelSettings(), None)
     assert noise == 1.0
     bursts = [burst(picture(speckle, v=0.3 * i, dv_dy=1e-3 * i), i) for i in (1, 2, 3)]
-    found = list(measure(bursts, kernel, loads, noise_GL=noise))
+    found = list(measure(bursts, Tracker(kernel, noise), loads))
     assert [m.number for m in found] == [0, 1, 2]
     assert [m.force for m in found] == [100.0, 200.0, 300.0]
     assert [m.field.mean("eyy")[0] for m in found] == pytest.approx([1e-3, 2e-3, 3e-3], abs=5e-6)
@@ -95,7 +95,7 @@ def test_a_renewed_reference_stays_composed(speckle: Speckle, on_demand: bool) -
         shares = ((np.where(left, w, 1), g) for w, g in fading)
         mixed = [w * picture(speckle, **g) + (1 - w) * picture(other, **g) for w, g in shares]
         steps = [burst(image, i) for i, image in enumerate(mixed, 1)]
-    found = list(measure(steps, kernel, LoadLog(), noise_GL=noise, renew_at=0.2, on_event=told.append))
+    found = watched(steps, kernel, noise, told, 0.2)
     renewals = [event for event in told if event.kind is EventKind.REFERENCE]
     assert len(renewals) == 1
     assert renewals[0].data["automatic"] is not on_demand
@@ -104,12 +104,24 @@ def test_a_renewed_reference_stays_composed(speckle: Speckle, on_demand: bool) -
     assert last.mean("exx")[0] == pytest.approx(0.03, abs=2e-5 if on_demand else 2e-3)
 
 
+def watched(
+    bursts: list[Burst | NewReference],
+    kernel: PhaseKernel,
+    noise: float | None,
+    told: list[Event],
+    renew_at: float = 1.0,
+) -> list[Measurement]:
+    """The measurements, with all events of kernel and guards in ``told``."""
+    guards = standard_guards(kernel, "small", told.append)
+    return list(measure(bursts, Tracker(kernel, noise, renew_at, told.append), LoadLog(), guards=guards))
+
+
 def test_a_blank_picture_does_not_end_the_measurement(speckle: Speckle) -> None:
     kernel, noise = prepare(burst(picture(speckle), 0), GRID, KernelSettings(), 1.0)
     told: list[Event] = []
     blank = np.full(SHAPE, 128.0)
     steps = [burst(blank, 1), NewReference(burst(blank, 2)), burst(picture(speckle, u=0.4), 3)]
-    found = list(measure(steps, kernel, LoadLog(), noise_GL=noise, renew_at=0.2, on_event=told.append))
+    found = watched(steps, kernel, noise, told, 0.2)
     assert np.isnan(found[0].field.u).all()
     assert np.isfinite(found[1].field.u).all()
     assert found[1].field.mean("u")[0] == pytest.approx(0.4, abs=1e-3)
@@ -126,11 +138,7 @@ def test_a_pattern_that_repeats_is_an_event_at_the_first_burst(speckle: Speckle)
     ):
         kernel, noise = prepare(burst(image, 0), GRID, KernelSettings(), 1.0)
         told.clear()
-        list(
-            measure(
-                [burst(image, 1), burst(image, 2)], kernel, LoadLog(), noise_GL=noise, on_event=told.append
-            )
-        )
+        watched([burst(image, 1), burst(image, 2)], kernel, noise, told)
         assert len(told) == len(words) and all(word in told[0].text for word in words)
         assert all(event.level == "warning" and event.t == 1.0 for event in told)
 
@@ -176,12 +184,12 @@ def test_smear_is_told_when_it_begins_and_ends() -> None:
 
 def test_a_change_of_sharpness_is_told_once_and_when_it_ends() -> None:
     told: list[Event] = []
-    guard, step = BlurGuard(told.append), make_measurement(0).time_step
+    guard, still = BlurGuard(told.append), make_measurement(0)
     # Not known, small, not certain, certain, still, nearly well, well, sharper.
     changes = [(math.nan, math.nan), (0.4, 0.01), (0.55, 0.05), (0.62, 0.02), (0.9, 0.02), (0.45, 0.02), (0.1, 0.02),
                (-0.7, 0.02)]  # fmt: skip
     for blur, sigma in changes:
-        guard.check(replace(step, blur=blur, sigma_blur=sigma))
+        guard.check(still.field, replace(still.time_step, blur=blur, sigma_blur=sigma))
     assert [event.level for event in told] == ["warning", "info", "warning"]
     assert "less sharp by 0.62 ± 0.02 px" in told[0].text and "sharper by 0.70 ± 0.02 px" in told[2].text
     assert told[0].data == {"blur_px": 0.62, "sigma_blur_px": 0.02}
@@ -192,7 +200,7 @@ def test_a_blurred_picture_is_told_with_its_width_and_changes_no_strain(speckle:
     bursts = [burst(gaussian_filter(still, blur), k) for k, blur in enumerate((0.0, 0.0, 0.8))]
     kernel, noise = prepare(bursts[0], GRID, KernelSettings(), 1.0)
     told: list[Event] = []
-    found = list(measure(bursts[1:], kernel, LoadLog(), noise_GL=noise, on_event=told.append))
+    found = watched(bursts[1:], kernel, noise, told)
     assert abs(found[0].time_step.blur) < 0.02
     assert found[1].time_step.blur == pytest.approx(0.8, abs=0.1)
     assert abs(found[1].time_step.exx) < 30e-6
@@ -203,10 +211,10 @@ def test_a_blur_that_costs_is_told_once_and_with_its_cost() -> None:
     told: list[Event] = []
     field = StrainField.from_values(GRID, {"u": 0.0}, {"du_dx": 120e-6, "dv_dy": 120e-6})
     field = replace(field, picture=PictureError(2.0, (1.0, 1.0), "blur"))
-    PictureGuard(told.append).check(field, 1.0)
+    PictureGuard(told.append).check(field, make_measurement(0).time_step)
     assert not told
     step = replace(make_measurement(0).time_step, blur=0.7, sigma_blur=0.02)
-    BlurGuard(told.append).check(step, field)
+    BlurGuard(told.append).check(field, step)
     assert [event.source for event in told] == ["sharpness"]
     assert "by 120 µm/m in place of 60" in told[0].text
 
@@ -217,7 +225,7 @@ def test_what_the_picture_has_become_is_told_once_with_its_cost_and_when_it_ends
     bursts = [burst(picture(speckle) + rng.normal(0, s, SHAPE), k) for k, s in enumerate(noises)]
     kernel, noise = prepare(bursts[0], GRID, KernelSettings(), 1.0)
     told: list[Event] = []
-    found = list(measure(bursts[1:], kernel, LoadLog(), noise_GL=noise, renew_at=0.1, on_event=told.append))
+    found = watched(bursts[1:], kernel, noise, told, 0.1)
     assert [(event.level, event.t) for event in told] == [("warning", 2.0), ("info", 4.0), ("warning", 5.0)]
     assert told[0].data["cause"] == "noise" and told[0].data["factor"] == pytest.approx(13**0.5, rel=0.1)
     costs = [float(np.nanmedian(m.field.sigma_exx)) * 1e6 for m in found[:2]]

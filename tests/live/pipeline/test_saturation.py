@@ -13,7 +13,7 @@ from acquire.frame import Burst, Frame, frozen
 from acquire.load_cell.load_log import LoadLog
 from analysis import KernelSettings, Roi, Status, ZoiGrid
 from live.cli import main
-from live.pipeline.measure import NewReference, measure
+from live.pipeline.measure import NewReference, Tracker, measure
 from live.pipeline.reference import prepare
 from live.results import Strain
 from tests.analysis.speckle import SHAPE, picture
@@ -33,7 +33,7 @@ def test_a_zoi_on_clipped_pixels_has_no_value() -> None:
     clear = np.zeros(SHAPE, bool)
     kernel, noise = prepare(burst(0, clear), GRID, KernelSettings(), 4.0)
     found = list(
-        measure([burst(1, clear), burst(2, CORNER), burst(3, clear)], kernel, LoadLog(), noise_GL=noise)
+        measure([burst(1, clear), burst(2, CORNER), burst(3, clear)], Tracker(kernel, noise), LoadLog())
     )
     status = [m.field.status[1, 1] for m in found]
     assert status == [Status.OK, Status.CLIPPED, Status.OK]
@@ -49,7 +49,7 @@ def test_a_reference_with_clipped_pixels_has_no_value_there(renewed: bool) -> No
     clear = np.zeros(SHAPE, bool)
     kernel, noise = prepare(burst(0, clear if renewed else CORNER), GRID, KernelSettings(), 4.0)
     steps = [NewReference(burst(1, CORNER))] if renewed else []
-    (found,) = measure([*steps, burst(2, clear)], kernel, LoadLog(), noise_GL=noise)
+    (found,) = measure([*steps, burst(2, clear)], Tracker(kernel, noise), LoadLog())
     assert found.field.status[1, 1] == Status.CLIPPED and found.field.status[-1, -1] == Status.OK
 
 

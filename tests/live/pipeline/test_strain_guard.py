@@ -89,7 +89,7 @@ def test_the_warning_comes_once_and_only_for_small_strains() -> None:
         told: list[Event] = []
         guard = StrainGuard(measure, told.append)  # type: ignore[arg-type]
         for number, one in enumerate(seen):
-            guard.check(one, number + 1.0)
+            guard.check(one, replace(make_measurement(0).time_step, t=number + 1.0))
         assert [event.t for event in told] == times
 
 
@@ -99,8 +99,8 @@ def steps(
     guard = DilatationGuard(nu, stand_off, events.append)
     for t, (exx, eyy) in enumerate(strains):
         sigmas = {"sigma_exx": 5e-6, "sigma_eyy": 5e-6}
-        step = make_measurement(number=t).time_step
-        guard.check(replace(step, t=float(t), exx=exx, eyy=eyy, **sigmas))
+        one = make_measurement(number=t)
+        guard.check(one.field, replace(one.time_step, t=float(t), exx=exx, eyy=eyy, **sigmas))
 
 
 def test_strains_that_do_not_fit_nu_are_motion_off_the_plane() -> None:
