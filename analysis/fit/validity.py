@@ -42,7 +42,7 @@ BENDING_SHARE = 0.15
 the ZOI, which a crack exceeds."""
 COLOURED = 1.5
 """Variance of u or v over that of white noise from which on bending is allowed as much more noise."""
-CENTRE_VARIANCE = (2.0, 16.0)
+CENTRE_VARIANCE = (2.5, 16.0)
 """The shares of the two limits above that a ZOI uses up are added and must not exceed 1: cracks, blur and glare often
 show a little in both (of 645,000 good simulated ZOIs 10 are lost so, of 295 wrong ones that pass both limits 157
 found). The sum counts as much more as the variance of u or v exceeds these times (order 1 and 2) that of a ZOI with
@@ -51,7 +51,7 @@ EMPTY_SHARES, EMPTY_SIGMA = (0.1, 0.4), 0.05
 """A fit that leaves between these shares of what the noise should leave, where u or v is more uncertain than this
 (px), had nothing to fit: a dark or blurred background with hardly noise and hardly pattern. One that leaves still
 less has the same picture before it."""
-MANY_STEPS, SLOW_SIGMA = 6, 0.065
+MANY_STEPS, SLOW_SIGMA = 8, 0.065
 """A fit that took so many steps, where u or v is more uncertain than this (px), has been led along an edge of the
 specimen or through clutter (seen on a polymer bar and an open hole; a pattern takes one to five)."""
 MIN_GAIN, MAX_GAIN = 0.2, 5.0
