@@ -10,6 +10,10 @@ the one of its degree that is flattest both where W = 1 (long waves come back wh
 (noise of short waves stays out): J. F. Kaiser and R. W. Hamming, "Sharpening the response of a symmetric
 nonrecursive filter by multiple use of the same filter", IEEE Trans. ASSP 25 (1977) 415-422. With a = 1 it
 is Van Cittert's iteration (doi:10.1007/BF01391351), which lets more noise through for the same resolution.
+
+Each further sharpening applies their 3 T^2 - 2 T^3 to the whole response. It ends more abruptly, which lets
+less noise through for the same resolution, rings longer beside an edge, and triples the work. A polynomial of
+as high a degree in one piece would grow without bound beside gaps; this one takes what is not exactly 0 or 1 back.
 """
 
 from __future__ import annotations
@@ -50,7 +54,7 @@ class Effect:
     noise_gradient: float
 
 
-def deconvolved(values: Floats, grid: ZoiGrid, steps: int = 7) -> Floats:
+def deconvolved(values: Floats, grid: ZoiGrid, steps: int = 7, sharpened: int = 0) -> Floats:
     """A map of an affine measurement under the Gaussian window, with the window's blur removed.
 
     Linear in the values. Constant and linear maps come back as they were, at borders and beside gaps
@@ -66,6 +70,8 @@ def deconvolved(values: Floats, grid: ZoiGrid, steps: int = 7) -> Floats:
         Its step should be at most a sixth of its size, or the window is sampled too coarsely.
     steps : int
         More resolve finer and are noisier (``effect``); 0 gives the map back.
+    sharpened : int
+        How often the response is sharpened: the same resolution with less noise, and longer ringing.
 
     Returns
     -------
@@ -74,31 +80,28 @@ def deconvolved(values: Floats, grid: ZoiGrid, steps: int = 7) -> Floats:
     Raises
     ------
     ValueError
-        Another shape than the grid, negative ``steps``, or a grid too coarse for its ZOIs.
+        Another shape than the grid, a negative number, or a grid too coarse for its ZOIs.
     """
     if values.shape != grid.shape:
         raise ValueError(f"the map has the shape {values.shape}, the grid of ZOIs {grid.shape}")
-    _check(grid, steps)
+    _check(grid, steps, sharpened)
     known = np.isfinite(values)
     measured = np.where(known, values, 0.0)
     if steps:
         blur = _Blur(known, _sampled(grid))
-        for _ in range(PASSES - 1):
-            measured = blur(measured)
-        out = _coefficient(steps) * measured
-        for j in range(steps - 1, -1, -1):
-            out = _coefficient(j) * measured + out - blur(out)
-        measured = out
+        measured = _unblurred(blur, measured, steps)
+        for times in range(sharpened):
+            measured = _sharpened(blur, measured, steps, times)
     return np.where(known, measured, np.nan)
 
 
-def response(periods: ArrayLike, grid: ZoiGrid, steps: int = 7) -> Floats:
+def response(periods: ArrayLike, grid: ZoiGrid, steps: int = 7, sharpened: int = 0) -> Floats:
     """Share of a sine along x or y that is left, the blur of the measurement included.
 
     Parameters
     ----------
     periods : (N,), px
-    grid, steps : as for ``deconvolved``
+    grid, steps, sharpened : as for ``deconvolved``
 
     Returns
     -------
@@ -109,21 +112,21 @@ def response(periods: ArrayLike, grid: ZoiGrid, steps: int = 7) -> Floats:
     ValueError
         As ``deconvolved``.
     """
-    _check(grid, steps)
+    _check(grid, steps, sharpened)
     k = 2 * pi / np.atleast_1d(np.asarray(periods, np.float64))
-    return _passed(k, grid) * _gain(_repeated(k, grid), steps)
+    return _passed(k, grid) * _gain(_repeated(k, grid), steps, sharpened)
 
 
-def effect(grid: ZoiGrid, steps: int = 7) -> Effect:
+def effect(grid: ZoiGrid, steps: int = 7, sharpened: int = 0) -> Effect:
     """The resolution and the noise of a deconvolved map; raises ValueError as ``deconvolved``."""
     periods = np.geomspace(0.2, 30, 4000) * grid.size
-    kept = response(periods, grid, steps)
+    kept = response(periods, grid, steps, sharpened)
     last = int(np.flatnonzero(kept < 1 - _LOST)[-1])
     l10 = float(np.interp(1 - _LOST, kept[last : last + 2], periods[last : last + 2]))
     # Of white noise, a displacement passes the window and a gradient its first moment.
     k = np.linspace(0, min(pi, 60 / grid.size), 241)
     across, again = _passed(k, grid) ** 2, _repeated(k, grid)
-    gain = _gain(np.outer(again, again), steps) ** 2
+    gain = _gain(np.outer(again, again), steps, sharpened) ** 2
     inside = np.r_[0.5, np.ones(len(k) - 2), 0.5]
 
     def noise(along: Floats) -> float:
@@ -133,9 +136,11 @@ def effect(grid: ZoiGrid, steps: int = 7) -> Effect:
     return Effect(l10, noise(across), noise(_passed(k, grid, moment=1) ** 2))
 
 
-def _check(grid: ZoiGrid, steps: int) -> None:
-    if steps < 0:
-        raise ValueError(f"the number of steps must not be negative, got {steps}")
+def _check(grid: ZoiGrid, steps: int, sharpened: int) -> None:
+    if steps < 0 or sharpened < 0:
+        raise ValueError(
+            f"the numbers of steps and of sharpenings must not be negative, got {min(steps, sharpened)}"
+        )
     if 6 * grid.step > grid.size:
         raise ValueError(
             f"ZOIs of {grid.size} px at a step of {grid.step} px are too far apart to be deconvolved; "
@@ -147,12 +152,40 @@ def _coefficient(j: int) -> float:
     return float(comb(PASSES - 1 + j, j))
 
 
-def _gain(blurred: Floats, steps: int) -> Floats:
+def _unblurred(blur: _Blur, values: Floats, steps: int) -> Floats:
+    """T(W)/W of the module's head, applied to a map."""
+    for _ in range(PASSES - 1):
+        values = blur(values)
+    out = _coefficient(steps) * values
+    for j in range(steps - 1, -1, -1):
+        out = _coefficient(j) * values + out - blur(out)
+    return out
+
+
+def _filtered(blur: _Blur, values: Floats, steps: int, sharpened: int) -> Floats:
+    """The whole response T(W), sharpened so often, applied to a map."""
+    if not sharpened:
+        return _unblurred(blur, blur(values), steps)
+    once = _filtered(blur, values, steps, sharpened - 1)
+    return _sharpened(blur, once, steps, sharpened - 1)
+
+
+def _sharpened(blur: _Blur, once: Floats, steps: int, sharpened: int) -> Floats:
+    """3 T^2 - 2 T^3 in place of T, of a map that T has been applied to ``once``; T is sharpened so often."""
+    twice = _filtered(blur, once, steps, sharpened)
+    return 3 * twice - 2 * _filtered(blur, twice, steps, sharpened)
+
+
+def _gain(blurred: Floats, steps: int, sharpened: int = 0) -> Floats:
     """T(W)/W, what is done to a wave of which one blur leaves the share ``blurred``."""
     if not steps:
         return np.ones_like(blurred)
     total = sum(_coefficient(j) * (1 - blurred) ** j for j in range(steps + 1))
-    return np.asarray(blurred ** (PASSES - 1) * total)
+    gain = np.asarray(blurred ** (PASSES - 1) * total)
+    for _ in range(sharpened):
+        kept = gain * blurred
+        gain = gain * (3 * kept - 2 * kept**2)
+    return gain
 
 
 def _passed(k: Floats, grid: ZoiGrid, moment: int = 0) -> Floats:

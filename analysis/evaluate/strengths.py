@@ -52,8 +52,9 @@ def proof_strength(loading: Loading, line: FittedLine, offset: float) -> Figure:
     value = stress.value + stress.slope * float(np.clip(place, -2, 2))
     doubt = math.hypot(strain.sigma, line.sigma_at(value))
     found = Figure.about(value, math.hypot(stress.sigma, hardening * doubt), max(last - first - 3, 4))
-    # Of few samples nothing shows how the curve bends between them.
-    between = abs(stress.slope) if last - first < ENOUGH else 0.0
+    if last - first >= ENOUGH:
+        return found
+    between = _bend(loading.stress, at) + hardening * _bend(plastic, at)
     return replace(found, low=found.low - between, high=found.high + between)
 
 
@@ -147,6 +148,19 @@ def _doubt(loading: Loading) -> float:
 def _step(loading: Loading, k: int) -> float:
     """The strain from one sample to the next, about there."""
     return max(float(loading.course[k] - loading.course[max(k - 1, 0)]), 0.0)
+
+
+def _bend(values: Floats, at: float) -> float:
+    """How far a course may be from the straight line between the two samples at ``at``: where it has a kink there.
+
+    A kink turns by what second differences on both sides have together; a smooth bend departs by a quarter of that.
+    Without a sample farther on either side, all that it changes by.
+    """
+    before = math.floor(at)
+    near = values[max(before - 1, 0) : before + 3]
+    if before < 1 or len(near) < 4:
+        return abs(float(values[before + 1] - values[before]))
+    return float(np.abs(np.diff(near, 2)).sum()) / 4
 
 
 def _around(course: Floats, at: float, low: float, high: float) -> tuple[int, int]:

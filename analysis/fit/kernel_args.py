@@ -241,6 +241,8 @@ class PooledError(NamedTuple):
         Standard deviation of what a single ZOI leaves over that; 0 where that is as stated.
     colour : (2,)
         Variance of u and of v over that of white noise of the same variance a pixel.
+    apart : bool
+        Whether ZOIs whose displacement bends were left out.
     """
 
     ratio: Floats
@@ -248,11 +250,12 @@ class PooledError(NamedTuple):
     usual: float
     scatter: float
     colour: Floats
+    apart: bool
 
     @classmethod
     def none(cls, count: int) -> PooledError:
         """Of ``count`` ZOIs that leave what is expected."""
-        return cls(np.ones(count), np.ones(count), 1.0, 0.0, np.ones(2))
+        return cls(np.ones(count), np.ones(count), 1.0, 0.0, np.ones(2), False)
 
     def at(self, places: NDArray[np.intp] | slice) -> PooledError:
         """That of some ZOIs."""

@@ -35,8 +35,13 @@ GROUP, MAX_GROUPS = 50, 8
 """ZOIs of like contrast whose median counts, at least, and number of such groups at most."""
 COLOUR_SPREAD = 1.0
 """Standard deviation of the logarithm of the ratio that the shapes of one ZOI show."""
-SHOWN = 6
+SHOWN = 7
 """Figures of a ZOI that are pooled (``explained``)."""
+BENT, SOME_BENT = 4.0, 0.1
+"""What a fit leaves of a displacement that bends, over the median of noise, that one ZOI in a hundred exceeds by
+chance; share of the ZOIs that bend from which on those that do not are pooled alone, ..."""
+STRAIGHT_COLOUR = 1.3
+"""... as long as they are one in ``LOWEST`` and show no more colour than this: coloured errors bend all."""
 SAME = 1e-3
 """What is left over what the noise as stated explains, below which the picture is its own reference: no noise shows."""
 LOWEST, LOWEST_DEVIATION = 5, 0.84
@@ -70,7 +75,11 @@ def pooled(
     count = explained(found, left, expected, known, places, every, out)
     if count < MIN_POOLED:
         return None
-    contrast, ratio, spread, bare, *cubic = out[:, np.argsort(out[0, :count], kind="stable")]
+    out = out[:, :count]
+    straight = _straight(out, known.white)
+    if straight is not None:
+        out, count = out[:, straight], np.count_nonzero(straight)
+    contrast, ratio, spread, bare, *cubic = out[:6, np.argsort(out[0], kind="stable")]
     if np.count_nonzero(bare < SAME) > count / 2:
         return None
     groups = _alike(count)
@@ -78,7 +87,10 @@ def pooled(
     number, shares = count * min(1.0, every * known.independent), np.array(cubic) / known.white[:, None]
     if given and usual.min() > AGREES[0] and usual.max() < AGREES[1]:
         colour = _shrunk(medians(shares), number)
-        stated = PooledError.none(len(known.signal))
+        stated = PooledError.none(len(known.signal))._replace(
+            forgiven=np.minimum(_at(known.signal, middle, usual), 1)
+        )
+        stated = stated._replace(apart=straight is not None)
         return stated if np.abs(np.log(colour)).max() < np.log(COLOURED) else stated._replace(colour=colour)
     trend, of_each = _at(known.signal, middle, usual), _at(contrast, middle, usual)
     scatter = MAD * float(np.median(np.abs(ratio / of_each - 1)))
@@ -86,7 +98,7 @@ def pooled(
     as_stated = (lowest < AS_STATED) | (np.median(lowest) < AS_STATED)
     forgiven = _at(known.signal, middle, np.where(as_stated, np.minimum(usual, 1.0), usual))
     colour = _shrunk(medians(shares / of_each), number)
-    return PooledError(trend, forgiven, float(np.median(trend)), scatter, colour)
+    return PooledError(trend, forgiven, float(np.median(trend)), scatter, colour, straight is not None)
 
 
 @helper
@@ -105,7 +117,8 @@ def explained(
     """How many of one in ``every`` ZOIs have a clear pattern and explain it; 0 where most with a clear one do not.
 
     Written to ``out`` (SHOWN, ..) of each: contrast; variance left over that expected, and what this scatters by;
-    the same before rounding counts; variance of the shapes of u and of v over that expected of u and of v.
+    the same before rounding counts; variance of the shapes of u and of v over that expected of u and of v; that of all
+    shapes, as they bend, over the variance left.
     """
     tried = count = 0
     for i in range(0, len(places), every):
@@ -125,8 +138,19 @@ def explained(
         out[3, count] = found.left[i] / (known.pixels[z] * expected[i])
         out[4, count] = found.cubic[i, 0] / (error * of_u)
         out[5, count] = found.cubic[i, 1] / (error * of_v)
+        out[6, count] = found.bending[i] * max(gain, MIN_NOISE_GAIN) ** 2 / (left[i] * max(of_u, of_v))
         count += 1
     return count if count >= MIN_MATCHED * tried else 0
+
+
+def _straight(out: Floats, white: Floats) -> NDArray[np.bool_] | None:
+    """Which of the ZOIs shown, (SHOWN, N), do not bend; None where few bend, most do, or all by a coloured error."""
+    straight = np.asarray(out[6] < BENT * white.sum())
+    count = np.count_nonzero(straight)
+    if not max(MIN_POOLED, len(straight) / LOWEST) <= count < (1 - SOME_BENT) * len(straight):
+        return None
+    shares = np.median(out[4:6, straight] / out[1, straight], axis=1) / white
+    return straight if shares.max() < STRAIGHT_COLOUR else None
 
 
 def _at(contrast: Floats, middle: Floats, values: Floats) -> Floats:

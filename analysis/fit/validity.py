@@ -5,6 +5,7 @@ depends neither on threads nor on neighbours. Tried and rejected (of 75 wrong ZO
 added, 34 are left):
 
 - squares of the two shares, or powers of 1.5: found 14 and 28 of the 75, their sum 39;
+- further limits on what is left and on bending (of 43 wrong ZOIs accepted, 17 at 0.16 % of the good ones refused);
 - half of MODEL_SHARE: found 46, but real pictures (an open hole, noise estimated) come to 0.87 of the present one;
 - a fixed share (3 %) of the variance of the pattern: accepted one in seven wrong ZOIs at cracks, holes and edges;
 - refusing all with more than 4 times the variance of a full pattern: 5 to 8 % of a real open hole, most of them right;
@@ -36,14 +37,14 @@ AGREES = 0.8, 1.1
 the pixels it smooths the noise, and white noise of the strength given leaves down to 0.84 (quintic splines)."""
 LOST_SHARE = 0.5
 """A fit that leaves more than this share of the pattern's variance has found something else."""
-BENDING_CHANCE = 5.0
+BENDING_CHANCE = 6.0
 """Standard deviations by which the square of a bending displacement must exceed its noise ..."""
 BENDING_SHARE = 0.15
 """... beyond the squares of a limit in px and of this share of the displacement that the strain makes in
 the ZOI, which a crack exceeds."""
 COLOURED = 1.5
 """Variance of u or v over that of white noise from which on bending is allowed as much more noise."""
-CENTRE_VARIANCE = (4.0, 16.0)
+CENTRE_VARIANCE = (2.5, 16.0)
 """The shares of the two limits above that a ZOI uses up are added and must not exceed 1: cracks, blur and glare often
 show a little in both (of 645,000 good simulated ZOIs 10 are lost so, of 295 wrong ones that pass both limits 157
 found). The sum counts as much more as the variance of u or v exceeds these times (order 1 and 2) that of a ZOI with

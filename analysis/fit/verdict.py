@@ -12,6 +12,7 @@ from analysis.compiled.loops import helper, inlined
 from analysis.field import Status
 from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, PooledError, ReferenceArgs, VerdictArgs
 from analysis.fit.validity import (
+    AGREES,
     BENDING_CHANCE,
     BENDING_SHARE,
     CHANCE,
@@ -65,7 +66,9 @@ def judge(
             chance = max(chance, UNKNOWN_NOISE_FACTOR if common.scatter == 0 else POOLED_NOISE_FACTOR)
             chance *= min(common.ratio[z], 1.0)
         pattern = known.signal[z] * min(gain, 1.0) ** 2
-        error, allowed = common.forgiven[z] * expected[z], chance * expected[z]
+        error = common.forgiven[z] * expected[z]
+        noise = min(expected[z], max(error, AGREES[0] * expected[z])) if rule.noise_known else expected[z]
+        allowed = chance * noise
         if common.forgiven[z] > 1:
             usual = error * (NOISE_FACTOR + CHANCE * max(common.scatter, spread))
             allowed = max(allowed, min(usual, LOST_SHARE * pattern))
@@ -80,10 +83,10 @@ def judge(
         elif not (MIN_GAIN < gain < MAX_GAIN and left[z] <= allowed + MODEL_SHARE * pattern):
             out[z] = POOR_MATCH
         else:
-            by_noise = NOISE_FACTOR * max(expected[z], error) if rule.noise_known else allowed
+            by_noise = NOISE_FACTOR * max(noise, error) if rule.noise_known else allowed
             misfit = _used(left[z], by_noise, allowed + MODEL_SHARE * pattern - by_noise)
             many = colour if common.forgiven[z] > 1 else 1.0
-            bent = _bent(found, z, known, many * max(expected[z], left[z]), rule)
+            bent = _bent(found, z, known, many * max(noise, left[z]), rule)
             doubt = (misfit + bent) * _beyond(known, z, rule.far)
             out[z] = OK if doubt <= 1 else POOR_MATCH if misfit > bent else UNEVEN
 

@@ -153,7 +153,7 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     if common is not None:
         seen, colour, ratio = common.colour, common.colour.repeat(3), common.ratio
         over = common.usual if ok.all() else float(np.median(ratio[ok]))
-        doubtful = max(colour.max(), over) > DOUBTFUL and not solution.had_lines
+        doubtful = max(colour.max(), over) > DOUBTFUL and not (common.apart or solution.had_lines)
         rest = beside_strain(solution, ok) if doubtful else None
         if rest is not None:
             over = 1.0 if solution.is_given and AGREES[0] < rest < AGREES[1] else rest

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from analysis import PhaseKernel, Roi, Status, StrainField, ZoiGrid
+from analysis import KernelSettings, PhaseKernel, Roi, Status, StrainField, ZoiGrid
 from analysis.field import mean_blur
 from analysis.fit.kernel_args import CONVERGED, OutArgs, ReferenceArgs
 from analysis.fit.pooling import pooled
@@ -73,6 +73,18 @@ def test_a_strain_that_bends_within_the_zois_is_no_error_of_the_picture(amplitud
     assert strained.sigma_v == pytest.approx(still.sigma_v, rel=1e-3)
 
 
+def test_waves_in_a_part_of_the_picture_are_no_noise_of_the_rest() -> None:
+    """Half of the ZOIs leave several times the noise, since they bend: the others keep their sigma."""
+    folded = lambda x, y: (0 * x, np.where(x < 0, 0.6 * np.sin(2 * np.pi * y / 40), 0))  # noqa: E731
+    wavy = 128 + 200 * (Speckle(2.0, 3, span=400).at(*displaced(SHAPE, folded)) - 0.5)
+    wavy += np.random.default_rng(2).normal(0, 1, SHAPE)
+    kernel = PhaseKernel(bent(1.0, 1, 0.0), GRID, KernelSettings(bending_px=np.inf))
+    still, found = kernel.measure(bent(1.0, 2, 0.0)), kernel.measure(wavy.astype(np.float32))
+    right = np.s_[:, GRID.x > SHAPE[1] / 2 + 20]
+    assert np.nanmedian(found.residual[:, GRID.x < 120]) > 1.5
+    assert np.mean(found.sigma_v[right]) == pytest.approx(np.mean(still.sigma_v[right]), rel=0.05)
+
+
 def test_coloured_noise_of_the_strength_given_keeps_its_colour() -> None:
     kernel = PhaseKernel(bent(2.0, 1, 0.0, 1.0), GRID, noise=2.0)
     field = kernel.measure(bent(2.0, 2, 0.0, 1.0), noise=2.0)
@@ -117,7 +129,7 @@ def test_of_an_unrelated_picture_no_common_error_is_taken() -> None:
 def zois(count: int, left: np.ndarray, signal: np.ndarray) -> tuple[OutArgs, ReferenceArgs]:
     found = OutArgs.starting(np.zeros((count, 6)))
     found.state[:], found.nuisance[:], found.left[:] = CONVERGED, 1, left
-    found.cubic[:] = 0.02 * left[:, None]
+    found.cubic[:], found.bending[:] = 0.02 * left[:, None], 0
     known = ReferenceArgs(
         signal,
         np.full(count, 300.0),
@@ -148,6 +160,7 @@ def test_given_noise_stands_where_what_is_left_agrees_and_few_zois_decide_nothin
     found, known = zois(200, np.full(200, 0.9), signal)
     agreed = pooled(found, found.left, np.ones(200), known, np.arange(200), given=True)
     assert agreed is not None and (agreed.ratio == 1).all()
+    assert agreed.forgiven == pytest.approx(np.full(200, 0.9))
     free = pooled(found, found.left, np.ones(200), known, np.arange(200), given=False)
     assert free is not None and free.ratio == pytest.approx(np.full(200, 0.9))
     few, of_few = zois(20, np.full(20, 9.0), np.full(20, 900.0))

@@ -21,8 +21,13 @@ ALLOWED = (1.05 + 4 * np.sqrt(2 / PIXELS)) * EXPECTED
 """What noise alone may leave: 5 %, and 4 standard deviations of a variance of so many pixels, more; GL^2."""
 
 
-def verdict(left: float, *, gain: float = 1.0, noise_known: bool = True, **changed: int) -> Status:
-    """The status of one ZOI that leaves a variance of ``left`` GL^2 where the noise has EXPECTED."""
+def verdict(
+    left: float, *, gain: float = 1.0, noise_known: bool = True, usual: float = 1.0, **changed: int
+) -> Status:
+    """The status of one ZOI that leaves a variance of ``left`` GL^2 where the noise has EXPECTED.
+
+    ``usual`` is what the ZOIs together leave of that.
+    """
     found = OutArgs.starting(np.zeros((1, 6)))
     found.left[:], found.bending[:], found.nuisance[:] = left, 0, (gain, 0, 0)
     found.state[:], found.iterations[:] = changed.get("state", CONVERGED), changed.get("iterations", 3)
@@ -37,7 +42,8 @@ def verdict(left: float, *, gain: float = 1.0, noise_known: bool = True, **chang
     )
     rule = VerdictArgs(noise_known, np.array([1.0, 1.0]), 32 / 6, 0.05, 4.0)
     out = np.empty(1, np.uint8)
-    judge(found, found.left, np.full(1, EXPECTED), PooledError.none(1), known, rule, out)
+    common = PooledError.none(1)._replace(forgiven=np.full(1, usual))
+    judge(found, found.left, np.full(1, EXPECTED), common, known, rule, out)
     return Status(int(out[0]))
 
 
@@ -54,6 +60,16 @@ def verdict(left: float, *, gain: float = 1.0, noise_known: bool = True, **chang
 )
 def test_what_a_fit_may_leave(left: float, status: Status) -> None:
     assert verdict(left) == status
+
+
+def test_a_fit_that_leaves_more_than_its_like_stands_out_though_the_noise_would_allow_it() -> None:
+    left = ALLOWED + 0.00196 * SIGNAL
+    assert verdict(left, usual=0.999) == Status.OK
+    assert verdict(left, usual=0.9) == Status.POOR_MATCH
+    assert verdict(0.9 * ALLOWED + 0.00196 * SIGNAL, usual=0.9) == Status.OK
+    # A noise given far too high is not taken for what it seems to be: colour would scatter more.
+    assert verdict(0.8 * ALLOWED + 0.00196 * SIGNAL, usual=0.3) == Status.OK
+    assert verdict(left, usual=0.9, noise_known=False) == Status.OK
 
 
 def test_unknown_noise_may_be_five_times_what_it_is_taken_for() -> None:

@@ -24,7 +24,7 @@ from live.results.maps.scale import AutoRange, ColourScale, range_kind
 from live.results.reader import Strain
 
 DISPLACEMENTS = ("u", "v")
-MAX_MEDIAN, MAX_STEPS = 51, 100
+MAX_MEDIAN, MAX_STEPS, MAX_SHARPENED = 51, 100, 4
 FORMATS = (".png", ".jpg")
 PAPER_LOW_PASS = 9.0  # px; the paper filters its maps "for cosmetic reasons": median, then Gaussian
 
@@ -48,6 +48,8 @@ class MapRequest:
         Sigma of a Gaussian filter; 0 for none.
     deconvolution : int
         Steps that remove the window's blur (``analysis.evaluate.deconvolution``); 0 for none.
+    sharpened : int
+        How often the response of the deconvolution is sharpened.
     """
 
     field: str
@@ -57,6 +59,7 @@ class MapRequest:
     median: int = 1
     low_pass_px: float = 0.0
     deconvolution: int = 0
+    sharpened: int = 0
 
     def check(self, grid: ZoiGrid) -> None:
         """Raise ConfigError where a number is impossible, or out of range for ``grid``."""
@@ -67,17 +70,21 @@ class MapRequest:
             ("median", self.median, odd, f"an odd number from 1 to {MAX_MEDIAN}"),
             ("low-pass", low_pass, 0 <= low_pass <= extent, f"0 to {extent} px, the extent of the grid"),
             ("deconvolution", self.deconvolution, 0 <= self.deconvolution <= MAX_STEPS, f"0 to {MAX_STEPS} steps"),
+            ("sharpening", self.sharpened, 0 <= self.sharpened <= MAX_SHARPENED, f"0 to {MAX_SHARPENED} times"),
         ):  # fmt: skip
             if not well:
                 raise ConfigError(f"a {what} of {value} is not possible; allowed: {allowed}")
+        if self.sharpened and not self.deconvolution:
+            raise ConfigError("only a deconvolved map can be sharpened; add --deconvolve STEPS")
 
     def treatment(self, grid: ZoiGrid) -> str:
         """The filters applied to the map, as text; "" for none."""
         words = []
         if self.deconvolution:
-            done = effect(grid, self.deconvolution)
+            done = effect(grid, self.deconvolution, self.sharpened)
             noise = done.noise if self.field in DISPLACEMENTS else done.noise_gradient
-            words = [f"deconvolved, {self.deconvolution} steps: l_10% {done.l10:.0f} px, noise x {noise:.2f}"]
+            how = f"{self.deconvolution} steps" + f", sharpened {self.sharpened} x" * (self.sharpened > 0)
+            words = [f"deconvolved, {how}: l_10% {done.l10:.0f} px, noise x {noise:.2f}"]
         words += [f"median {self.median} x {self.median}"] * (self.median > 1)
         words += [f"low-pass {self.low_pass_px:g} px"] * (self.low_pass_px > 0)
         return ", ".join(words)
@@ -182,7 +189,7 @@ def _treated(strain: Strain, request: MapRequest) -> NDArray[np.float64]:
     if request.deconvolution:
         _check_blur(strain.config.get("measure", {}), request.field)
         try:
-            values = deconvolved(values, strain.grid, request.deconvolution)
+            values = deconvolved(values, strain.grid, request.deconvolution, request.sharpened)
         except ValueError as error:
             raise ConfigError(str(error)) from None
     return for_display(values, strain.grid.step, request.low_pass_px, request.median)

@@ -105,6 +105,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ["--field", "status"],
         ["--field", "sigma_eyy", "--row", "0", "--limit", "1e-3"],
         ["--field", "eyy", "--median", "3", "--low-pass", "9", "--deconvolve", "2"],
+        ["--field", "eyy", "--deconvolve", "2", "--sharpen", "3"],
     ],
 )
 def test_a_picture_comes_out(results: Path, tmp_path: Path, more: list[str]) -> None:
@@ -135,6 +136,8 @@ def test_what_was_done_is_named() -> None:
     assert (
         MapRequest("u", deconvolution=3).treatment(grid) == "deconvolved, 3 steps: l_10% 62 px, noise x 1.05"
     )
+    sharpened = MapRequest("u", deconvolution=2, sharpened=4).treatment(grid)
+    assert sharpened == "deconvolved, 2 steps, sharpened 4 x: l_10% 51 px, noise x 1.02"
 
 
 @pytest.mark.parametrize(
@@ -155,6 +158,8 @@ def test_only_a_known_blur_is_taken_off(results: Path, key: str, value: object) 
         (["--field", "status", "--median", "3"], 2, "neither filtered nor deconvolved"),
         (["--deconvolve", "-1"], 2, "allowed: 0 to 100 steps"),
         (["--deconvolve", "100000000"], 2, "allowed: 0 to 100 steps"),
+        (["--deconvolve", "2", "--sharpen", "5"], 2, "allowed: 0 to 4 times"),
+        (["--sharpen", "1"], 2, "only a deconvolved map can be sharpened; add --deconvolve STEPS"),
         (["--limit", "nan"], 2, "a limit of nan"),
         (["--limit", "inf"], 2, "a limit of inf"),
         (["--limit", "0"], 2, "a limit of 0.0"),
