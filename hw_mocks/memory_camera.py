@@ -22,8 +22,8 @@ from hw_mocks.deformation import Affine
 from hw_mocks.scene import Exposer, Sensor
 from hw_mocks.speckle import Speckle
 
-STILL = 1.0
-"""Seconds without motion at the start, for the reference."""
+STILL_S, STILL_FRAMES = 1.0, 40
+"""Without motion at the start, at least, for the reference."""
 SPOT_PX = 6
 """Radius of a spot of glare."""
 SHIFT_PX, STRAIN = (0.11, -0.07), (-3e-5, 1e-4)
@@ -111,7 +111,7 @@ class MemoryCamera(CameraBase):
 
     def _which(self, number: int) -> int:
         """The picture of a frame: the first while all is still, then to and fro."""
-        moving = number - round(STILL * self._settings.fps)
+        moving = number - max(round(STILL_S * self._settings.fps), STILL_FRAMES)
         if moving <= 0:
             return number % 2  # the same pattern with other noise
         last = len(self._pictures) - 2
