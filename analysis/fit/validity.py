@@ -64,6 +64,8 @@ MAX_SIGMA_U = 0.3
 MIN_INFORMATION = 0.04
 """Information on u, v or a gradient beside the others, over that of a pattern with the same gradients everywhere: a
 corner or an edge has less. Where u and v of real ZOIs agree with their neighbours to 0.05 px, 4 of 18,303 have less."""
+SMALL_PX, SMALL_POWER = (20.0, 28.0), 4.3
+"""ZOIs (order 1 and 2) below which also random patterns have less, since few speckles lie in them, and how fast."""
 INFORMATION_OVER_NOISE = 1.4
 """The same over what noise alone pretends: a fit along an edge follows the noise of the reference (8 of the 18,303)."""
 QUIETER = 2.0
@@ -100,6 +102,12 @@ def information(
     found = 1 / (np.maximum(inverse[:, affine, affine], 1e-30) * even)
     least = np.where(energy > 0, energy, np.inf).repeat(3, axis=1)
     return (found / least).min(axis=1), found.min(axis=1) / max(noise_energy, 1e-12)
+
+
+def least_information(size: int, order: int) -> float:
+    """Share of the information of an even pattern below which a ZOI of ``size`` px has none (``information``)."""
+    share: float = min(1.0, size / SMALL_PX[order - 1]) ** SMALL_POWER
+    return MIN_INFORMATION * share
 
 
 def has_pattern(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analysis.field import Status, profile
 from analysis.fit.kernel_args import NormalArgs, ReferenceImages, WindowRows
 from analysis.fit.noise_bias import noise_bias
-from analysis.fit.validity import CLIPPED_SHARE, MIN_INFORMATION, SHOWN_SHARE, has_pattern, information
+from analysis.fit.validity import CLIPPED_SHARE, SHOWN_SHARE, has_pattern, information, least_information
 from analysis.kernel.images import NoiseModel, continue_rim, padded, rounding_variance, second_differences
 from analysis.kernel.settings import KernelSettings
 from analysis.picture.spectrum import Pattern, filtered_pattern
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 DOUBTFUL = 0.2
-"""Information from which on the picture of a ZOI is not looked at (``validity.MIN_INFORMATION``)."""
+"""Information from which on the picture of a ZOI is not looked at (``validity.least_information``)."""
 
 
 class PatternError(ValueError):
@@ -120,7 +120,8 @@ def prepare_reference(
         out.inverse[:-1], energy[:, :2].astype(np.float64), pattern.left_gradient, line
     )
     status = _measurable(pattern, out.covariance, energy, rounding_variance(image))
-    status[(share < MIN_INFORMATION) | ~_shown(image, origins, line, energy[:, 2], share)] = Status.NO_PATTERN
+    unknown = share < least_information(len(line), settings.order)
+    status[unknown | ~_shown(image, origins, line, energy[:, 2], share)] = Status.NO_PATTERN
     if clipped is not None and clipped.any():
         from analysis.fit.assembly import clipped_share
 

@@ -28,7 +28,7 @@ def loading(
     unknown = np.full(len(strain), math.nan)
     return Loading(
         np.arange(len(strain)) / 10, strain, stress, across, strain, unknown, unknown, across, unknown,
-        stress, strain, 0.0, noise_stress, 0, len(strain) - 1, False,
+        unknown, stress, strain, 0.0, noise_stress, 0, len(strain) - 1, False,
     )  # fmt: skip
 
 

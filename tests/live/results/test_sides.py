@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from datetime import timedelta
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -75,13 +76,15 @@ def test_the_curve_of_the_mean_has_means_and_the_stress_of_the_front() -> None:
 
 
 def test_the_newest_values_are_those_of_the_newest_instant_of_both(monkeypatch: pytest.MonkeyPatch) -> None:
-    def recent(last: int) -> dict[str, Course]:
-        t = np.arange(last + 1.0)
-        return {AXIAL: Course(t, 1e-3 * t * last, np.zeros(last + 1))}
+    def recent(state: Any) -> dict[str, Course]:
+        t = np.arange(state.last + 1.0)
+        return {AXIAL: Course(t, 1e-3 * t * state.last, np.zeros(state.last + 1))}
 
     monkeypatch.setattr("live.results.sides.together._recent", recent)
-    front, back = cast(RunState, 6), cast(RunState, 4)
-    mean, bending, _ = newest(front, back)[AXIAL]
+    healthy = SimpleNamespace(camera_failed=False)
+    front, back = (cast(RunState, SimpleNamespace(last=k, health=healthy)) for k in (6, 4))
+    mean, bending, _, at = newest(front, back)[AXIAL]
+    assert at == 4.0
     assert mean == pytest.approx(4e-3 * (6 + 4) / 2) and bending == pytest.approx(4e-3 * (6 - 4) / 2)
 
 

@@ -52,7 +52,8 @@ def test_everything_is_offered() -> None:
     event_log.emit(EventKind.NOTE, "operator", "hello")
     out.end()
     assert {name for name, _ in view.calls} == {"show", "point", "picture", "load", "event"}
-    assert [what for name, what in view.calls if name == "point"] == [(0.001, 0.0)]
+    (point,) = (what for name, what in view.calls if name == "point")
+    assert point == pytest.approx((0.001, 0.0))
     assert view.closed
     assert out.reports[0].summary == "all drawn"
 
