@@ -21,7 +21,7 @@ from live.results.report.saving import find_browser
 
 ROOT = Path(__file__).parents[4]
 FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
-TIMEOUT_S = 120.0
+TIMEOUT_S = 240.0
 
 
 def chromium() -> str:
