@@ -159,7 +159,7 @@ def _own_error(ready: PreparedReference, left: Pixels, which: Places) -> Floats:
     The filter that makes f shows in the cross spectrum of f and the reference as it was recorded.
     """
     size = left.shape[1]
-    window = np.outer(np.hanning(size + 2)[1:-1], np.hanning(size + 2)[1:-1])
+    window = _window(size)
     level, raw = (_spectra(zois_of(ready.images[k], ready.origins[which], size), window) for k in (2, 3))
     response = np.mean((level * raw.conj()).real, axis=0) / np.mean(np.abs(raw) ** 2, axis=0)
     power = np.mean(np.abs(_spectra(left, window)) ** 2, axis=0) / np.sum(window**2)
@@ -175,7 +175,7 @@ def by_frequency(solution: Solution, ok: NDArray[np.bool_]) -> Floats:
     """
     size = solution.reference.grid.size
     left = _without_planes(left_by_fit(solution, some(ok, SPECTRA // size**2)))
-    window = np.outer(np.hanning(size + 2)[1:-1], np.hanning(size + 2)[1:-1])
+    window = _window(size)
     power = np.mean(np.abs(_spectra(left, window)) ** 2, axis=0)
     seen = np.sum(solution.reference.response * power, axis=(1, 2))
     return np.asarray(seen[:6] / seen[6:].repeat(3))
@@ -187,6 +187,12 @@ def _without_planes(left: Pixels) -> Pixels:
     along_x, along_y = (np.einsum(f"nij,{k}->n", left, x) / (len(x) * np.sum(x**2)) for k in "ji")
     planes = along_x[:, None, None] * x + along_y[:, None, None] * x[:, None]
     return np.asarray(left - left.mean(axis=(1, 2), keepdims=True) - planes, np.float32)
+
+
+def _window(size: int) -> Floats:
+    """That of Hann without its zeros, (n, n)."""
+    line = np.hanning(size + 2)[1:-1]
+    return np.outer(line, line)
 
 
 def _spectra(zois: Pixels, window: Floats) -> NDArray[np.complex64]:

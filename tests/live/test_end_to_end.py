@@ -82,6 +82,13 @@ def assert_bit_equal(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> None
         np.testing.assert_array_equal(values, b[name], err_msg=name)
 
 
+def assert_replay_is_bit_equal(folder: Path, out: Path) -> None:
+    """A replay of a run as measured, into ``out``, gives its strains."""
+    session = str(folder / "session.h5")
+    assert main(["replay", session, "--as-measured", "--out", str(out), "--no-view", "--no-rrd"]) == 0
+    assert_bit_equal(strains(folder), strains(out))
+
+
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome]:
     folder = tmp_path_factory.mktemp("live") / "run"
@@ -142,18 +149,7 @@ def test_the_csv_has_a_row_a_measurement(recorded: tuple[Path, Outcome]) -> None
 
 def test_replay_as_measured_is_bit_equal(recorded: tuple[Path, Outcome], tmp_path: Path) -> None:
     folder, _ = recorded
-    out = tmp_path / "again"
-    arguments = [
-        "replay",
-        str(folder / "session.h5"),
-        "--as-measured",
-        "--out",
-        str(out),
-        "--no-view",
-        "--no-rrd",
-    ]
-    assert main(arguments) == 0
-    assert_bit_equal(strains(folder), strains(out))
+    assert_replay_is_bit_equal(folder, tmp_path / "again")
 
 
 def test_plain_replay_measures_every_burst_with_other_zois(

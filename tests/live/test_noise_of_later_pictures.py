@@ -8,10 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from live.cli import main
 from live.results.reader import Strain
 from tests.accuracy.truth import Speckle, affine
-from tests.live.test_end_to_end import assert_bit_equal, live_run, strains
+from tests.live.test_end_to_end import assert_replay_is_bit_equal, live_run, strains
 
 NOISE_GL = (1, 1, 1, 1, 1, 2, 2, 3, 3, 5, 5)
 """By picture; the first four make the reference."""
@@ -32,22 +31,12 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_live_and_replay_agree_where_the_noise_grows(
     pictures: Path, tmp_path: Path, stated: float | None
 ) -> None:
-    folder, out = tmp_path / "run", tmp_path / "again"
+    folder = tmp_path / "run"
     measured: dict[str, float] = {"measure.zoi": 32, "measure.step": 16, "measure.burst": 1}
     if stated is not None:
         measured["measure.noise_GL"] = stated
     live_run(folder, camera=f"files:{pictures}?fps=20", **measured)
-    replay = [
-        "replay",
-        str(folder / "session.h5"),
-        "--as-measured",
-        "--out",
-        str(out),
-        "--no-view",
-        "--no-rrd",
-    ]
-    assert main(replay) == 0
-    assert_bit_equal(strains(folder), strains(out))
+    assert_replay_is_bit_equal(folder, tmp_path / "again")
     with Strain.open(folder / "strain.h5") as strain:
         instants = len(strain.time_s)
     assert instants == len(NOISE_GL) - 4
