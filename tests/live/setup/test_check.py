@@ -380,3 +380,12 @@ def test_automatic_controls_by_name_and_value() -> None:
     }
     found = automatic_controls(controls)
     assert found == ("auto_exposure", "white_balance_automatic", "exposure_dynamic_framerate")
+
+
+def test_the_noise_of_each_zoi_is_that_of_a_burst_of_the_test() -> None:
+    """Half of the frames against the other half is scaled to reference and burst of the test, as in the table."""
+    found = figures("&bits=12&noise=1", zoi=48)
+    assert found.floor is not None
+    one = found.floor.of(found.burst)
+    assert one is not None
+    assert np.nanmedian(found.zois.sigma) == pytest.approx(one.predicted, rel=0.1)

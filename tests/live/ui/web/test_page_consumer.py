@@ -27,6 +27,7 @@ from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.curve_history import MAX_POINTS, CurveHistory
 from live.ui.web.map_view import plate_shapes
 from live.ui.web.page_consumer import PageConsumer, elongation_length
+from live.ui.web.painting import shrunk, traffic_light
 from tests.live.made_up import make_frame, make_measurement
 from tests.live.ui.waiting import until
 from tests.live.ui.web.sentences import (
@@ -333,3 +334,20 @@ def test_plates_are_drawn_beside_the_gauges_and_cannot_be_dragged() -> None:
     consumer.measurement(measurement())
     consumer.idle()
     assert set(consumer.state()["picture"]["gauges"]) == {"axial", "plate left"}
+
+
+def test_the_noise_of_zois_from_green_over_yellow_to_red() -> None:
+    """By its logarithm: yellow is at the geometric mean of the two limits."""
+    noise = np.array([0.5e-4, 1e-4, 3e-4, 9e-4, 5e-3, np.nan])
+    colours = traffic_light(noise, 1e-4, 9e-4)
+    green, yellow, red = (40, 170, 80), (240, 200, 30), (220, 50, 40)
+    wanted = np.array([green, green, yellow, red, red, red])
+    assert np.abs(colours[:, :3].astype(int) - wanted).max() <= 1
+
+
+def test_a_large_picture_is_reduced_and_its_grey_levels_fill_those_of_the_screen() -> None:
+    image = np.full((600, 1920), 1023, np.uint16)
+    image[:, 960:] = 512
+    picture, scale = shrunk(image, 10)
+    assert (picture.shape, scale) == ((300, 960, 3), 0.5)
+    assert (picture[:, :470] == 255).all() and (picture[:, 490:] == 127).all()
