@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from analysis.evaluate.curve import (
     Course,
+    Curve,
+    Loading,
     TwoSides,
     broken_at,
     first_crossing,
@@ -92,3 +95,18 @@ def test_the_other_side_is_known_between_its_instants_alone() -> None:
     )
     assert BACK.at(asked, 4.0).value == pytest.approx([math.nan, 1.5e-4, 5e-4, 7e-4, math.nan], nan_ok=True)
     assert BACK.at(asked, 4.0).sigma[1] == pytest.approx(math.hypot(0.75, 0.25) * 6e-6)
+
+
+@pytest.mark.parametrize(("rising", "half"), [(600, 4), (150, 2), (40, 0)])
+def test_what_of_a_test_is_evaluated(rising: int, half: int) -> None:
+    """All that has strain and stress up to the last sample before the break; running means of up to 9 samples."""
+    stress = np.concatenate([np.arange(rising + 1.0), np.zeros(5)])
+    strain = 1e-5 * np.arange(len(stress))
+    strain[5] = math.nan
+    curve = Curve(np.arange(len(stress)) / 10, strain, stress, transverse=-0.3 * strain)
+    found = Loading.of(curve)
+    assert (found.n, found.top, found.half, found.broke) == (rising, rising - 1, half, True)
+    assert found.t[-1] == rising / 10 and found.strain[-1] == 1e-5 * rising
+    assert np.array_equal(found.elastic, found.strain) and np.array_equal(found.narrowing, found.transverse)
+    assert np.isnan(found.uneven).all() and found.course[0] == 0.0
+    assert not Loading.of(replace(curve, stress=np.arange(float(len(stress))))).broke

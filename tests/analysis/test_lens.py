@@ -234,7 +234,18 @@ def test_noise_beyond_what_is_stated_is_in_the_uncertainty_of_the_lens() -> None
         for one in fields
     ]
     honest, short = (lens_of_shifts(some, WIDTH, HEIGHT) for some in (fields, ninth))
+    assert honest.lens.parameters[:3] == pytest.approx(
+        TRUE[:3], rel=1e-12
+    )  # not found: half a diagonal, the middle
     assert short.over_noise == pytest.approx(3, rel=0.1)
     assert short.rms_px == pytest.approx(honest.rms_px, rel=1e-3)
     radial = np.s_[3:5, 3:5]
     assert short.lens.covariance[radial] == pytest.approx(honest.lens.covariance[radial], rel=0.1)
+
+
+def test_eleven_zois_are_too_few_for_a_lens() -> None:
+    fields = shifted(np.random.default_rng(1), 1e-3)
+    few = np.where(np.arange(GRID.active.size).reshape(GRID.shape) % 13 == 0, Status.OK, Status.LOST)
+    assert (few == Status.OK).sum() == 11
+    with pytest.raises(ValueError, match="with 11 ZOIs that all of them show; it takes 2 and 12"):
+        lens_of_shifts([replace(one, status=few.astype(np.uint8)) for one in fields], WIDTH, HEIGHT)

@@ -322,17 +322,27 @@ def test_the_tilt_of_a_plane_is_read_from_its_keystone() -> None:
     assert tilts == pytest.approx([0.2, 0.3], rel=0.02)
 
 
-def test_the_sigma_of_a_keystone_is_the_scatter_of_noise() -> None:
-    """ZOIs side by side: the noise of each is its own."""
-    grid, rng = ZoiGrid.cover(Roi(0, 0, 320, 256), 32, 32), np.random.default_rng(2)
+@pytest.mark.parametrize(("step", "overlap"), [(32, 1.0), (16, 2.0)])
+def test_the_sigma_of_a_keystone_is_the_scatter_of_noise(step: int, overlap: float) -> None:
+    """As of noise that each ZOI has to itself; where they overlap, of as many as lie side by side."""
+    grid, rng = ZoiGrid.cover(Roi(0, 0, 320, 256), 32, step), np.random.default_rng(2)
     found = []
     for _ in range(200):
         u, v = rng.normal(0, 1e-3, (2, *grid.shape))
         along_x, along_y = keystones(StrainField.from_values(grid, {"u": u, "v": v}, 1e-3))
         found.append((along_x.by_u, along_x.by_v, along_y.by_u, along_y.by_v))
-    by = np.std(found, axis=0)
+    by = overlap * np.std(found, axis=0)
     assert along_x.sigma == pytest.approx(max(by[:2]), rel=0.2)
     assert along_y.sigma == pytest.approx(max(by[2:]), rel=0.2)
+
+
+def test_eleven_zois_show_no_keystone() -> None:
+    grid = ZoiGrid.cover(Roi(0, 0, 128, 96), 32, 32)
+    status = np.zeros(grid.shape, int)
+    assert math.isfinite(keystones(StrainField.from_values(grid, {}, 1e-3, status))[0].by_u)
+    status[0, 0] = Status.LOST
+    for one in keystones(StrainField.from_values(grid, {}, 1e-3, status)):
+        assert math.isnan(one.by_u) and one.rise == 0
 
 
 @pytest.mark.parametrize(
