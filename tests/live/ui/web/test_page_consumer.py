@@ -16,6 +16,7 @@ import pytest
 
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
+from analysis import StrainField
 from analysis.evaluate import GAUGE_KINDS, GaugeValue
 from live.config.loading import Config, load_config
 from live.pipeline.consumer import Consumer
@@ -25,7 +26,7 @@ from live.pipeline.run_state import RunState
 from live.results.maps.field_maps import FIELD_MAPS
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.curve_history import MAX_POINTS, CurveHistory
-from live.ui.web.map_view import plate_shapes
+from live.ui.web.map_view import MapView, plate_shapes
 from live.ui.web.page_consumer import PageConsumer, elongation_length
 from live.ui.web.painting import shrunk, traffic_light
 from tests.live.made_up import make_frame, make_measurement
@@ -236,6 +237,20 @@ def test_the_value_at_a_place_of_the_map(config: Config) -> None:
     assert found["value"] == pytest.approx(m.field.value("eyy")[row, column])
     assert found["sigma"] == pytest.approx(m.field.sigma("eyy")[row, column])
     assert consumer.map.value_at(-500, -500)["value"] is None
+
+
+def test_the_value_is_that_of_the_zoi_that_has_moved_to_the_place(config: Config) -> None:
+    m = measurement()
+    grid = m.field.grid
+    x, y = np.meshgrid(grid.x, grid.y)
+    field = StrainField.from_values(grid, {"dv_dy": 1e-5 * x + 3e-7 * y}, 1e-5)
+    view = MapView(config)
+    view.draw(replace(m, field=field, time_step=replace(m.time_step, u=20.0, v=-13.0)))
+    for row, column in ((1, 2), (3, 4)):
+        found = view.value_at(grid.x[column] + 20.0 + 5, grid.y[row] - 13.0 - 5)
+        assert found["value"] == pytest.approx(1e-5 * grid.x[column] + 3e-7 * grid.y[row])
+    for off, there in ((7.9, True), (8.1, False)):  # half a step beyond the last centre
+        assert (view.value_at(grid.x[-1] + 20.0 + off, grid.y[2] - 13.0)["value"] is not None) == there
 
 
 def test_a_recording_shows_figures_of_one_instant(config: Config) -> None:
