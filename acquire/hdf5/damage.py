@@ -81,7 +81,7 @@ def abandon_file(file: h5py.File) -> None:
 _BOUNDS = ("v110", "v110")  # the format that survives SIGKILL; older ones promise nothing
 
 
-CACHE_BYTES, METADATA_BYTES = 8 << 10, 256 << 10
+CACHE_BYTES, METADATA_BYTES = 16 << 10, 256 << 10
 """Of values of each dataset, and of the structure of a file, that HDF5 keeps in memory: enough to append."""
 
 
