@@ -1,4 +1,7 @@
-"""Queues and histories of hours, in fast motion: what run, page and display keep grows by little, or not at all."""
+"""Queues and histories of hours, in fast motion: what run, page and display keep grows by little, or not at all.
+
+What is kept of each frame is its time step, and of each load sample its time and force.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,8 @@ from dataclasses import fields, replace
 import pytest
 
 from acquire.load_sample import LoadSample
-from live.pipeline.measurement import TimeStep
+from live.pipeline.latency import LatencyMonitor, LatencySample
+from live.pipeline.measurement import ForceMatching, TimeStep
 from live.pipeline.run_state import RunState
 from live.ui.rerun.messages import ViewSetup
 from live.ui.rerun.outbox import Outbox, Pending
@@ -17,7 +21,8 @@ from live.ui.web.curve_history import CurveHistory
 from tests.live.made_up import make_grid, make_measurement
 
 LOAD_HZ = 10
-STEP = make_measurement(0, 1e-3).time_step
+FIRST = make_measurement(0, 1e-3)
+STEP = FIRST.time_step
 FLOATS = [
     one.name for one in fields(TimeStep) if isinstance(getattr(STEP, one.name), float) and one.name != "t"
 ]
@@ -30,10 +35,16 @@ class Kept:
         self.run_state, self.curve = RunState.new(0.25), CurveHistory(["t", "force", "axial", "exx"])
         self.pending = Pending()
         self.outbox = Outbox(ViewSetup("long", 640, 480, 8, make_grid(), 0.0), self.pending)
+        self.matching = ForceMatching(self.run_state.loads)
+        self.latency = LatencyMonitor(lambda: 0.0, lambda: None)
+        self.matched = 0
 
     def frame(self, t: float) -> None:
         step = changed(t)
         self.run_state.history.add(step)
+        measurement = replace(FIRST, burst=replace(FIRST.burst, t=t), time_step=step)
+        self.matched += len(self.matching.add(measurement))
+        self.latency.check(LatencySample(t, step.latency_s, step.measure_s), 1.0)
         self.curve.add([t, 1e3 * t, step.exx, step.exx])
         self.pending.row(Kind.MEANS, (t, step.exx, 1e-5, step.eyy, 1e-5, step.exy, 1e-5))
         self.pending.row(Kind.POINTS, (step.exx, 1e3 * t))
@@ -74,3 +85,4 @@ def test_memory_of_hours(hours: float, fps: int) -> None:
     assert per_minute < 0.3 * fps / 20
     assert len(kept.curve.since(-1, 0)["rows"]) <= 4001
     assert kept.pending.dropped == 0
+    assert kept.matched + len(kept.matching) == frames and len(kept.matching) <= 2
