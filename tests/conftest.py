@@ -5,8 +5,15 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import hypothesis
 import pytest
 from _pytest.runner import runtestprotocol
+
+# No example has a time limit of its own, which a busy machine would exceed; pytest's is that of the whole test.
+hypothesis.settings.register_profile(
+    "any machine", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+)
+hypothesis.settings.load_profile("any machine")
 
 MEASURING = {"accuracy", "adversary", "analysis", "bench", "contracts", "live"}
 

@@ -18,7 +18,7 @@ from analysis import PICTURE_KINDS, share_compiled
 from live import cli
 from live.setup.compiling import compile_ahead, progress_text
 from tests.bench.soak import children
-from tests.live.replay.batch.running import until
+from tests.live.ui.waiting import until
 
 ROOT = Path(__file__).parents[3]
 CAMERA = "sim:uniform?seconds=60&fps=20&width=160&height=128"

@@ -26,7 +26,8 @@ from live.replay.batch.test_list import find_tests
 from live.results import strain_h5
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.replay.batch.conftest import SETTINGS
-from tests.live.replay.batch.running import datasets, differing, is_gone, parts, pid_of, rows, started, until
+from tests.live.replay.batch.running import datasets, differing, is_gone, parts, pid_of, rows, started
+from tests.live.ui.waiting import until
 
 ROOT = Path(__file__).parents[4]
 
