@@ -139,7 +139,7 @@ def test_the_simulated_rig_is_at_rest_before_a_run(
     moving = "sim:?seconds=4&hold=0.01"
     assert main(["load-check", "--load", moving, "--seconds", "1"]) == 0
     small = ["--roi", "all", "--zoi", "48", "--step", "48", "--reference-burst", "8"]
-    camera = "sim:uniform?seconds=2&hold=0.01&end=0.01&fps=50&width=320&height=256"
+    camera = "sim:uniform?lockstep=yes&seconds=2&hold=0.01&end=0.01&fps=50&width=320&height=256"
     assert main(["check", "--camera", camera, "--load", "sim:", *small]) == 0
     assert "LOOK" not in capsys.readouterr().out
 
