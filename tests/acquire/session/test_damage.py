@@ -88,6 +88,16 @@ def test_recover_makes_a_clean_copy(tmp_path: Path) -> None:
         recover(path)
 
 
+def test_the_folder_of_a_run_stands_for_its_session(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    run.mkdir()
+    with writer(run / "session.h5") as session:
+        session.write_frame(frame(0))
+    with Session.open(run) as read:
+        assert len(read) == 1
+    assert recover(run).path == run / "session.recovered.h5"
+
+
 def test_a_frame_that_cannot_be_read_becomes_a_counted_loss(tmp_path: Path) -> None:
     path = tmp_path / "session.h5"
     with writer(path) as session:

@@ -168,6 +168,18 @@ def test_the_snapshot_and_the_gauges(capsys: pytest.CaptureFixture[str], tmp_pat
     assert "nothing is overwritten" in capsys.readouterr().err
 
 
+def test_both_cameras_are_checked(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """NO-GO where one of them is not ready, with the picture of each."""
+    drawn = str(tmp_path / "seen.png")
+    dark = STILL.replace("?", "?contrast=2&")
+    code, output = checked(capsys, "", "--back", dark, "--snapshot", drawn)
+    assert code == 6 and "NO-GO" in output
+    front, back = output.split(f"back: {dark}")
+    assert f"front: {STILL}" in front and "LOOK" not in front and "LOOK" in back
+    assert {path.name for path in tmp_path.glob("*.png")} == {"seen-front.png", "seen-back.png"}
+    assert checked(capsys, "", "--back", STILL)[0] == 0
+
+
 def test_a_gauge_beside_the_specimen_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     rig = tmp_path / "rig.toml"
     rig.write_text("[gauges.far]\nkind = 'zoi'\nat = [900, 20]\n")
