@@ -185,7 +185,7 @@ def test_from_the_stamp_of_the_frame_to_the_read_of_the_client(tmp_path: Path) -
         if not listeners:
             listeners.extend([Listener(port), Caller(port, receive_buffer=2048)])
 
-    real = "sim:uniform?seconds=4&fps=20&width=224&height=192&bits=12"
+    real = "sim:uniform?seconds=3&fps=20&width=224&height=192&bits=12"
     outcome = live_run(tmp_path / "run", real, each=note, **{"measure.burst": 1, "strain_out.tcp": str(port)})
     good, stalled = listeners
     good.join(LONG_S)
