@@ -363,6 +363,7 @@ for k in itertools.count():
 """
 
 
+@pytest.mark.timed
 def test_a_killed_writer_leaves_what_is_older_than_its_last_flush(tmp_path: Path) -> None:
     command = [sys.executable, "-c", WRITER, str(tmp_path)]
     with subprocess.Popen(
