@@ -33,16 +33,26 @@ def _mirror(i: int, n: int) -> int:
     return min(i, period - i)
 
 
+def room_for(shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Memory for the ``coefficients`` of images (H, W): (H + 2 PAD) rows of W + 2 PAD, and a vector more than that.
+
+    To be used again: fresh memory takes as long as the filter. numpy asks for large pages, numba does not.
+    """
+    height, width = shape
+    return np.empty((height + 2 * PAD) * (width + 2 * PAD) + LANES, np.float32)
+
+
 @parallel
-def coefficients(image: NDArray[Any], offset: Any, taps: NDArray[np.float32], box: Box) -> Any:
+def coefficients(
+    image: NDArray[Any], offset: Any, taps: NDArray[np.float32], box: Box, out: NDArray[np.float32]
+) -> None:
     """Spline coefficients of ``image - offset`` (uint8, uint16 or float32), mirrored PAD pixels beyond each edge.
 
-    Returns flat float32: (H + 2 PAD) rows of W + 2 PAD, and a vector more than that; outside ``box``
-    they are not computed. ``taps`` is one side of the symmetric prefilter.
+    Written to ``out`` (``room_for``); outside ``box`` they are not computed. ``taps`` is one side of the symmetric
+    prefilter.
     """
     height, width = image.shape
     stride = width + 2 * PAD
-    out = np.empty((height + 2 * PAD) * stride + LANES, np.float32)
     for n in range(out.size - LANES, out.size):
         out[n] = 0
     counters, calling = np.zeros(SHARES, np.int64), caller()
@@ -54,7 +64,6 @@ def coefficients(image: NDArray[Any], offset: Any, taps: NDArray[np.float32], bo
             _copy_row(out, _mirror(y - PAD, height) + PAD, stride, y)
         if box.bottom == height:
             _copy_row(out, _mirror(height + y, height) + PAD, stride, PAD + height + y)
-    return out
 
 
 @helper
