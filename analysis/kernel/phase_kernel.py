@@ -165,11 +165,13 @@ class PhaseKernel:
         Raises
         ------
         ValueError
-            The image has another size than the reference, or the start another grid.
+            The image has another size than the reference or values that are not finite, or the start another grid.
         """
         FORK_GUARD.check()
         reference = self.reference
-        image, shape = as_recorded(deformed, "the deformed image"), reference.prepared.shape
+        later = start is not None and not reference.cleaned  # when the image is filtered
+        image = as_recorded(deformed, "the deformed image", any_values=later)
+        shape = reference.prepared.shape
         if image.shape != shape:
             raise ValueError(
                 f"the deformed image has {image.shape[1]} x {image.shape[0]} px, "

@@ -77,11 +77,11 @@ class Solution:
         self.noise = noise
         self.guess = guess
         self._room = room_for(prepared.shape) if room is None else room
-        self.rounding = reference.rounding + rounding_variance(image)
         self.common: PooledError | None = None
         self.retried = False
         self.had_lines = False
         self._take(_cleaned(image) if reference.cleaned else image)
+        self.rounding = reference.rounding + rounding_variance(image)
         self.table = tap_table(reference.settings.interpolant)
         self.tolerance = reference.tolerance(self._current_std())
         self._noise, current = self.variances(np.s_[:], np.ones(len(guess)))
@@ -131,7 +131,8 @@ class Solution:
 
         self._box, prepared = box, self.reference.prepared
         taps = prefilter_taps(self.reference.settings.interpolant)
-        coefficients(self.image, np.float32(prepared.pattern.mean), taps, box, self._room)
+        if not coefficients(self.image, np.float32(prepared.pattern.mean), taps, box, self._room):
+            raise ValueError("the deformed image holds values that are not finite")
         return PictureArgs.within(self._room, prepared.shape, box, SPILL_PX)
 
     def _current_std(self) -> float:

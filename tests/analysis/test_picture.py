@@ -179,6 +179,21 @@ def test_no_coefficient_depends_on_what_else_is_filtered(box: Box) -> None:
     assert np.array_equal(whole[inside], part[inside])
 
 
+@pytest.mark.parametrize("kind", [np.uint8, np.float32])
+@pytest.mark.parametrize(("place", "finite"), [(None, True), ((70, 60), False), ((299, 399), True)])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_the_prefilter_sees_values_that_are_not_finite(
+    kind: type, place: tuple[int, int] | None, finite: bool, value: float
+) -> None:
+    """In its box and beside it, but not where it reads nothing."""
+    image = np.random.default_rng(2).integers(0, 256, (300, 400)).astype(kind)
+    if place is not None and kind is np.float32:
+        image[place] = value
+    box, room = Box(75, 200, 65, 300), room_for(image.shape)
+    seen = coefficients(image, np.float32(100), prefilter_taps(5), box, room)
+    assert seen is (finite or kind is np.uint8)
+
+
 @pytest.mark.parametrize(
     "motion",
     [
@@ -196,9 +211,7 @@ def test_warp_is_the_interpolated_image(motion: tuple, size: int) -> None:
     origin = np.array([[24, 30]])
     out = np.empty((1, size, size), np.float32)
     box = Box(0, IMAGE.shape[0], 0, IMAGE.shape[1])
-    picture = PictureArgs.within(
-        filtered(IMAGE, 0, box), IMAGE.shape, box, 0.5
-    )
+    picture = PictureArgs.within(filtered(IMAGE, 0, box), IMAGE.shape, box, 0.5)
     warp_zois(picture, tap_table(5), origin, size, np.array([motion], float), out)
     x = np.arange(size) - (size - 1) / 2
     u = motion[0] + motion[1] * x + motion[2] * x[:, None]
