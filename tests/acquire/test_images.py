@@ -239,7 +239,7 @@ def test_unknown_settings_list_the_known_ones(tmp_path: Path) -> None:
         open_camera(f"files:{tmp_path}?rate=5")
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.sampled_from(["tif", "png", "bmp"]),
     st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), max_size=6),

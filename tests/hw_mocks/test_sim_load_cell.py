@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 import os
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +39,7 @@ def first(cell: LoadCell, n: int) -> list[LoadSample]:
     return samples
 
 
+@pytest.mark.timed
 def test_force_is_the_programmes_within_noise() -> None:
     cell, specimen = opened("sim:?seconds=0.6&hold=0.1&rate=200&noise_N=0.5")
     with cell:
@@ -65,15 +65,6 @@ def test_events_and_info_carry_the_address() -> None:
         first(cell, 2)
     assert cell.info.address == "sim:?rate=200&seed=4" and cell.info.protocol == "ascii"
     assert events and {event.source for event in events} == {"sim:?rate=200&seed=4"}
-
-
-def test_stop_from_another_thread() -> None:
-    cell, _ = opened("sim:?rate=100")
-    with cell:
-        stopper = threading.Timer(0.05, cell.stop)
-        stopper.start()
-        assert len(list(cell)) < 100
-        stopper.join()
 
 
 def test_port_is_gone_after_close() -> None:

@@ -30,7 +30,7 @@ from live.run.live_run import LiveRun, run_live
 from live.run.outcome import Outcome
 from live.setup.devices import Rig
 from live.ui.terminal.screen import TerminalScreen
-from tests.live.replay.batch.running import until
+from tests.live.ui.waiting import until
 
 SIM = "sim:woven?lockstep=yes&seconds=3&fps=15&width=224&height=192&bits=12"
 SMALL = {

@@ -236,6 +236,7 @@ def test_a_folder_that_may_not_be_written(tmp_path: Path) -> None:
         writer(Path("/proc/session.h5"))
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("after_s", [0.0, 0.113, 0.351])
 def test_only_the_youngest_are_lost(tmp_path: Path, after_s: float) -> None:
     remains = kill_once(tmp_path, after_s, fps=100, size=256)

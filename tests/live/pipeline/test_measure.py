@@ -315,6 +315,23 @@ def test_what_goes_in_comes_out() -> None:
             history.time_steps[beyond]
 
 
+def test_numbers_of_hours_come_out_whether_they_change_or_not() -> None:
+    """In blocks of 1024, of which those without a change are kept as one number."""
+    history, axial = History(), {"axial": GaugeValue(0.25, 0.125)}
+    zeros = [0.0] * 1030 + [-0.0] * 10 + [7.25] * 2000
+    raw = [math.nan] * 2000 + [1.0] * 1040
+    for i, (zero, force) in enumerate(zip(zeros, raw, strict=True)):
+        history.add(replace(some(i), zero=zero, force_raw=force, gauges=axial if i >= 1500 else {}))
+    assert repr(history.column("zero").tolist()) == repr(zeros), "-0.0 is not 0.0"
+    assert np.array_equal(history.column("force_raw"), raw, equal_nan=True)
+    assert np.array_equal(history.column("t"), np.arange(3040) * 0.37)
+    for i in (0, 1023, 1024, 1035, 2999, -1):
+        step = history.time_steps[i]
+        assert repr((step.zero, step.force_raw)) == repr((zeros[i], raw[i]))
+        assert step.refused == f"{range(3040)[i] % 4} LOST"
+    assert [len(history.time_steps[i].gauges) for i in (0, 1499, 1500, 3039)] == [0, 0, 1, 1]
+
+
 def test_a_gauge_that_comes_and_goes() -> None:
     history, late = History(), {"late": GaugeValue(1.0, 0.125)}
     for gauges in ({}, late, {}):
@@ -339,6 +356,16 @@ def test_little_memory() -> None:
     grown = tracemalloc.get_traced_memory()[0] / 20_000
     tracemalloc.stop()
     assert grown < 250, "bytes an instant with two gauges"
+
+
+def test_numbers_that_do_not_change_take_no_memory() -> None:
+    history, still = History("y"), make_measurement(0).time_step
+    tracemalloc.start()
+    for i in range(20_480):
+        history.add(replace(still, t=1e-3 * i))
+    grown = tracemalloc.get_traced_memory()[0] / 20_480
+    tracemalloc.stop()
+    assert grown < 8 + 8, "bytes an instant: its time"
 
 
 def test_the_means_of_an_old_file_are_not_called_strains_of_the_region() -> None:

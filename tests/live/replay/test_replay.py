@@ -39,7 +39,7 @@ from live.replay.opening import prepare_replay
 from live.replay.source import ReplaySource, prefetch
 from live.results import Strain
 from live.setup.region import FirstLook
-from tests.live.ui.waiting import until
+from tests.live.ui.waiting import LONG_S, until
 
 
 def test_the_same_items_in_order() -> None:
@@ -59,7 +59,7 @@ def test_they_are_taken_while_one_is_worked_on_but_no_more_than_there_is_room() 
 
     bursts = prefetch(items(), queue_size=3)
     assert next(bursts) == 0
-    assert waiting.wait(10), "nothing was read ahead"
+    assert waiting.wait(LONG_S), "nothing was read ahead"
     assert max(taken) <= 5
     bursts.close()
 

@@ -29,6 +29,7 @@ from live.results.row import StrainRow, maps_of
 from live.results.stored_fields import read_field
 from live.results.strain_csv import COLUMNS
 from live.results.strain_h5 import FLUSH_S, StrainWriter, rounded
+from tests.acquire.session.fixtures import writer
 from tests.clock import Clock
 from tests.live.made_up import CAMERA, START, make_grid, make_measurement
 
@@ -49,6 +50,24 @@ def open_results(folder: Path, **more: Any) -> Results:
 def rows_of(path: Path) -> list[dict[str, str]]:
     with path.open() as file:
         return list(csv.DictReader(file))
+
+
+def test_the_last_piece_of_each_column_stays_in_memory(tmp_path: Path) -> None:
+    """HDF5 reads a piece that is larger than its cache from the disk again for each row."""
+    writer(tmp_path / "session.h5").close()
+    open_results(tmp_path).close()
+    sizes = {}
+    for path in (tmp_path / "session.h5", tmp_path / "strain.h5"):
+        with h5py.File(path) as file:
+            datasets: list[h5py.Dataset] = []
+            file.visititems(lambda _, item, found=datasets: found.append(item))  # type: ignore[misc]
+            sizes |= {
+                f"{path.stem} {one.name}": one.chunks[0] * one.dtype.itemsize
+                for one in datasets
+                if isinstance(one, h5py.Dataset) and one.chunks and one.ndim == 1
+            }
+    assert len(sizes) > 50
+    assert max(sizes.values()) <= child.CACHE_BYTES, sizes
 
 
 def test_what_was_written_comes_back(tmp_path: Path) -> None:
@@ -346,6 +365,7 @@ for k in itertools.count():
 """
 
 
+@pytest.mark.timed
 def test_a_killed_writer_leaves_what_is_older_than_its_last_flush(tmp_path: Path) -> None:
     command = [sys.executable, "-c", WRITER, str(tmp_path)]
     with subprocess.Popen(

@@ -220,9 +220,9 @@ def disturbed(
     each: Callable[[Measurement], None] = lambda m: None,
     **more: Any,
 ) -> tuple[Outcome, np.ndarray]:
-    """A run of a good three seconds, and time and latency of each result."""
+    """A run of two and a half seconds, and time and latency of each result."""
     settings = {
-        "camera.address": f"bench:?width=192&height=160&fps={FPS:g}&seconds=3.3&pictures=8&buffers=64",
+        "camera.address": f"bench:?width=192&height=160&fps={FPS:g}&seconds=2.5&pictures=8&buffers=64",
         "measure.zoi": 48,
         "measure.step": 32,
         "measure.burst": 1,
@@ -250,7 +250,7 @@ def test_a_measurement_held_up_skips_and_catches_up(tmp_path: Path) -> None:
     paused: list[float] = []
 
     def hold(m: Measurement) -> None:
-        if m.number == 20:
+        if m.number == 5:
             time.sleep(0.7)
             paused.append(time.monotonic())
 
@@ -270,7 +270,7 @@ def test_a_slow_disk_is_borne_by_the_buffer_or_leaves_a_counted_gap(
     plain = SessionWriter.write_frame
 
     def slow(self: SessionWriter, frame: Any) -> Any:
-        if frame.index in range(40, 60):
+        if frame.index in range(16, 30):
             time.sleep(0.1)  # a quarter of the rate of the camera
         return plain(self, frame)
 
@@ -281,14 +281,14 @@ def test_a_slow_disk_is_borne_by_the_buffer_or_leaves_a_counted_gap(
     assert frame_counts.recorded + frame_counts.unrecorded == frame_counts.grabbed
     assert (outcome.exit_code == 5) is gap
     assert frame_counts.lost == 0
-    assert recovered(rows, float(rows[-1, 0]) - 1.5)
+    assert recovered(rows, float(rows[-1, 0]) - 1.3)
 
 
 class Flood(NoLoadCell):
-    """Silent for a second, then ten thousand lines at once."""
+    """Silent for a little, then ten thousand lines at once."""
 
     def __iter__(self) -> Iterator[LoadSample]:
-        time.sleep(1.0)
+        time.sleep(0.6)
         now = time.monotonic()
         yield from (LoadSample(now + 1e-6 * k, float(k), raw=b"+1.0 N") for k in range(10_000))
 
@@ -304,7 +304,7 @@ def test_a_flood_of_load_lines_does_not_hold_up_the_pictures(
     outcome, rows = disturbed(tmp_path)
     assert outcome.run_state.frame_counts.load_samples == 10_000
     assert (outcome.run_state.frame_counts.unrecorded, outcome.run_state.frame_counts.lost) == (0, 0)
-    assert recovered(rows, float(rows[0, 0]) + 1.2)
+    assert recovered(rows, float(rows[0, 0]) + 0.8)
 
 
 @pytest.mark.timed
