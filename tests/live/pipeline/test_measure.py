@@ -374,3 +374,33 @@ def test_the_means_of_an_old_file_are_not_called_strains_of_the_region() -> None
     for old, words in ((True, "mean eyy"), (False, "eyy of the region")):
         held = values if old else values | {"extension_y": np.full(3, np.nan)}
         assert curve_of(held.get, (), "y", np.arange(3.0), np.zeros(3)).source == words
+
+
+class NoiseOfKernel:
+    """In place of a kernel: keeps the noise that it is given, loses every ZOI of the second burst, finds all others."""
+
+    def __init__(self, given: list[tuple[str, float | None]]) -> None:
+        self.given = given
+
+    def measure(self, image: np.ndarray, *, noise: float | None, **_: object) -> StrainField:
+        self.given.append(("measured", noise))
+        lost = len(self.given) == 2
+        return StrainField.from_values(GRID, {"u": math.nan if lost else 0.0}, 1e-3)
+
+    def renewed(self, image: np.ndarray, field: StrainField, *, noise: float | None) -> NoiseOfKernel:
+        self.given.append(("renewed", noise))
+        return self
+
+
+def test_every_picture_is_measured_and_renewed_with_the_noise_of_its_own_mean() -> None:
+    """A renewal that the pipeline makes by itself takes the burst before: that of one frame has more noise."""
+    given: list[tuple[str, float | None]] = []
+    told: list[Event] = []
+    tracker = Tracker(NoiseOfKernel(given), 2.0, 0.5, told.append)  # type: ignore[arg-type]
+    still = np.zeros(SHAPE)
+    tracker.measure(burst(still, 0, 4))
+    tracker.measure(burst(still, 1, 16))
+    assert given == [("measured", 1.0), ("measured", 0.5), ("renewed", 1.0), ("measured", 0.5)]
+    tracker.renew_on_demand(burst(still, 2, 64))
+    assert given[4:] == [("measured", 0.25), ("renewed", 0.25)]
+    assert [event.data["n"] for event in told] == [4, 64]

@@ -363,6 +363,7 @@ for k in itertools.count():
 """
 
 
+@pytest.mark.timed
 def test_a_killed_writer_leaves_what_is_older_than_its_last_flush(tmp_path: Path) -> None:
     command = [sys.executable, "-c", WRITER, str(tmp_path)]
     with subprocess.Popen(
@@ -439,3 +440,19 @@ def test_unknown_maps_and_rows_are_refused(tmp_path: Path) -> None:
             strain.maps("ezz")
         with pytest.raises(DataError, match="no row 1"):
             strain.maps("exx", 1)
+
+
+@pytest.mark.parametrize(
+    ("measure", "strain"),
+    [("small", 0.02), ("engineering", 0.02), ("green", 0.0202), ("hencky", math.log(1.02))],
+)
+def test_true_strain_and_stress_are_those_of_the_stretch_in_any_measure(measure: Any, strain: float) -> None:
+    """Where no strips show the elongation, the stretch follows from the strain of the region."""
+    m = make_measurement(0, 0.02, force=3000.0)
+    step = dataclasses.replace(m.time_step, extension_y=math.nan, exx=0.0, eyy=strain)
+    field = dataclasses.replace(m.field, measure=measure)
+    info = dataclasses.replace(INFO, strain_measure=measure, area_m2=20e-6)
+    values = StrainRow.of(dataclasses.replace(m, field=field, time_step=step), info).values
+    assert values["stress_Pa"] == pytest.approx(150e6)
+    assert values["true_strain"] == pytest.approx(math.log(1.02), rel=1e-9)
+    assert values["true_stress_Pa"] == pytest.approx(153e6, rel=1e-9)
