@@ -176,6 +176,9 @@ def test_bits_are_checked_and_guessed_aloud(tmp_path: Path) -> None:
         open_camera(f"files:{path}?bits=9")
     with pytest.raises(ConfigError, match="bits"):
         open_camera(f"files:{path}?bits=17")
+    above = write(tmp_path / "b.png", np.array([[0, 1024], [5, 6]], np.uint16))
+    with pytest.raises(DataError, match="1024 does not fit into bits=10"):
+        open_camera(f"files:{above}?bits=10")
 
 
 def test_jpeg_is_warned_about(tmp_path: Path) -> None:

@@ -207,3 +207,12 @@ def test_server_writes_lines_at_its_rate() -> None:
             data += os.read(reader, 1000)
         os.close(reader)
     assert set(data.split(b"\r\n")[1:-1]) == {b"5.0 N"}
+
+
+def test_on_nominal_time_a_weight_hangs_on_the_cell_and_forces_are_rounded() -> None:
+    cell, specimen = opened("sim:?lockstep=yes&seconds=2&rate=50&noise_N=0&resolution_N=2&weight_N=37")
+    samples = list(cell)
+    assert cell.noise_N == pytest.approx(2 / math.sqrt(12))
+    assert {sample.force % 2 for sample in samples} == {0.0}
+    truth = specimen.force([sample.t for sample in samples]) + 37
+    assert np.abs(truth - [sample.force for sample in samples]).max() <= 1.0

@@ -243,3 +243,17 @@ def test_only_the_youngest_are_lost(tmp_path: Path, after_s: float) -> None:
     # How long a flush waits for a core depends on the machine's load here; the script measures it.
     assert remains.oldest_missing_s < 0.2, remains
     assert remains.frames_found > (after_s - 0.2) * 100 * 0.8, remains
+
+
+def test_frames_without_a_time_are_lost_before_the_next_one(tmp_path: Path) -> None:
+    path = tmp_path / "session.h5"
+    with writer(path) as session:
+        for number in range(6):
+            session.write_frame(frame(number, lost_before=(0, 0, 4, 2, 0, 0)[number]))
+    with h5py.File(path, "r+") as file:
+        file["entry/frames/monotonic_s"][1:3] = math.nan
+    found = recover(path)
+    assert found.frames == 4
+    with Session.open(found.path) as back:
+        assert back.indices.tolist() == [5, 8, 9, 10]
+        assert [one.lost_before for one in back.frames()] == [0, 2 + 4 + 2, 0, 0]

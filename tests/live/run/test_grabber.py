@@ -6,6 +6,7 @@ The disturbances are at small scale with the camera from memory; docs/data/distu
 from __future__ import annotations
 
 import math
+import queue
 import subprocess
 import sys
 import time
@@ -30,9 +31,11 @@ from live.commands.consumers import standard_consumers
 from live.config.loading import load_config
 from live.pipeline.consumer import Consumer
 from live.pipeline.measurement import Measurement
+from live.pipeline.queues import LatestQueue
 from live.pipeline.reference import ReferenceBurst, ReferenceTaker
 from live.pipeline.run_state import FrameCounts, RunState
 from live.run import live_run as live_module
+from live.run.burst_queue import BurstQueue
 from live.run.grabber import Grabber, GrabPlan
 from live.run.live_run import run_live
 from live.run.outcome import Outcome
@@ -321,3 +324,26 @@ def test_frames_that_never_make_a_reference_come_with_a_hint(tmp_path: Path) -> 
     outcome = live_run(tmp_path / "run", camera, **{"measure.reference_burst": 32})
     hints = [e.text for e in outcome.run_state.event_log.events("warning") if e.source == "reference"]
     assert len(hints) == 1 and "no 32 frames in a row" in hints[0] and "--reference-burst" in hints[0]
+
+
+class TakenBursts:
+    """A grabber that has taken bursts of two frames, so many lost before each, and has ended."""
+
+    def __init__(self, *lost: int) -> None:
+        self.bursts: LatestQueue[Burst] = LatestQueue()
+        self.references: queue.SimpleQueue[ReferenceBurst] = queue.SimpleQueue()
+        self.running, self.fps = False, 10.0
+        image, t = np.zeros((4, 6), np.float32), 0.0
+        for k, before in enumerate(lost):
+            first = 10 + 2 * k
+            self.bursts.put(
+                Burst(image, 2, 1.0, image > 0, 8, t, 0.1, first, first + 1, before, "nominal"),
+            )
+        self.bursts.close()
+
+
+def test_frames_lost_before_skipped_bursts_are_lost_before_the_one_that_is_measured() -> None:
+    counts = FrameCounts()
+    taken = list(BurstQueue(TakenBursts(2, 0, 3, 1), counts, lambda words: None).bursts())  # type: ignore[arg-type]
+    assert [(burst.first_index, burst.lost) for burst in taken if isinstance(burst, Burst)] == [(16, 6)]
+    assert counts.skipped == 6
