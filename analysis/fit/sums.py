@@ -26,6 +26,8 @@ Item = TypeVar("Item")
 
 MONOMIALS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 """1, x, y, x^2, xy, y^2, with which a channel is multiplied."""
+ROWS_AT_ONCE = 16
+"""Of an image whose squares are summed: what lies between stays in the cache."""
 MAX_CACHED = 64
 """Gauges whose factors are remembered."""
 
@@ -137,7 +139,7 @@ class MeanNoise:
         pitch, samples = self.images.shape[2], self.images[0].size
         flat = self.images.reshape(-1)
         scatter(flat, samples, pitch, origins, self._weights(shares, which), line, along, corner, out)
-        return float(np.cumsum(np.cumsum(out**2, axis=1)[:, -1])[-1])
+        return sum_of_squares(out)
 
     def _weights(self, shares: Floats, which: NDArray[np.intp]) -> Floats:
         """The rows of the inverse that make these sums, by channel and monomial, (B, 7, 6)."""
@@ -147,6 +149,15 @@ class MeanNoise:
         for j, (channel, x, y) in enumerate(columns(self.order)):
             out[:, channel, MONOMIALS.index((int(x), int(y)))] = row[:, j]
         return out
+
+
+def sum_of_squares(image: Floats) -> float:
+    """The sum of the squares of an image (H, W), row by row in their order: the same bits wherever it is in memory."""
+    rows = np.empty(len(image))
+    for first in range(0, len(image), ROWS_AT_ONCE):
+        some = image[first : first + ROWS_AT_ONCE]
+        rows[first : first + ROWS_AT_ONCE] = np.cumsum(some * some, axis=1)[:, -1]
+    return float(np.cumsum(rows)[-1])
 
 
 def unit_variance(name: str, covariance: NDArray[np.float32]) -> Floats:

@@ -161,8 +161,11 @@ def as_image(image: ArrayLike, what: str) -> NDArray[np.float32]:
     return own
 
 
-def as_recorded(image: ArrayLike, what: str) -> NDArray[Any]:
-    """The same as uint8, uint16 or float32, whichever it is already, read-only; raises the same."""
+def as_recorded(image: ArrayLike, what: str, *, any_values: bool = False) -> NDArray[Any]:
+    """The same as uint8, uint16 or float32, whichever it is already, read-only; raises the same.
+
+    ``any_values``: those that are not finite are found later.
+    """
     array = np.asarray(image)
     if array.ndim != 2 or array.size == 0:
         raise ValueError(
@@ -172,7 +175,7 @@ def as_recorded(image: ArrayLike, what: str) -> NDArray[Any]:
         raise ValueError(f"{what} must hold grey levels, got {array.dtype}")
     kind = array.dtype if array.dtype in (np.uint8, np.uint16) else np.float32
     out = np.ascontiguousarray(array, kind).view()
-    if array.dtype.kind == "f" and not np.isfinite(np.sum(out)):
+    if not any_values and array.dtype.kind == "f" and not np.isfinite(np.sum(out)):
         raise ValueError(f"{what} holds values that are not finite")
     # numba takes what may be written for another type, and would compile every loop twice.
     out.flags.writeable = False

@@ -72,10 +72,13 @@ class PhaseKernel:
         noise: Noise | None = None,
         clipped: NDArray[np.bool_] | None = None,
     ) -> None:
+        from analysis.picture.prefilter import room_for
+
         FORK_GUARD.check()
         image = as_image(reference, "the reference")
         made = ReferencePicture.first(image, grid, settings or KernelSettings(), noise, clipped)
         self.reference = replace(made, period=periods(made))
+        self._room = room_for(image.shape)
         check_machine(self.settings, grid.size)
 
     @property
@@ -162,11 +165,13 @@ class PhaseKernel:
         Raises
         ------
         ValueError
-            The image has another size than the reference, or the start another grid.
+            The image has another size than the reference or values that are not finite, or the start another grid.
         """
         FORK_GUARD.check()
         reference = self.reference
-        image, shape = as_recorded(deformed, "the deformed image"), reference.prepared.shape
+        later = start is not None and not reference.cleaned  # when the image is filtered
+        image = as_recorded(deformed, "the deformed image", any_values=later)
+        shape = reference.prepared.shape
         if image.shape != shape:
             raise ValueError(
                 f"the deformed image has {image.shape[1]} x {image.shape[0]} px, "
@@ -175,13 +180,13 @@ class PhaseKernel:
         model = None if noise is None else as_model(noise)
         saturated = clipped_pixels(image, clipped, model)
         if start is None:
-            solution = Solution(reference, image, model, reference.searched(image))
+            solution = Solution(reference, image, model, reference.searched(image), self._room)
             mend(solution)
             retry_lost(solution, None, saturated)
             return field_of(solution)
         before, carried = self._before(start), self._carried_motion(start)
         predicted = before + carried.ahead
-        solution = Solution(reference, image, model, reference.local(predicted))
+        solution = Solution(reference, image, model, reference.local(predicted), self._room)
         mend(solution)
         retry_lost(solution, reference.local(before), saturated)
         return field_of(solution, PredictedMotion(predicted, carried))

@@ -44,6 +44,8 @@ class Solution:
         Of the image; None: not known.
     guess : (A, modes)
         Every ZOI that has a pattern and a guess is measured; one without a guess is LOST.
+    room : flat float32, optional
+        Memory for the coefficients of the image (``prefilter.room_for``); by default its own.
 
     Attributes
     ----------
@@ -61,17 +63,25 @@ class Solution:
     """
 
     def __init__(
-        self, reference: ReferencePicture, image: NDArray[Any], noise: NoiseModel | None, guess: Floats
+        self,
+        reference: ReferencePicture,
+        image: NDArray[Any],
+        noise: NoiseModel | None,
+        guess: Floats,
+        room: NDArray[np.float32] | None = None,
     ) -> None:
+        from analysis.picture.prefilter import room_for
+
         prepared = reference.prepared
         self.reference = reference
         self.noise = noise
         self.guess = guess
-        self.rounding = reference.rounding + rounding_variance(image)
+        self._room = room_for(prepared.shape) if room is None else room
         self.common: PooledError | None = None
         self.retried = False
         self.had_lines = False
         self._take(_cleaned(image) if reference.cleaned else image)
+        self.rounding = reference.rounding + rounding_variance(image)
         self.table = tap_table(reference.settings.interpolant)
         self.tolerance = reference.tolerance(self._current_std())
         self._noise, current = self.variances(np.s_[:], np.ones(len(guess)))
@@ -121,8 +131,9 @@ class Solution:
 
         self._box, prepared = box, self.reference.prepared
         taps = prefilter_taps(self.reference.settings.interpolant)
-        flat = coefficients(self.image, np.float32(prepared.pattern.mean), taps, box)
-        return PictureArgs.within(flat, prepared.shape, box, SPILL_PX)
+        if not coefficients(self.image, np.float32(prepared.pattern.mean), taps, box, self._room):
+            raise ValueError("the deformed image holds values that are not finite")
+        return PictureArgs.within(self._room, prepared.shape, box, SPILL_PX)
 
     def _current_std(self) -> float:
         if self.noise is None:

@@ -181,13 +181,14 @@ def _phase() -> None:
 
 def _prefilter(kinds: Sequence[str]) -> None:
     """What every deformed image goes through first, for each kind of picture."""
-    from analysis.picture.prefilter import coefficients
+    from analysis.picture.prefilter import coefficients, room_for
     from analysis.picture.splines import prefilter_taps
 
     for kind in kinds:
         picture = _small()[0].astype(kind)
         picture.flags.writeable = False
-        coefficients(picture, np.float32(100), prefilter_taps(5), Box(0, 96, 0, 96))
+        room = room_for(picture.shape)
+        coefficients(picture, np.float32(100), prefilter_taps(5), Box(0, 96, 0, 96), room)
 
 
 def _rest() -> None:

@@ -39,6 +39,27 @@ def test_whole_grey_levels_are_the_same_in_any_type() -> None:
         assert np.array_equal(kernel.measure(image).parameters, expected.parameters)
 
 
+def test_pictures_share_the_memory_of_their_coefficients(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bits do not depend on what was in it before, and no picture takes memory of its own."""
+    first, second = picture(u=0.3, v=-0.2), picture(u=6.4, du_dx=0.01)
+    expected = [PhaseKernel(picture(), GRID).measure(image).parameters for image in (first, second)]
+    kernel = PhaseKernel(picture(), GRID)
+    monkeypatch.setattr("analysis.picture.prefilter.room_for", None)
+    for image, values in ((first, expected[0]), (second, expected[1]), (first, expected[0])):
+        np.testing.assert_array_equal(kernel.measure(image).parameters, values)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_values_that_are_not_finite_are_refused(value: float) -> None:
+    kernel, bad = PhaseKernel(picture(), GRID), picture(u=0.1).astype(np.float32)
+    last = kernel.measure(picture(u=0.1))
+    bad[100, 90] = value
+    for start in (None, last):
+        with pytest.raises(ValueError, match="the deformed image holds values that are not finite"):
+            kernel.measure(bad, start=start)
+    np.testing.assert_array_equal(kernel.measure(picture(u=0.1)).parameters, last.parameters)
+
+
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
 def test_a_frame_buffer_may_be_filled_again(dtype: type) -> None:
     """As a camera does that reuses its buffer: the reference stays what it was."""

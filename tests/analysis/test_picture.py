@@ -8,6 +8,7 @@ from math import comb
 import numpy as np
 import pytest
 from scipy import ndimage
+from scipy.optimize import brentq
 
 from analysis.compiled.convolution import GROUP, REACH
 from analysis.compiled.vectors import LANES
@@ -18,16 +19,26 @@ from analysis.picture.pattern import (
     autocorrelation_fwhm,
     clipped_share,
     describe_pattern,
+    gauge_length,
+    l10_strain,
     noise_of_picture,
     predicted_sigma,
     resolution_length,
 )
-from analysis.picture.prefilter import PART, coefficients
+from analysis.picture.prefilter import PART, coefficients, room_for
 from analysis.picture.splines import PAD, Box, basis, prefilter_taps, tap_table
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 
 FULL = 4095.0
+
+
+def filtered(image: np.ndarray, offset: float, box: Box, degree: int = 5) -> np.ndarray:
+    """The coefficients of an image, in memory that held something else."""
+    out = room_for(image.shape)
+    out.fill(np.nan)
+    coefficients(image, np.float32(offset), prefilter_taps(degree), box, out)
+    return out
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +158,7 @@ def test_taps_need_no_linear_algebra(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("degree", [3, 5])
 def test_prefilter_is_that_of_scipy(degree: int, kind: type, shape: tuple[int, int]) -> None:
     image = np.random.default_rng(1).integers(0, 256, shape).astype(kind)
-    found = coefficients(image, np.float32(100), prefilter_taps(degree), Box(0, shape[0], 0, shape[1]))
+    found = filtered(image, 100, Box(0, shape[0], 0, shape[1]), degree)
     expected = ndimage.spline_filter(image.astype(float) - 100, degree, mode="mirror")
     expected = np.pad(expected, PAD, mode="reflect")
     found = found[: expected.size].reshape(expected.shape)
@@ -164,11 +175,26 @@ def test_no_coefficient_depends_on_what_else_is_filtered(box: Box) -> None:
     image = np.random.default_rng(2).integers(0, 256, shape).astype(np.uint8)
     image.flags.writeable = False
     whole, part = (
-        coefficients(image, np.float32(100), prefilter_taps(5), b)[: -LANES].reshape(-1, shape[1] + 2 * PAD)
+        filtered(image, 100, b)[: -LANES].reshape(-1, shape[1] + 2 * PAD)
         for b in (Box(0, shape[0], 0, shape[1]), box)
     )  # fmt: skip
     inside = np.s_[PAD + box.top : PAD + box.bottom, PAD + box.left : PAD + box.right]
     assert np.array_equal(whole[inside], part[inside])
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.float32])
+@pytest.mark.parametrize(("place", "finite"), [(None, True), ((70, 60), False), ((299, 399), True)])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_the_prefilter_sees_values_that_are_not_finite(
+    kind: type, place: tuple[int, int] | None, finite: bool, value: float
+) -> None:
+    """In its box and beside it, but not where it reads nothing."""
+    image = np.random.default_rng(2).integers(0, 256, (300, 400)).astype(kind)
+    if place is not None and kind is np.float32:
+        image[place] = value
+    box, room = Box(75, 200, 65, 300), room_for(image.shape)
+    seen = coefficients(image, np.float32(100), prefilter_taps(5), box, room)
+    assert seen is (finite or kind is np.uint8)
 
 
 @pytest.mark.parametrize(
@@ -188,9 +214,7 @@ def test_warp_is_the_interpolated_image(motion: tuple, size: int) -> None:
     origin = np.array([[24, 30]])
     out = np.empty((1, size, size), np.float32)
     box = Box(0, IMAGE.shape[0], 0, IMAGE.shape[1])
-    picture = PictureArgs.within(
-        coefficients(IMAGE, np.float32(0), prefilter_taps(5), box), IMAGE.shape, box, 0.5
-    )
+    picture = PictureArgs.within(filtered(IMAGE, 0, box), IMAGE.shape, box, 0.5)
     warp_zois(picture, tap_table(5), origin, size, np.array([motion], float), out)
     x = np.arange(size) - (size - 1) / 2
     u = motion[0] + motion[1] * x + motion[2] * x[:, None]
@@ -293,8 +317,8 @@ def test_composition_undoes_the_step(order: int) -> None:
 def test_in_a_box_the_coefficients_are_those_of_the_whole(rows: tuple, columns: tuple) -> None:
     image = np.random.default_rng(2).integers(0, 256, (200, 300)).astype(np.uint8)
     box, everything = Box.of(image.shape, rows, columns), Box(0, 200, 0, 300)
-    whole = coefficients(image, np.float32(100), prefilter_taps(5), everything)
-    part = coefficients(image, np.float32(100), prefilter_taps(5), box)
+    whole = filtered(image, 100, everything)
+    part = filtered(image, 100, box)
     width = image.shape[1] + 2 * PAD
     top = box.top + PAD if box.top else 0
     bottom = box.bottom + PAD + (PAD if box.bottom == 200 else 0)
@@ -305,3 +329,16 @@ def test_in_a_box_the_coefficients_are_those_of_the_whole(rows: tuple, columns: 
         assert np.array_equal(
             part[y * width + left : y * width + right], whole[y * width + left : y * width + right]
         )
+
+
+def test_the_gauge_length_is_the_side_of_the_square_with_the_same_noise() -> None:
+    """Of an even window its own side; of a Gaussian one of s, sqrt(24) / L^2 = 1 / (2 sqrt(pi) s^2)."""
+    assert gauge_length(64, "uniform") == pytest.approx(64, rel=1e-3)
+    assert gauge_length(64) == pytest.approx(math.sqrt(2 * math.sqrt(24 * math.pi)) * 64 / 6, rel=0.02)
+
+
+def test_the_period_of_a_strain_that_has_lost_a_tenth() -> None:
+    """Of an even window the moment of a sine, 3 (sin a - a cos a) / a^3 with a = pi size / period, is 0.9 there."""
+    a = brentq(lambda a: 3 * (math.sin(a) - a * math.cos(a)) / a**3 - 0.9, 0.1, 3)
+    assert l10_strain(64, "uniform") == pytest.approx(math.pi * 64 / a, rel=1e-3)
+    assert l10_strain(64) == pytest.approx(resolution_length(64), rel=0.05)

@@ -1,5 +1,7 @@
 """The benchmark, ``make bench``; it stops with advice where OpenCV does not work."""
 
+import live  # noqa: F401 - what it sets in the environment, before numpy is loaded
+
 try:
     import cv2
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -52,3 +55,14 @@ def test_the_cause_is_named() -> None:
     assert "the disk is too slow" in warnings(0.5, backlog=0.2).pop()
     assert "the kernel needs 90 ms" in warnings(0.5, kernel_s=0.09).pop()
     assert "the processor is short" in warnings(0.5).pop()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
+def test_the_linear_algebra_of_the_program_has_no_threads_of_its_own() -> None:
+    code = "import live.cli, os, numpy as np; np.ones((500, 500)) @ np.ones((500, 500))"
+    without = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}; print(len(os.listdir('/proc/self/task')))"],
+        env=without, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.strip() == "1"
