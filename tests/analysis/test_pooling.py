@@ -335,5 +335,5 @@ def test_grainy_noise_of_the_reference_is_no_pattern(later: float) -> None:
     clean = 255 * Speckle(3.0, 1, span=400).at(*affine(SHAPE))
     for k, seen in enumerate(own.attenuation):
         found, true = made.prepared.images[k, : SHAPE[0], : SHAPE[1]], np.gradient(clean, axis=1 - k)
-        assert seen == pytest.approx(np.mean(found * true) / np.mean(found**2), abs=0.04)
+        assert seen == pytest.approx(np.mean(found * true) / np.mean(found**2), abs=0.1)
     assert own.moments[0] == pytest.approx(12**2, rel=0.15)
