@@ -337,3 +337,11 @@ def test_grainy_noise_of_the_reference_is_no_pattern(later: float) -> None:
         found, true = made.prepared.images[k, : SHAPE[0], : SHAPE[1]], np.gradient(clean, axis=1 - k)
         assert seen == pytest.approx(np.mean(found * true) / np.mean(found**2), abs=0.1)
     assert own.moments[0] == pytest.approx(12**2, rel=0.15)
+
+
+@pytest.mark.parametrize("stated", [None, 2.0])
+def test_half_of_the_noise_is_that_of_the_reference(stated: float | None) -> None:
+    """Where both pictures have the same, whether it is stated or not; so much of it all later fields have in common."""
+    field = PhaseKernel(picture(2.0, 1), GRID, noise=stated).measure(picture(2.0, 2, **MOTION), noise=stated)
+    of_reference = field.covariance_reference[0][field.ok] / field.covariance[0][field.ok]
+    assert np.median(of_reference) == pytest.approx(0.5, abs=0.05)
