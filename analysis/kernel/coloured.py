@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from analysis.field.picture_error import Cause
 from analysis.fit.validity import AGREES
 from analysis.kernel.lines import inner, left_by_fit, lines_along, some, zois_of
-from analysis.kernel.prepared import PreparedReference
+from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.solve import Solution
 from analysis.kernel.white_noise import halves
 from analysis.picture.blocks import BLOCKS, blockiness
@@ -144,7 +144,7 @@ def coloured_bias(
 
     reference, ready, found = solution.reference, solution.reference.prepared, solution.found
     modes = reference.modes
-    own = _own_error(ready, left, which)
+    own = _own_error(reference, left, which)
     own *= 0.5 if cause in BOTH_ALIKE else share
     more = ready.weight * (own - solution.noise_taken[:, None] * ready.pattern.own_noise)
     inverse = ready.inverse[:-1, :, [modes, -3, -2]]  # with the columns f, f_xx and f_yy
@@ -153,31 +153,45 @@ def coloured_bias(
     return moved, step[:, -3] + step[:, -2]
 
 
-def _own_error(ready: PreparedReference, left: Pixels, which: Places) -> Floats:
+def _own_error(reference: ReferencePicture, left: Pixels, which: Places) -> Floats:
     """What the error of a pixel, times f, f_xx and f_yy of its own part in them, is on average, (3,), GL^2.
 
     The filter that makes f shows in the cross spectrum of f and the reference as it was recorded.
     """
     size = left.shape[1]
     window = _window(size)
-    level, raw = (_spectra(zois_of(ready.images[k], ready.origins[which], size), window) for k in (2, 3))
-    response = np.mean((level * raw.conj()).real, axis=0) / np.mean(np.abs(raw) ** 2, axis=0)
     power = np.mean(np.abs(_spectra(left, window)) ** 2, axis=0) / np.sum(window**2)
-    error = power * response * halves(size) / size**2
+    error = power * _filter_of_level(reference, which) * halves(size) / size**2
     bend = 2 * np.cos(2 * np.pi * np.fft.fftfreq(size)) - 2
     return np.array([np.sum(error), np.sum(error * bend[: error.shape[1]]), np.sum(error * bend[:, None])])
 
 
-def by_frequency(solution: Solution, ok: NDArray[np.bool_]) -> Floats:
+def _filter_of_level(reference: ReferencePicture, which: Places) -> NDArray[np.float32]:
+    """The filter that makes f, as some ZOIs show it, (n, n // 2 + 1); the last one is remembered."""
+    ready, kept, key = reference.prepared, reference.kept, which.tobytes()
+    if key not in kept:
+        size = reference.grid.size
+        window, at = _window(size), ready.origins[which]
+        level, raw = (_spectra(zois_of(ready.images[k], at, size), window) for k in (2, 3))
+        kept.clear()
+        kept[key] = np.mean((level * raw.conj()).real, axis=0) / np.mean(np.abs(raw) ** 2, axis=0)
+    return kept[key]
+
+
+def left_of_some(solution: Solution, ok: NDArray[np.bool_]) -> tuple[Places, Pixels]:
+    """As many of the ZOIs ``ok`` (A,) as spectra need, (N,), and what the fits leave of them, (N, n, n)."""
+    which = some(ok, SPECTRA // solution.reference.grid.size**2)
+    return which, left_by_fit(solution, which)
+
+
+def by_frequency(reference: ReferencePicture, left: Pixels) -> Floats:
     """Variance of u, its gradients, v and its over that which the shapes of third degree have by the same error, (6,).
 
-    By the spectrum of what the fits leave.
+    By the spectrum of what the fits leave of some ZOIs, (N, n, n).
     """
-    size = solution.reference.grid.size
-    left = _without_planes(left_by_fit(solution, some(ok, SPECTRA // size**2)))
-    window = _window(size)
-    power = np.mean(np.abs(_spectra(left, window)) ** 2, axis=0)
-    seen = np.sum(solution.reference.response * power, axis=(1, 2))
+    window = _window(reference.grid.size)
+    power = np.mean(np.abs(_spectra(_without_planes(left), window)) ** 2, axis=0)
+    seen = np.sum(reference.response * power, axis=(1, 2))
     return np.asarray(seen[:6] / seen[6:].repeat(3))
 
 
