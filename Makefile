@@ -71,13 +71,15 @@ newest lowest: export NUMBA_CACHE_DIR = $(CURDIR)/$(VENV)-$@/numba
 newest:
 	@rm -rf $(VENV)-$@ && $(PYTHON) -m venv $(VENV)-$@
 	@$(VENV)-$@/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
-	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest
+	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest $(PARALLEL) -m "not timed"
+	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest -m timed
 
 lowest:
 	@rm -rf $(VENV)-$@ && $(PYTHON) -m venv $(VENV)-$@
 	@$(VENV)-$@/bin/python -m pip install --quiet --disable-pip-version-check uv
 	@$(VENV)-$@/bin/uv pip install --quiet --python $(VENV)-$@/bin/python --resolution lowest-direct --editable '.[test]'
-	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest
+	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest $(PARALLEL) -m "not timed"
+	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest -m timed
 
 # After make newest has passed: its versions are those of demo and test from then on.
 constraints:

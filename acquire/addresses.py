@@ -108,6 +108,14 @@ def expanded(path: str) -> Path:
         raise ConfigError(f"{path}: there is no such user, so no home folder; give the whole path") from None
 
 
+RECORDING = "session.h5"
+
+
+def session_file(path: Path) -> Path:
+    """The session file: that in ``path`` where it is the folder of a run, else ``path``."""
+    return path / RECORDING if (path / RECORDING).is_file() else path
+
+
 class Options:
     """The settings of an address, taken one by one with their types and bounds.
 

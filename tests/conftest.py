@@ -5,8 +5,19 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import hypothesis
 import pytest
 from _pytest.runner import runtestprotocol
+
+# A second thread of OpenBLAS only waits for a core, most of all where other programs have them: it takes a fifth of
+# the time of the tests, and more of a busy machine. Set before numpy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# No example has a time limit of its own, which a busy machine would exceed; pytest's is that of the whole test.
+hypothesis.settings.register_profile(
+    "any machine", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+)
+hypothesis.settings.load_profile("any machine")
 
 MEASURING = {"accuracy", "adversary", "analysis", "bench", "contracts", "live"}
 
@@ -21,11 +32,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_setupnodes() -> None:
-    """Compile once for all processes (pytest-xdist), before they start.
-
-    Each has a core of its own: a second thread of OpenBLAS only waits for it, and takes a fifth of its time.
-    """
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    """Compile once for all processes (pytest-xdist), before they start."""
     compile_all()
 
 

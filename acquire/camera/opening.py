@@ -20,7 +20,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import Address, Registry, expanded, parse_address
+from acquire.addresses import RECORDING, Address, Registry, expanded, parse_address
 from acquire.camera.contract import Camera
 from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
@@ -99,7 +99,6 @@ def list_cameras() -> list[CameraListing]:
     return found
 
 
-RECORDING = "session.h5"
 _VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".m4v", ".webm")
 
 

@@ -81,15 +81,15 @@ def abandon_file(file: h5py.File) -> None:
 _BOUNDS = ("v110", "v110")  # the format that survives SIGKILL; older ones promise nothing
 
 
-CACHE_BYTES, METADATA_BYTES = 32 << 10, 2 << 20
-"""Of values of each dataset, and of the structure of a file, that HDF5 keeps in memory."""
+CACHE_BYTES, METADATA_BYTES = 16 << 10, 256 << 10
+"""Of values of each dataset, and of the structure of a file, that HDF5 keeps in memory: enough to append."""
 
 
 def create_file(path: Path, declare: Callable[[h5py.File], object]) -> h5py.File:
     """Make a file with what ``declare`` puts into it, open to append while others read (SWMR).
 
     Its caches are bounded. By default HDF5 keeps up to 1 MiB of each dataset, and 32 MiB of a file's structure: a file
-    with some hundred columns then takes more memory for an hour.
+    with some hundred columns then takes more memory for an hour. What it frees it keeps for reuse, as much again.
 
     Raises
     ------
@@ -110,8 +110,9 @@ def create_file(path: Path, declare: Callable[[h5py.File], object]) -> h5py.File
         raise
     file = h5py.File(path, "r+", libver=_BOUNDS, rdcc_nbytes=CACHE_BYTES)
     cache = file.id.get_mdc_config()
-    cache.max_size = METADATA_BYTES
-    cache.flash_incr_mode = 0  # or it grows for one large piece
+    cache.set_initial_size = True
+    cache.initial_size = cache.min_size = cache.max_size = METADATA_BYTES
+    cache.incr_mode = cache.decr_mode = cache.flash_incr_mode = 0
     file.id.set_mdc_config(cache)
     file.swmr_mode = True
     return file

@@ -22,6 +22,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.addresses import session_file
 from acquire.clock import ClockPair
 from acquire.closing import Closing
 from acquire.errors import DataError
@@ -177,14 +178,14 @@ class Session(Closing):
 
     @classmethod
     def open(cls, path: str | os.PathLike[str]) -> Self:
-        """Open a session file, or the whole set that it belongs to.
+        """Open a session file (or the folder of a run that has one), or the whole set that it belongs to.
 
         Raises
         ------
         DataError
             Not there, not a session, newer than this program, or damaged; says what to do.
         """
-        part = SessionPart(path)
+        part = SessionPart(session_file(Path(path)))
         if not part.set_id:
             return cls([part])
         parts, missing = _whole_set(part)

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from acquire.addresses import session_file
 from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.events import Event, EventKind, Level
@@ -61,6 +62,7 @@ def recover(source: str | os.PathLike[str], target: str | os.PathLike[str] | Non
     Parameters
     ----------
     source : path
+        A session file, or the folder of a run that has one.
     target : path or None
         None: beside the source, ``session.recovered.h5``.
 
@@ -73,7 +75,7 @@ def recover(source: str | os.PathLike[str], target: str | os.PathLike[str] | Non
     DataError
         Nothing can be read, or the target exists or cannot be written.
     """
-    path = Path(source)
+    path = session_file(Path(source))
     clean = Path(target) if target else path.with_name(f"{path.stem}.recovered{path.suffix}")
     with SessionPart(path, salvage=True) as part, _writer(clean, part) as writer:
         return _copy(part, writer)

@@ -6,11 +6,13 @@ to 0.05 for noise, else 0.15 and more.
 
 What white noise of the strength stated in the reference adds is taken off in the fit (``noise_bias``). Of what
 compression or a filter leaves, neighbouring pixels are alike, and so the spectrum of what the fits leave takes the
-place of the noise: half of it is the reference's where both pictures were spoilt alike. Without it, JPEG at quality 50
-makes mean strains of 700 um/m too much, and a blur of 0.6 px, where there is none.
+place of the noise; how much of it is the reference's shows in what it has in common with the reference. Without it,
+JPEG at quality 50 makes mean strains of 700 um/m too much, and a blur of 0.6 px, where there is none.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +39,10 @@ FEWEST, PART = 8, 8
 EXPLAINED, MIN_CORNER = 0.5, 0.01
 """Share of the error that shifts must explain; determinant of the gradients over its largest, from which on they are
 known."""
-BOTH_ALIKE = ("compression", "filter")
-"""Causes that spoil the reference as much as the picture."""
+BOTH_ALIKE = "compression"
+"""Cause that spoils the reference as much as the picture. Its error goes with the pattern, which hides whose it is."""
+MIN_APART = 0.1
+"""Share of the spectrum of the error that must be unlike that of the pattern to show which picture has the error."""
 
 
 def error_cause(solution: Solution, ok: NDArray[np.bool_], left: Pixels) -> Cause:
@@ -125,14 +129,49 @@ def _is_white(left: NDArray[np.floating]) -> bool:
     return bool(abs(beside) < NEIGHBOURS * np.mean(within**2))
 
 
-def coloured_bias(
-    solution: Solution, which: Places, left: Pixels, cause: Cause, share: float
-) -> tuple[Floats, Floats]:
-    """What to add to the parameters (A, modes) and to the growth of the variance of the blur (A,), px^2.
+class OwnError(NamedTuple):
+    """What the error of a picture is in its reference, on average.
+
+    Attributes
+    ----------
+    moments : (3,), GL^2
+        A pixel's error times its own part in f, f_xx and f_yy.
+    variance : float, GL^2
+        Of white noise that would be as strong at the frequencies of J.
+    attenuation : (2,)
+        Share of J'J for u and for v that is pattern (regression dilution): by so much a fit answers less to an error.
+    """
+
+    moments: Floats
+    variance: float
+    attenuation: Floats
+
+
+def coloured_bias(solution: Solution, own: OwnError) -> tuple[Floats, Floats]:
+    """What to add to the parameters (A, modes) and to the growth of the variance of the blur (A,), px^2."""
+    from analysis.fit.sensitivity import parameter_scale
+
+    reference, ready, taken = solution.reference, solution.reference.prepared, solution.noise_taken[:, None]
+    modes = reference.modes
+    inverse = ready.weight * ready.inverse[:-1, :, [modes, -3, -2]]  # with the columns f, f_xx and f_yy
+    white = ready.pattern.own_noise
+    step = np.einsum("apk,ak->ap", inverse, own.moments - taken * white)
+    step += (own.variance - taken) * (ready.bias - inverse @ white)  # of the gradients (``noise_bias``)
+    step /= solution.found.nuisance[:, :1]
+    moved = -parameter_scale(reference.settings.order, reference.grid.size) * step[:, :modes]
+    return moved, step[:, -3] + step[:, -2]
+
+
+def own_error(
+    reference: ReferencePicture, which: Places, left: Pixels, cause: Cause, share: float
+) -> OwnError:
+    """The part of the error that is the reference's.
+
+    The filter that makes f shows in the cross spectrum of f and the reference as it was recorded.
 
     Parameters
     ----------
-    solution : Solution
+    reference : ReferencePicture
     which, left : (N,), (N, n, n), GL
         Some ZOIs, and what the fits leave of them.
     cause : str
@@ -140,41 +179,56 @@ def coloured_bias(
     share : float
         Of the error of both pictures that is the reference's, as stated.
     """
-    from analysis.fit.sensitivity import parameter_scale
-
-    reference, ready, found = solution.reference, solution.reference.prepared, solution.found
-    modes = reference.modes
-    own = _own_error(reference, left, which)
-    own *= 0.5 if cause in BOTH_ALIKE else share
-    more = ready.weight * (own - solution.noise_taken[:, None] * ready.pattern.own_noise)
-    inverse = ready.inverse[:-1, :, [modes, -3, -2]]  # with the columns f, f_xx and f_yy
-    step = np.einsum("apk,ak->ap", inverse, more) / found.nuisance[:, :1]
-    moved = -parameter_scale(reference.settings.order, reference.grid.size) * step[:, :modes]
-    return moved, step[:, -3] + step[:, -2]
-
-
-def _own_error(reference: ReferencePicture, left: Pixels, which: Places) -> Floats:
-    """What the error of a pixel, times f, f_xx and f_yy of its own part in them, is on average, (3,), GL^2.
-
-    The filter that makes f shows in the cross spectrum of f and the reference as it was recorded.
-    """
     size = left.shape[1]
-    window = _window(size)
-    power = np.mean(np.abs(_spectra(left, window)) ** 2, axis=0) / np.sum(window**2)
-    error = power * _filter_of_level(reference, which) * halves(size) / size**2
-    bend = 2 * np.cos(2 * np.pi * np.fft.fftfreq(size)) - 2
-    return np.array([np.sum(error), np.sum(error * bend[: error.shape[1]]), np.sum(error * bend[:, None])])
+    window, often = _window(size), halves(size)
+    of_left = _spectra(left, window)
+    level, raw = _recorded(reference, which)
+    power, recorded = (np.mean(np.abs(spectra) ** 2, axis=0) * often for spectra in (of_left, raw))
+    shared, passed = (np.mean((of * raw.conj()).real, axis=0) * often for of in (-of_left, level))
+    response = passed / recorded
+    if cause != BOTH_ALIKE:
+        share = _of_reference(power, shared, passed, often * passed / recorded**2, share)
+    error = share * power * response
+    bend = 2 - 2 * np.cos(2 * np.pi * np.fft.fftfreq(size))
+    bends = np.ones((1, 1)), bend[None, : error.shape[1]], bend[:, None]
+    errors, patterns, squares = (
+        np.array([np.sum(of * b) for b in bends]) for of in (error, passed, passed * response)
+    )
+    weight = passed * response * (bends[1] + bends[2])
+    scale = np.sum(window**2)
+    return OwnError(
+        errors * (1, -1, -1) / (scale * size**2),
+        share * float(np.sum(power / often * weight) / np.sum(weight) / scale),
+        (patterns - errors)[1:] / squares[1:],
+    )
 
 
-def _filter_of_level(reference: ReferencePicture, which: Places) -> NDArray[np.float32]:
-    """The filter that makes f, as some ZOIs show it, (n, n // 2 + 1); the last one is remembered."""
+def _of_reference(power: Floats, shared: Floats, passed: Floats, weight: Floats, stated: float) -> float:
+    """What share of an error with the spectrum ``power`` is the reference's; ``stated`` where that does not show.
+
+    The difference of the pictures has the error of the reference with the opposite sign. So what is left and the
+    reference share that error in their spectrum, ``shared``, with the sign changed, and as much of the pattern,
+    ``passed``, as the gain is too small. Least squares part the two.
+    """
+    weight = weight / power
+    products = np.array([[np.sum(weight * a * b) for b in (power, passed, shared)] for a in (power, passed)])
+    (error, both, seen), (_, gain, seen_gain) = products
+    determinant = error * gain - both**2
+    if not determinant > MIN_APART * error * gain:
+        return stated
+    return float(np.clip((gain * seen - both * seen_gain) / determinant, 0, 1))
+
+
+def _recorded(reference: ReferencePicture, which: Places) -> NDArray[np.complex64]:
+    """Spectra of some ZOIs of the filtered pattern and of the reference as it was recorded, (2, N, n, n // 2 + 1).
+
+    The last ones are remembered: as a rule these ZOIs are the same in every picture.
+    """
     ready, kept, key = reference.prepared, reference.kept, which.tobytes()
     if key not in kept:
-        size = reference.grid.size
-        window, at = _window(size), ready.origins[which]
-        level, raw = (_spectra(zois_of(ready.images[k], at, size), window) for k in (2, 3))
+        size, at = reference.grid.size, ready.origins[which]
         kept.clear()
-        kept[key] = np.mean((level * raw.conj()).real, axis=0) / np.mean(np.abs(raw) ** 2, axis=0)
+        kept[key] = np.stack([_spectra(zois_of(ready.images[k], at, size), _window(size)) for k in (2, 3)])
     return kept[key]
 
 

@@ -84,7 +84,7 @@ class ReferencePicture:
     period : (A,) float64, px
         Smallest displacement at which a ZOI looks like itself (``repeating.periods``); infinite: none.
     kept : dict
-        By ZOIs, the filter of the pattern as they show it (``coloured``).
+        By ZOIs, spectra of what they recorded (``coloured``).
     """
 
     grid: ZoiGrid
@@ -107,7 +107,7 @@ class ReferencePicture:
     response: Floats
     cleaned: bool
     period: Floats
-    kept: dict[bytes, Image] = field(default_factory=dict, repr=False)
+    kept: dict[bytes, NDArray[np.complex64]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def first(

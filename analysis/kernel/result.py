@@ -20,6 +20,7 @@ from analysis.kernel.coloured import (
     coloured_bias,
     error_cause,
     left_of_some,
+    own_error,
 )
 from analysis.kernel.solve import Solution
 
@@ -90,8 +91,9 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         first,
         whole,
     )
+    error, local, growth, attenuation = _corrected(solution, ok, noise)
+    noise = noise._replace(colour=noise.colour / attenuation.repeat(3) ** 2)
     parts = _covariances(solution, ok, noise, first, whole)
-    error, local, growth = _corrected(solution, ok, noise)
     blur = np.stack([growth, growth]).astype(np.float32)
     blur[0, ~ok] = np.nan
     weigh_blur(reference.prepared.blur, whole, blur[1])
@@ -119,21 +121,26 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
 
 def _corrected(
     solution: Solution, ok: NDArray[np.bool_], noise: _Noise
-) -> tuple[PictureError | None, Floats, Floats]:
-    """The error of the picture; parameters, and growth of the variance of the blur, without what it adds on average."""
+) -> tuple[PictureError | None, Floats, Floats, Floats]:
+    """The error of the picture; parameters, and growth of the variance of the blur, without what it adds on average.
+
+    Last, (2,), the attenuation of u and v (``OwnError``).
+    """
     found, reference = solution.found, solution.reference
-    p, growth = found.p, found.nuisance[:, 2]
+    p, growth, none = found.p, found.nuisance[:, 2], np.ones(2)
     if np.isnan(noise.over):
-        return None, p, growth
+        return None, p, growth, none
     error = PictureError(noise.over, (float(noise.colour[0]), float(noise.colour[3])))
     if not solution.had_lines and noise.over * float(noise.seen.max()) ** 0.5 <= LIMIT:
-        return error, p, growth
+        return error, p, growth, none
     which, left = noise.left or left_of_some(solution, ok)
     error = replace(error, cause="bands" if solution.had_lines else error_cause(solution, ok, left))
     if reference.sensors is not None:
-        return error, p, growth
-    moved, sharper = coloured_bias(solution, which, left, error.cause, noise.share(found.nuisance[:, 0], ok))
-    return error, p + moved, growth + sharper
+        return error, p, growth, none
+    share = noise.share(found.nuisance[:, 0], ok)
+    own = own_error(reference, which, left, error.cause, share)
+    moved, sharper = coloured_bias(solution, own)
+    return error, p + moved, growth + sharper, own.attenuation
 
 
 def _motion(solution: Solution, values: Floats, expected: PredictedMotion) -> Motion:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic inspect``."""
-    parser.add_argument("session", help="session.h5")
+    parser.add_argument("session", help="session.h5, or the folder of its run")
     parser.add_argument("--zoi", required=True, metavar="R,C", help="row and column of the ZOI in the grid")
     parser.add_argument(
         "--frame", type=int, required=True, metavar="N", help="number of the frame (or burst), from 0"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -23,11 +24,12 @@ from live.commands.options import (
     add_options,
     add_verbose,
     configured,
+    overrides,
     require_new,
 )
 from live.commands.signals import interrupts
 from live.config.loading import Config
-from live.config.sides import names_of, second_camera
+from live.config.sides import second_camera, side_configs
 from live.setup.check.budget import budget_lines
 from live.setup.check.check_list import CheckFigures, examine, table_lines
 from live.setup.check.sample import take
@@ -43,7 +45,7 @@ LISTEN_S = 3.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic check``."""
-    add_options(parser, "devices", "camera", "crop", "dark", "flat", "load")
+    add_options(parser, "devices", "camera", "back", "beside", "crop", "dark", "flat", "load")
     parser.add_argument(
         "--target", type=float, metavar="UM_M", help="largest strain noise of one ZOI for the test, um/m"
     )
@@ -71,21 +73,48 @@ def command(arguments: argparse.Namespace) -> int:
     config = configured(arguments)
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (see phasedic devices)")
-    if arguments.snapshot:
-        require_new(Path(arguments.snapshot), *PICTURES)
-    check_load_port(config.load.address)
-    if (second := second_camera(config)) is not None:
-        here, other = names_of(config)
-        screen.print(f"this checks the {here}; check the {other} on its own: {second}")
     target = None if arguments.target is None else arguments.target * 1e-6
+    cameras = {"": config} if second_camera(config) is None else side_configs(config, overrides(arguments))
+    snapshots = {name: _snapshot_of(name, arguments.snapshot) for name in cameras}
+    for path in filter(None, snapshots.values()):
+        require_new(path, *PICTURES)
+    check_load_port(config.load.address)
     if arguments.watch:
+        first, one = next(iter(cameras.items()))
+        if first:
+            screen.print(f"--watch looks at the {first} only; without it both cameras are checked")
         with interrupts() as stop:
-            figures = watch(config, target, screen, stop.is_set)
-    else:
-        figures = examine(take(config, report_warnings(screen.print)), config, _load(config))
-    if arguments.snapshot:
-        write_picture(Path(arguments.snapshot), _drawn(figures, config, target))
-        screen.print(f"written: {arguments.snapshot}")
+            figures = watch(one, target, screen, stop.is_set)
+        ready = _shown(figures, one, target, snapshots[first], screen)
+        screen.print(_verdict([figures], ready))
+        return 0 if ready else NOT_READY
+    load, every, ready = _load(config), list[CheckFigures](), True
+    for name, one in cameras.items():
+        if name:
+            screen.print(f"{name}: {one.camera.address}")
+        every.append(examine(take(one, report_warnings(screen.print)), one, load))
+        ready &= _shown(every[-1], one, target, snapshots[name], screen)
+        if name:
+            screen.print("")
+    screen.print(_verdict(every, ready))
+    return 0 if ready else NOT_READY
+
+
+def _snapshot_of(name: str, given: str | None) -> Path | None:
+    """The file of one camera's snapshot: with two cameras, its name is part of that of the file."""
+    if not given:
+        return None
+    path = Path(given)
+    return path.with_stem(f"{path.stem}-{name}") if name else path
+
+
+def _shown(
+    figures: CheckFigures, config: Config, target: float | None, path: Path | None, screen: TerminalScreen
+) -> bool:
+    """Print the figures of one camera, and draw them where that is asked; whether it is ready."""
+    if path is not None:
+        write_picture(path, _drawn(figures, config, target))
+        screen.print(f"written: {path}")
     lines = check_lines(figures, target, config.measure.reference_shift_px)
     budget = budget_lines(figures, config)
     for line in [
@@ -96,17 +125,15 @@ def command(arguments: argparse.Namespace) -> int:
         *budget,
     ]:
         screen.print(line)
-    ready = all(line.good for line in lines)
-    screen.print(_verdict(figures, ready))
-    return 0 if ready else NOT_READY
+    return all(line.good for line in lines)
 
 
-def _verdict(figures: CheckFigures, ready: bool) -> str:
+def _verdict(cameras: Sequence[CheckFigures], ready: bool) -> str:
     if not ready:
         return "NO-GO: not ready, see the lines with LOOK above"
-    if figures.stack.few:
+    if few := [figures.stack for figures in cameras if figures.stack.few]:
         open_points = "noise in time, flicker, drift and vibration are not measured"
-        return f"GO, as far as {figures.stack.count_text} can show: {open_points}"
+        return f"GO, as far as {few[0].count_text} can show: {open_points}"
     return "GO: ready"
 
 

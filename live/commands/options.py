@@ -114,9 +114,11 @@ def add_gauge_option(parser: argparse.ArgumentParser) -> None:
 
 
 def require_new(path: Path, *endings: str) -> None:
-    """Raises ConfigError if the file exists, or its name does not end in one of ``endings``."""
+    """Raises ConfigError if the file exists, its folder does not, or its name ends in none of ``endings``."""
     if path.exists() or path.is_symlink():
         raise ConfigError(f"{path} exists; nothing is overwritten, choose another name")
+    if not path.parent.is_dir():
+        raise ConfigError(f"{path}: there is no folder {path.parent}; make it, or choose another name")
     if endings and path.suffix.lower() not in endings:
         raise ConfigError(f"{path}: no such picture can be written; end its name in {' or '.join(endings)}")
 

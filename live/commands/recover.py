@@ -12,7 +12,7 @@ PrintLine = Callable[[str], None]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic recover``."""
-    parser.add_argument("session", help="damaged or unfinished session.h5")
+    parser.add_argument("session", help="damaged or unfinished session.h5, or the folder of its run")
     parser.add_argument("--out", metavar="FILE", help="new file (default: beside the session)")
 
 

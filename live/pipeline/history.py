@@ -6,10 +6,9 @@ A test of a day has millions of time steps, so they take little memory.
 from __future__ import annotations
 
 import math
-from array import array
 from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import fields, replace
-from typing import Any, Generic, Literal, TypeVar, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +16,13 @@ from numpy.typing import NDArray
 from acquire.load_cell import LoadLog
 from analysis.evaluate import Curve, GaugeValue, LoadAxis, load_axis
 from live.pipeline.measurement import AXIAL, TRANSVERSE, TimeStep, extension_along, strains_along
+from live.pipeline.queues import Thinned
 
 Array = NDArray[np.float64]
-Item = TypeVar("Item")
 
 MAX_KEPT = 2000
 """Time steps that ``AxisFinder`` keeps, evenly thinned."""
+_ROWS = 1024  # of a block of the history
 _GROWTH = 1.1  # of the time steps from one search for the axis to the next
 _COUNTS = ("n_valid", "n_zoi")
 SHORT = (
@@ -40,11 +40,11 @@ _TYPES = {
 class TimeSeries(Sequence[TimeStep]):
     """A list that one thread appends to and any thread reads: numbers as columns, each text once.
 
-    About 180 bytes for each time step and 25 more for each gauge; of ``sigma`` and the like seven digits.
+    At most 180 bytes for each time step and 25 more for each gauge; of ``sigma`` and the like seven digits.
     """
 
     def __init__(self) -> None:
-        self._numbers = {name: array(kind) for name, kind in _TYPES.items()}
+        self._numbers = {name: _NumberColumn(kind) for name, kind in _TYPES.items()}
         self._refused = _TextColumn()
         self._gauges: dict[str, _GaugeColumn] = {}
         self._count = 0
@@ -64,7 +64,7 @@ class TimeSeries(Sequence[TimeStep]):
 
     def column(self, name: str) -> Array:
         """One number over time, (N,) float64."""
-        return _copied(self._numbers[name], self._count)
+        return self._numbers[name].copied(self._count)
 
     @property
     def gauges(self) -> tuple[str, ...]:
@@ -74,12 +74,12 @@ class TimeSeries(Sequence[TimeStep]):
     def gauge(self, name: str) -> Array | None:
         """Values of a gauge, (N,) float64; None where the first time step has none of that name."""
         column = self._gauges.get(name)
-        return None if column is None or column.since else _copied(column.values, self._count)
+        return None if column is None or column.since else column.values.copied(self._count)
 
     def gauge_sigma(self, name: str) -> Array | None:
         """Standard uncertainties of a gauge, (N,) float64; None as for ``gauge``."""
         column = self._gauges.get(name)
-        return None if column is None or column.since else _copied(column.sigmas, self._count)
+        return None if column is None or column.since else column.sigmas.copied(self._count)
 
     def __len__(self) -> int:
         return self._count
@@ -107,13 +107,41 @@ class TimeSeries(Sequence[TimeStep]):
         return TimeStep(**numbers, refused=self._refused[i], gauges=gauges)
 
 
+class _NumberColumn:
+    """Numbers in blocks of ``_ROWS``; a full block of equal numbers takes the memory of one.
+
+    Blocks and no array that grows: that leaves gaps in the memory wherever it is moved.
+    """
+
+    def __init__(self, kind: str) -> None:
+        self._kind, self._count = kind, 0
+        self._blocks: list[NDArray[Any]] = []
+
+    def append(self, value: float) -> None:
+        at = self._count % _ROWS
+        if at == 0:
+            self._blocks.append(np.zeros(_ROWS, self._kind))
+        block = self._blocks[-1]
+        block[at] = value
+        if at == _ROWS - 1 and block.tobytes() == block[:1].tobytes() * _ROWS:
+            self._blocks[-1] = np.broadcast_to(block[0], _ROWS)
+        self._count += 1
+
+    def __getitem__(self, i: int) -> Any:  # float or int
+        return self._blocks[i // _ROWS].item(i % _ROWS)
+
+    def copied(self, count: int) -> Array:
+        """The first ``count``, (count,) float64."""
+        return np.concatenate([np.empty(0), *self._blocks])[:count]
+
+
 class _TextColumn:
     """Texts, each stored once: few of them differ."""
 
     def __init__(self) -> None:
         self._numbers: dict[str, int] = {}
         self._texts: list[str] = []
-        self._column = array("i")
+        self._column = _NumberColumn("i")
 
     def append(self, text: str) -> None:
         if text not in self._numbers:
@@ -122,20 +150,18 @@ class _TextColumn:
         self._column.append(self._numbers[text])
 
     def __getitem__(self, i: int) -> str:
-        return self._texts[self._column[i]]
+        return self._texts[int(self._column[i])]
 
 
 class _GaugeColumn:
     """The values of one gauge, which the first ``since`` time steps do not have."""
 
     def __init__(self, since: int) -> None:
-        nothing = [math.nan] * since
         self.since = since
-        self.values, self.sigmas = array("d", nothing), array("d", nothing)
-        self._shares = array("f", nothing)
-        self._reasons, self._missing = _TextColumn(), array("b", [1] * since)
+        self.values, self.sigmas, self._shares = _NumberColumn("d"), _NumberColumn("d"), _NumberColumn("f")
+        self._reasons, self._missing = _TextColumn(), _NumberColumn("b")
         for _ in range(since):
-            self._reasons.append("")
+            self.append(None)
 
     def append(self, value: GaugeValue | None) -> None:
         stored = value or GaugeValue(math.nan, math.nan)
@@ -149,47 +175,6 @@ class _GaugeColumn:
         if self._missing[i]:
             return None
         return GaugeValue(self.values[i], self.sigmas[i], self._reasons[i], self._shares[i])
-
-
-def _copied(kept: array[Any], count: int) -> Array:
-    # Of a slice: an array that lends its memory to numpy cannot grow meanwhile.
-    return np.frombuffer(kept[:count], kept.typecode).astype(np.float64)
-
-
-class Thinned(Generic[Item]):
-    """A bounded list, evenly thinned, and always the newest item: when full, every second item is dropped.
-
-    Parameters
-    ----------
-    size : int
-        Items kept at most (and one more, the newest).
-
-    Attributes
-    ----------
-    kept : list
-        Every ``2**halvings``-th item from the first on, oldest first.
-    halvings : int
-        How often every second item was dropped.
-    """
-
-    def __init__(self, size: int) -> None:
-        self._size, self._count = size, 0
-        self.kept, self.halvings = list[Item](), 0
-        self._newest: list[Item] = []
-
-    def append(self, item: Item) -> None:
-        """Add the newest."""
-        self._newest = [item]
-        if self._count % (1 << self.halvings) == 0:
-            self.kept.append(item)
-            if len(self.kept) > self._size:
-                self.kept, self.halvings = self.kept[::2], self.halvings + 1
-        self._count += 1
-
-    def items(self) -> list[Item]:
-        """Oldest first, the newest always included."""
-        is_kept = (self._count - 1) % (1 << self.halvings) == 0
-        return self.kept + self._newest * (not is_kept)
 
 
 def curve_of(

@@ -1,6 +1,7 @@
-"""The two queues between threads: ``LatestQueue`` keeps the newest item, ``BoundedQueue`` is bounded in bytes.
+"""Bounded containers: two queues between threads, and ``Thinned``, a list of a whole test.
 
-Both count the items that they cannot pass on; nothing is dropped silently.
+``LatestQueue`` keeps the newest item, ``BoundedQueue`` is bounded in bytes; both count the items that they cannot
+pass on, nothing is dropped silently.
 """
 
 from __future__ import annotations
@@ -154,3 +155,39 @@ class BoundedQueue(_Queue[tuple[Item, int]], Generic[Item]):
     def waiting_bytes(self) -> int:
         """Bytes queued now."""
         return self._bytes
+
+
+class Thinned(Generic[Item]):
+    """A bounded list, evenly thinned, and always the newest item: when full, every second item is dropped.
+
+    Parameters
+    ----------
+    size : int
+        Items kept at most (and one more, the newest).
+
+    Attributes
+    ----------
+    kept : list
+        Every ``2**halvings``-th item from the first on, oldest first.
+    halvings : int
+        How often every second item was dropped.
+    """
+
+    def __init__(self, size: int) -> None:
+        self._size, self._count = size, 0
+        self.kept, self.halvings = list[Item](), 0
+        self._newest: list[Item] = []
+
+    def append(self, item: Item) -> None:
+        """Add the newest."""
+        self._newest = [item]
+        if self._count % (1 << self.halvings) == 0:
+            self.kept.append(item)
+            if len(self.kept) > self._size:
+                self.kept, self.halvings = self.kept[::2], self.halvings + 1
+        self._count += 1
+
+    def items(self) -> list[Item]:
+        """Oldest first, the newest always included."""
+        is_kept = (self._count - 1) % (1 << self.halvings) == 0
+        return self.kept + self._newest * (not is_kept)

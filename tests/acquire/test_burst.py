@@ -113,7 +113,7 @@ def test_frames_of_another_kind_are_refused_by_name() -> None:
         burst_of([small(0), frame(np.zeros((3, 6), np.uint8), 1)])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.sampled_from(["good", "damaged", "gap"]), max_size=60), st.integers(1, 5))
 def test_what_is_lost_or_damaged_is_counted_once(kinds: list[str], n: int) -> None:
     frames = list(_stream(kinds))

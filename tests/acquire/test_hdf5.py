@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from acquire.errors import DataError
 from acquire.hdf5 import COMPRESSED, DiskSync, PictureReader, PictureStack, compile_loops, create_file
 from acquire.hdf5 import disk as pace_module
+from acquire.hdf5.damage import METADATA_BYTES
 from acquire.hdf5.disk import forecast, free_bytes, network_share
 from tests.acquire.session.fixtures import frame, writer
 from tests.live.ui.waiting import until
@@ -88,6 +89,27 @@ def test_a_new_file_is_read_while_it_grows_and_replaces_none(tmp_path: Path) -> 
     with pytest.raises(FileExistsError):
         create_file(path, lambda head: head.create_group("other"))
     assert path.read_bytes() == content
+
+
+def test_the_structure_of_a_long_file_takes_no_more_memory(tmp_path: Path) -> None:
+    """Of each piece HDF5 keeps its place in memory: without a bound a file of hours takes megabytes."""
+    names, rows = [f"map {k}" for k in range(10)], 3000
+
+    def declare(file: h5py.File) -> None:
+        for name in names:
+            file.create_dataset(name, (0, 2, 2), "u1", maxshape=(None, 2, 2), chunks=(1, 2, 2))
+
+    with create_file(tmp_path / "a.h5", declare) as file:
+        stacks = [PictureStack(file[name]) for name in names]
+        for row in range(rows):
+            for stack in stacks:
+                stack.append(np.full((2, 2), row % 256, np.uint8))
+        largest, _, used, _ = file.id.get_mdc_size()
+        assert largest == METADATA_BYTES and used <= METADATA_BYTES < 20 * rows * len(names)
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert np.array_equal(file[names[-1]][:, 1, 1], np.arange(rows) % 256), (
+            "what was let go is in the file"
+        )
 
 
 def test_forecast(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -176,6 +176,9 @@ def test_bits_are_checked_and_guessed_aloud(tmp_path: Path) -> None:
         open_camera(f"files:{path}?bits=9")
     with pytest.raises(ConfigError, match="bits"):
         open_camera(f"files:{path}?bits=17")
+    above = write(tmp_path / "b.png", np.array([[0, 1024], [5, 6]], np.uint16))
+    with pytest.raises(DataError, match="1024 does not fit into bits=10"):
+        open_camera(f"files:{above}?bits=10")
 
 
 def test_jpeg_is_warned_about(tmp_path: Path) -> None:
@@ -236,7 +239,7 @@ def test_unknown_settings_list_the_known_ones(tmp_path: Path) -> None:
         open_camera(f"files:{tmp_path}?rate=5")
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.sampled_from(["tif", "png", "bmp"]),
     st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), max_size=6),

@@ -269,3 +269,37 @@ def test_noise_alone_is_seldom_taken_for_movement() -> None:
     for n, most in ((5, 100), (12, 40), (40, 10)):
         t = np.arange(n) / 80
         assert sum(not stillness(t, rng.standard_normal(n)).still for _ in range(1000)) < most
+
+
+def test_the_figures_of_a_report_by_value() -> None:
+    """A cell pressed to 80 % of its capacity; one line of 20 came 60 ms late."""
+    forces = [-400.0, -399.0, -398.5, -399.5] * 5
+    samples = [LoadSample(k / 50 + 0.06 * (k >= 10), force) for k, force in enumerate(forces)]
+    found = report(samples, INFO, seconds=1.0)
+    assert (found.lowest_N, found.highest_N, found.step_N) == (-400.0, -398.5, 0.5)
+    assert found.of_capacity == pytest.approx(0.8)
+    assert found.rate == pytest.approx(19 / (19 / 50 + 0.06))
+    assert found.jitter_s == pytest.approx(np.std([0.02] * 18 + [0.08]))
+    assert found.longest_s == found.silent_s == pytest.approx(1 - 0.44)
+    assert report(samples).longest_s == pytest.approx(0.08)
+
+
+def test_the_movement_is_between_the_means_of_tenths_of_the_time() -> None:
+    forces = [10.0] * 40 + [13.0, 15.0] * 5 + [10.0] * 50
+    samples = [LoadSample(k / 10, force) for k, force in enumerate(forces)]
+    assert report(samples, seconds=10.0).moved_N == pytest.approx(4.0)
+
+
+def test_a_slow_cell_has_no_gaps_as_long_as_it_keeps_its_pace() -> None:
+    """Of a device that sends twice a second five of its own periods are a gap; of a fast one a quarter of a second."""
+    assert report(steady(20, rate=2.0)).remarks[0].startswith("only 2 samples a second")
+    assert len(report(steady(20, rate=2.0)).remarks) == 1
+    for rate, gap, named in ((2.0, 2.4, False), (2.0, 2.9, True), (50.0, 0.2, False), (50.0, 0.3, True)):
+        late = [dataclasses.replace(one, t=one.t + gap - 1 / rate) for one in steady(99, rate)[50:]]
+        remarks = report([*steady(50, rate), *late]).remarks
+        assert any("a gap of" in one for one in remarks) == named, (rate, gap)
+
+
+def test_an_underload_is_as_far_beyond_the_range_as_an_overload() -> None:
+    found = report(changed(steady(), 50, LoadSample(1.0, NAN, flags=LoadFlag.UNDERLOAD)))
+    assert found.remarks == ("1 samples in overload or saturated: unload the cell, or check its wiring",)

@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from analysis.evaluate.curve import broken_at, first_crossing, noise, reading, smoothed, true_curve
+from analysis.evaluate.curve import (
+    Course,
+    Curve,
+    Loading,
+    TwoSides,
+    broken_at,
+    first_crossing,
+    noise,
+    reading,
+    smoothed,
+    true_curve,
+)
 
 
 @pytest.mark.parametrize(("least", "broken"), [(0.5, False), (0.03, False), (0.015, True), (0.0, True)])
@@ -49,3 +61,52 @@ def test_a_reading_between_samples_of_a_parabola() -> None:
     assert found.value == pytest.approx(0.5 * 7.25**2 + 2 * 7.25 + 1)
     assert found.slope == pytest.approx(9.25)
     assert 0 < found.sigma < 0.1
+
+
+def test_the_uncertainty_of_a_reading_is_that_of_its_noise() -> None:
+    """Of so few values that the three a parabola takes count; never less than the noise of one value makes it."""
+    rng, k = np.random.default_rng(5), np.arange(7.0)
+    found = [reading(3 * k + rng.normal(0, 0.2, 7), 2.3, 0, 7) for _ in range(3000)]
+    errors = np.array([one.value - 3 * 2.3 for one in found])
+    assert np.mean([one.sigma**2 for one in found]) == pytest.approx(np.mean(errors**2), rel=0.1)
+    quiet = reading(3 * k, 2.3, 0, 7, min_sigma=0.2)
+    assert quiet.sigma == pytest.approx(np.std(errors), rel=0.05)
+
+
+T = np.array([0.0, 1.0, 2.0, 6.0])
+BACK = Course(T, np.array([1.0, 3.0, 5.0, 9.0]) * 1e-4, np.full(4, 6e-6))
+
+
+def test_the_mean_and_the_bending_of_two_sides() -> None:
+    """Bending is positive where the front is the longer side; noise is independent, and a tilt of 0.1 degree left."""
+    front = Course(np.array([0.5, 1.0]), np.array([6e-4, 1e-4]), np.full(2, 8e-6))
+    sides = TwoSides.of(front, BACK, 1.0)
+    assert sides.mean == pytest.approx([4e-4, 2e-4])
+    assert sides.bending == pytest.approx([2e-4, -1e-4])
+    tilt = math.radians(0.1) ** 2 / 2 / math.sqrt(3)
+    noise = [math.hypot(8e-6, 6e-6 / math.sqrt(2)) / 2, math.hypot(8e-6, 6e-6) / 2]
+    assert sides.sigma == pytest.approx(np.hypot(noise, tilt))
+
+
+def test_the_other_side_is_known_between_its_instants_alone() -> None:
+    asked = np.array([-0.1, 0.25, 2.0, 4.0, 6.1])
+    assert BACK.at(asked, 1.0).value == pytest.approx(
+        [math.nan, 1.5e-4, math.nan, math.nan, math.nan], nan_ok=True
+    )
+    assert BACK.at(asked, 4.0).value == pytest.approx([math.nan, 1.5e-4, 5e-4, 7e-4, math.nan], nan_ok=True)
+    assert BACK.at(asked, 4.0).sigma[1] == pytest.approx(math.hypot(0.75, 0.25) * 6e-6)
+
+
+@pytest.mark.parametrize(("rising", "half"), [(600, 4), (150, 2), (40, 0)])
+def test_what_of_a_test_is_evaluated(rising: int, half: int) -> None:
+    """All that has strain and stress up to the last sample before the break; running means of up to 9 samples."""
+    stress = np.concatenate([np.arange(rising + 1.0), np.zeros(5)])
+    strain = 1e-5 * np.arange(len(stress))
+    strain[5] = math.nan
+    curve = Curve(np.arange(len(stress)) / 10, strain, stress, transverse=-0.3 * strain)
+    found = Loading.of(curve)
+    assert (found.n, found.top, found.half, found.broke) == (rising, rising - 1, half, True)
+    assert found.t[-1] == rising / 10 and found.strain[-1] == 1e-5 * rising
+    assert np.array_equal(found.elastic, found.strain) and np.array_equal(found.narrowing, found.transverse)
+    assert np.isnan(found.uneven).all() and found.course[0] == 0.0
+    assert not Loading.of(replace(curve, stress=np.arange(float(len(stress))))).broke

@@ -8,7 +8,7 @@ import pytest
 from analysis import PhaseKernel, Roi, Status, ZoiGrid
 from analysis.field.motion import Motion
 from analysis.follow.prediction import AGE_MOVED, MAX_AGE, motion_after
-from analysis.follow.search import find_blocks, global_shift, search
+from analysis.follow.search import Blocks, find_blocks, global_shift, search
 from tests.analysis.speckle import SHAPE, picture
 
 SIGMA, LEVER, A = 0.01, 5.0, 4000
@@ -203,3 +203,34 @@ def test_blocks_know_nothing_of_zois() -> None:
     blocks = find_blocks(reference, deformed, WIDE_GRID.roi)
     assert np.all(np.abs(blocks.shift[..., 0] - 7) <= 1.5)
     assert np.median(np.abs(blocks.planes()[..., 1:3])) < 0.01
+
+
+AFFINE_BLOCKS = np.array([3.0, 0.05, -0.02, -2.0, 0.01, 0.08])
+"""u, du_dx, du_dy, v, dv_dx, dv_dy at the middle."""
+
+
+def affine_blocks(spoilt: float = 0.0) -> Blocks:
+    """Blocks that move by ``AFFINE_BLOCKS``; one of them by ``spoilt`` px more."""
+    y, x = np.arange(7.0) * 20 - 60, np.arange(9.0) * 20 - 80
+    shift = np.stack([q[0] + q[1] * x + q[2] * y[:, None] for q in AFFINE_BLOCKS.reshape(2, 3)], axis=-1)
+    shift[3, 4] += spoilt
+    return Blocks(y, x, shift)
+
+
+@pytest.mark.parametrize("spoilt", [0.0, 30.0])
+def test_the_plane_of_blocks_is_that_of_their_motion_at_any_point(spoilt: float) -> None:
+    """A block that leaps out of it is left out; at the corners, too."""
+    at_y, at_x = np.array([-63.0, 4.0, 55.0]), np.array([77.0, -3.0, -84.0])
+    found = affine_blocks(spoilt).plane_at(at_y, at_x)
+    du = np.stack([q[0] + q[1] * at_x + q[2] * at_y for q in AFFINE_BLOCKS.reshape(2, 3)], axis=1)
+    assert found[:, [0, 3]] == pytest.approx(du, abs=0.3)
+    assert found[:, [1, 2, 4, 5]] == pytest.approx(
+        np.broadcast_to(AFFINE_BLOCKS[[1, 2, 4, 5]], (3, 4)), abs=0.015
+    )
+
+
+def test_around_a_point_are_the_four_blocks_between_which_it_lies() -> None:
+    blocks = affine_blocks()
+    assert blocks.around(np.array([5.0]), np.array([-33.0]))[0].tolist() == [
+        blocks.shift[r, c].tolist() for r in (3, 4) for c in (2, 3)
+    ]

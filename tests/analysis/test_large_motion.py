@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -20,6 +22,7 @@ Motion = tuple[float, float, float]
 """Steps of the middle (x, y), px, and the strain along y; across it the strip becomes narrower by 0.3 of that."""
 
 
+@cache
 def picture(motion: Motion, background: str, seed: int) -> NDArray[np.uint8]:
     """The strip over a background that stays where it is."""
     dx, dy, eyy = motion

@@ -224,3 +224,28 @@ def test_too_few_pictures_and_small_shifts_are_refused() -> None:
     fields = shifted(np.random.default_rng(1), 1e-3)
     with pytest.raises(ValueError, match="1 shifted pictures with 140 ZOIs"):
         lens_of_shifts(fields[:1], WIDTH, HEIGHT)
+
+
+def test_noise_beyond_what_is_stated_is_in_the_uncertainty_of_the_lens() -> None:
+    """Three times the noise stated: the lens is as uncertain as where all of it is stated."""
+    fields = shifted(np.random.default_rng(3), 5e-3)
+    ninth = [
+        replace(one, covariance=one.covariance / 9, covariance_reference=one.covariance_reference / 9)
+        for one in fields
+    ]
+    honest, short = (lens_of_shifts(some, WIDTH, HEIGHT) for some in (fields, ninth))
+    assert honest.lens.parameters[:3] == pytest.approx(
+        TRUE[:3], rel=1e-12
+    )  # not found: half a diagonal, the middle
+    assert short.over_noise == pytest.approx(3, rel=0.1)
+    assert short.rms_px == pytest.approx(honest.rms_px, rel=1e-3)
+    radial = np.s_[3:5, 3:5]
+    assert short.lens.covariance[radial] == pytest.approx(honest.lens.covariance[radial], rel=0.1)
+
+
+def test_eleven_zois_are_too_few_for_a_lens() -> None:
+    fields = shifted(np.random.default_rng(1), 1e-3)
+    few = np.where(np.arange(GRID.active.size).reshape(GRID.shape) % 13 == 0, Status.OK, Status.LOST)
+    assert (few == Status.OK).sum() == 11
+    with pytest.raises(ValueError, match="with 11 ZOIs that all of them show; it takes 2 and 12"):
+        lens_of_shifts([replace(one, status=few.astype(np.uint8)) for one in fields], WIDTH, HEIGHT)

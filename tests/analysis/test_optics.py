@@ -17,7 +17,9 @@ from analysis.optics import (
     Model,
     PlateFit,
     PlateLayout,
+    alike,
     choose_model,
+    keystones,
     trouble,
     without_plates,
 )
@@ -38,10 +40,15 @@ def fit_of(boxes: dict[str, tuple[float, float, float, float]]) -> PlateFit:
     return PlateFit(PlateLayout.of(GRID, boxes), AXIS)
 
 
-def seen(fit: PlateFit, boxes: dict[str, tuple[float, float, float, float]], optics: Optics) -> StrainField:
+def seen(
+    fit: PlateFit,
+    boxes: dict[str, tuple[float, float, float, float]],
+    optics: Optics,
+    specimen: VirtualSpecimen = SPECIMEN,
+) -> StrainField:
     """What a perfect kernel measures on a specimen that looks as ``optics`` show it at rest."""
     optics = replace(optics, plates=tuple(boxes.values()))
-    before, after = optics.seen(SPECIMEN, 0.0), optics.seen(SPECIMEN, END)
+    before, after = optics.seen(specimen, 0.0), optics.seen(specimen, END)
     x, y = np.meshgrid(fit.layout.whole.x, fit.layout.whole.y)
     flat_x, flat_y = x.copy(), y.copy()  # places of the plane that are seen at the ZOIs
     for _ in range(6):
@@ -285,3 +292,69 @@ def test_zois_that_touch_a_plate_are_not_of_the_specimen() -> None:
 def test_impossible_plates(boxes: dict[str, tuple[float, float, float, float]], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         PlateLayout.of(GRID, boxes)
+
+
+def risen(grid: ZoiGrid, k: float, *, bent: bool = False) -> StrainField:
+    """u = k x^2 and v = k x y about the middle of ``grid``, as a tilt makes them; ``bent``: v is that of bending."""
+    x, y = np.meshgrid(grid.x - grid.x.mean(), grid.y - grid.y.mean())
+    sign = -1 if bent else 1
+    values = (k * x * x, 2 * k * x, 0 * x, sign * k * x * y, sign * k * y, sign * k * x)
+    return StrainField.from_values(grid, dict(zip(NAMES, values, strict=True)), 1e-3)
+
+
+def test_a_scale_that_rises_evenly_is_a_keystone_and_bending_is_none() -> None:
+    """The mean strain rises by 1.5 k from one px to the next, here over 320 px; u and v show the same."""
+    wide = ZoiGrid.cover(Roi(0, 0, 384, 224), 64, 32)
+    along_x, along_y = keystones(risen(wide, 1e-6))
+    assert (along_x.by_u, along_x.by_v) == pytest.approx((1.5e-6 * 320,) * 2)
+    assert along_x.rise == pytest.approx(1.5e-6 * 320) and along_x.px == 320
+    assert (along_y.by_u, along_y.by_v) == pytest.approx((0, 0), abs=1e-12) and along_y.px == 160
+    bent = keystones(risen(wide, 1e-6, bent=True))[0]
+    assert (bent.by_u, bent.by_v) == pytest.approx((1.5e-6 * 320, -1.5e-6 * 320)) and bent.rise == 0
+
+
+def test_the_tilt_of_a_plane_is_read_from_its_keystone() -> None:
+    fit = fit_of(TWO)
+    optics = Optics(500.0, settling=PlaneMotion(0.0, math.radians(0.3), math.radians(0.2)))
+    still = replace(SPECIMEN, programme=replace(SPECIMEN.programme, knee_strain=5e-9, max_strain=1e-8))
+    field = seen(fit, TWO, optics, still)
+    tilts = sorted(abs(math.degrees(one.tilt(FOCAL))) for one in keystones(field))
+    assert tilts == pytest.approx([0.2, 0.3], rel=0.02)
+
+
+@pytest.mark.parametrize(("step", "overlap"), [(32, 1.0), (16, 2.0)])
+def test_the_sigma_of_a_keystone_is_the_scatter_of_noise(step: int, overlap: float) -> None:
+    """As of noise that each ZOI has to itself; where they overlap, of as many as lie side by side."""
+    grid, rng = ZoiGrid.cover(Roi(0, 0, 320, 256), 32, step), np.random.default_rng(2)
+    found = []
+    for _ in range(200):
+        u, v = rng.normal(0, 1e-3, (2, *grid.shape))
+        along_x, along_y = keystones(StrainField.from_values(grid, {"u": u, "v": v}, 1e-3))
+        found.append((along_x.by_u, along_x.by_v, along_y.by_u, along_y.by_v))
+    by = overlap * np.std(found, axis=0)
+    assert along_x.sigma == pytest.approx(max(by[:2]), rel=0.2)
+    assert along_y.sigma == pytest.approx(max(by[2:]), rel=0.2)
+
+
+def test_eleven_zois_show_no_keystone() -> None:
+    grid = ZoiGrid.cover(Roi(0, 0, 128, 96), 32, 32)
+    status = np.zeros(grid.shape, int)
+    assert math.isfinite(keystones(StrainField.from_values(grid, {}, 1e-3, status))[0].by_u)
+    status[0, 0] = Status.LOST
+    for one in keystones(StrainField.from_values(grid, {}, 1e-3, status)):
+        assert math.isnan(one.by_u) and one.rise == 0
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "noise", "both"),
+    [
+        (3.0, 2.0, 1.0, 2.5),
+        (3.0, 2.0, 2.6, 0.0),
+        (3.0, 0.9, 1.0, 0.0),
+        (-3.0, -1.5, 1.0, -2.25),
+        (3.0, -3.0, 0.0, 0.0),
+    ],
+)
+def test_what_two_values_have_in_common(one: float, other: float, noise: float, both: float) -> None:
+    """Their mean, where it is beyond the noise and their whole difference."""
+    assert alike(one, other, noise) == both

@@ -8,6 +8,7 @@ from math import comb
 import numpy as np
 import pytest
 from scipy import ndimage
+from scipy.optimize import brentq
 
 from analysis.compiled.convolution import GROUP, REACH
 from analysis.compiled.vectors import LANES
@@ -18,6 +19,8 @@ from analysis.picture.pattern import (
     autocorrelation_fwhm,
     clipped_share,
     describe_pattern,
+    gauge_length,
+    l10_strain,
     noise_of_picture,
     predicted_sigma,
     resolution_length,
@@ -326,3 +329,16 @@ def test_in_a_box_the_coefficients_are_those_of_the_whole(rows: tuple, columns: 
         assert np.array_equal(
             part[y * width + left : y * width + right], whole[y * width + left : y * width + right]
         )
+
+
+def test_the_gauge_length_is_the_side_of_the_square_with_the_same_noise() -> None:
+    """Of an even window its own side; of a Gaussian one of s, sqrt(24) / L^2 = 1 / (2 sqrt(pi) s^2)."""
+    assert gauge_length(64, "uniform") == pytest.approx(64, rel=1e-3)
+    assert gauge_length(64) == pytest.approx(math.sqrt(2 * math.sqrt(24 * math.pi)) * 64 / 6, rel=0.02)
+
+
+def test_the_period_of_a_strain_that_has_lost_a_tenth() -> None:
+    """Of an even window the moment of a sine, 3 (sin a - a cos a) / a^3 with a = pi size / period, is 0.9 there."""
+    a = brentq(lambda a: 3 * (math.sin(a) - a * math.cos(a)) / a**3 - 0.9, 0.1, 3)
+    assert l10_strain(64, "uniform") == pytest.approx(math.pi * 64 / a, rel=1e-3)
+    assert l10_strain(64) == pytest.approx(resolution_length(64), rel=0.05)

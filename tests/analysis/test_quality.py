@@ -162,3 +162,24 @@ def test_no_pattern_is_no_specimen(what: str) -> None:
 def test_what_is_no_picture() -> None:
     with pytest.raises(ValueError, match=r"\d"):
         find_specimen(np.zeros((8, 8)))
+
+
+def test_the_box_holds_the_mask_and_no_more() -> None:
+    found = find_specimen(cluttered_scene()[0])
+    assert found is not None
+    box, rows, columns = found.box, found.mask.any(axis=1), found.mask.any(axis=0)
+    assert (box.width, box.height) == (np.ptp(np.flatnonzero(columns)) + 1, np.ptp(np.flatnonzero(rows)) + 1)
+    assert (
+        found.share
+        == found.mask[box.y : box.y + box.height, box.x : box.x + box.width].sum() / found.mask.size
+    )
+
+
+@pytest.mark.parametrize(("side", "found"), [(90, True), (30, False)])
+def test_the_least_specimen(side: int, found: bool) -> None:
+    """Half a percent of the picture; what is narrower than a small ZOI is none."""
+    rng = np.random.default_rng(2)
+    speckle = gaussian_filter(rng.normal(size=(side, side)), 2)
+    picture = np.full((700, 900), 90.0)
+    picture[300 : 300 + side, 400 : 400 + side] += 40 * speckle / speckle.std()
+    assert (find_specimen(picture + rng.normal(0, 1, picture.shape)) is not None) == found

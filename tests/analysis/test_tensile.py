@@ -26,6 +26,7 @@ from analysis.evaluate import (
 )
 from analysis.evaluate.curve import Loading, broken_at
 from analysis.evaluate.elastic import _slope, line_through
+from analysis.evaluate.lag import _accepted, _Fit
 from hw_mocks.machine import FlowCurve, Programme
 from tests.analysis.curves import Truth, composite, linear, lueders, noisy, ramberg_osgood
 
@@ -226,6 +227,26 @@ def test_the_zero_is_named_and_the_curve_stays() -> None:
     assert np.array_equal(curve.strain, before)
 
 
+def test_a_yield_point_that_falls_by_two_percent_is_one() -> None:
+    """The limit of the standard is half a percent; the undershoot after it is no part of ReL."""
+    found = evaluate_test(noisy(lueders(upper=306e6), 0))
+    assert found.ReH.value == pytest.approx(306e6, rel=2e-3)
+    assert found.ReL.value == pytest.approx(300e6, rel=2e-3)
+
+
+def test_the_undershoot_after_the_upper_yield_strength_is_no_lower_one() -> None:
+    """Clause 12 of the standard: what follows within 0.05 % strain does not count."""
+    truth = lueders()
+    dip = 15e6 * np.exp(-0.5 * ((truth.curve.strain - 330e6 / 205e9 - 2.5e-4) / 8e-5) ** 2)
+    curve = replace(truth.curve, stress=truth.curve.stress - np.nan_to_num(dip))
+    found = evaluate_test(noisy(replace(truth, curve=curve), 0))
+    assert found.ReL.value == pytest.approx(300e6, rel=2e-3)
+
+
+def test_the_strain_at_the_highest_force_is_the_middle_of_its_flat_top() -> None:
+    assert evaluate_test(noisy(lueders(), 0)).Agt.value == pytest.approx(0.12, abs=5e-4)
+
+
 def test_a_neck_is_no_yield_point() -> None:
     truth = lueders(upper=300.5e6)
     found = evaluate_test(noisy(truth, 0))
@@ -368,6 +389,31 @@ def test_it_is_refused_in_words(test: dict[str, float], message: str) -> None:
 
 def test_a_lag_beyond_the_search_is_not_answered() -> None:
     assert not any(f.known for f in found(1.6)[:20])
+
+
+def test_a_lag_that_is_known_worse_than_asked_is_not_answered() -> None:
+    known = find_lag(*tracks(3, 0.15))
+    half = (known.high - known.low) / 2
+    assert find_lag(*tracks(3, 0.15), max_half_width=1.01 * half) == known
+    refused = find_lag(*tracks(3, 0.15), max_half_width=0.99 * half)
+    assert not refused.known and "begin to measure some seconds before" in refused.why
+
+
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({}, ""),
+        ({"significance": 9.9}, "the strain does not follow the force"),
+        ({"known": 0.94}, "too evenly"),
+        ({"separation": 19.0}, "too evenly"),
+        ({"lag": 0.96}, "no lag within 1 s fits"),
+        ({"lag": -0.96}, "no lag within 1 s fits"),
+    ],
+)
+def test_the_limits_of_a_lag(changed: dict[str, float], why: str) -> None:
+    fit = _Fit(0.94, 1e-3, 200, separation=21.0, significance=10.1, straight=True, known=0.96)
+    found = _accepted(replace(fit, **changed), 1.0, 0.1)
+    assert found.known == (not why) and why in found.why
 
 
 def test_strain_that_does_not_follow_is_refused() -> None:

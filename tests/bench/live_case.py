@@ -16,7 +16,6 @@ import sys
 import tempfile
 import threading
 import time
-from array import array
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -46,15 +45,18 @@ class Watch(Consumer):
     blocks = False
 
     def __init__(self) -> None:
-        self._numbers = array("d")  # not a list of tuples: a soak watches what grows
+        # Not in memory: a soak watches what grows there.
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - ends with the process
 
     def measurement(self, measurement: Measurement) -> None:
         i, b = measurement.time_step, measurement.burst
-        self._numbers.extend((b.t, b.first_index, b.last_index, i.latency_s, i.measure_s, i.n_valid))
+        numbers = (b.t, b.first_index, b.last_index, i.latency_s, i.measure_s, i.n_valid)
+        self._file.write(np.array(numbers, np.float64).tobytes())
 
     def rows(self) -> np.ndarray:
         """All so far, (N, 6)."""
-        return np.array(self._numbers).reshape(-1, 6)
+        self._file.seek(0)
+        return np.frombuffer(self._file.read()).reshape(-1, 6)
 
 
 def skipped_share(rows: np.ndarray) -> float:

@@ -3,7 +3,8 @@
 The running program as in ``live_case`` (camera from memory, recording, view served and written, load cell), with
 the page and a client of the strain output, each read in a process of its own. The recording is rotated and its old
 parts are removed here. Every 10 s the memory and the open handles of each of its processes are read from /proc; the
-slopes from the sixth minute on are what counts. ``--csv`` keeps the curve.
+slopes from the sixth minute on are what counts, those of each two minutes show whether it still grows. ``--csv`` keeps
+the curve.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +36,7 @@ from tests.live.ui.web.http_page import HttpPage
 
 WARM_S = 300.0
 """Not counted: caches and histories fill."""
-LOOK_S = 10.0
+LOOK_S, PART_S = 10.0, 120.0
 KEPT_PARTS = 2
 STRAIN_OUT_PORT = 19_877
 
@@ -56,16 +58,21 @@ class Curve:
             name = "program" if pid == os.getpid() else b" ".join(words[-2:]).decode()[-40:].strip()
             self.rows.append((pid, name, time.monotonic() - begin, kB / 1024, handles))
 
-    def slopes(self) -> dict[str, dict[str, float]]:
+    def slopes(self) -> dict[str, dict[str, Any]]:
         """Of each process that lived on after ``WARM_S``: MiB a minute, first and last, handles."""
-        out = {}
+        out: dict[str, dict[str, Any]] = {}
         for pid in dict.fromkeys(row[0] for row in self.rows):
             mine = [row for row in self.rows if row[0] == pid and row[2] > WARM_S]
             if len(mine) < 3:
                 continue
             t, memory = np.array([row[2] for row in mine]), np.array([row[3] for row in mine])
             out[f"{mine[0][1]} ({pid})"] = {
-                "MiB a minute": round(float(np.polyfit(t / 60, memory, 1)[0]), 3),
+                "MiB a minute": slope(t, memory),
+                "MiB a minute in each two": [
+                    slope(t[part], memory[part])
+                    for since in np.arange(WARM_S, t[-1], PART_S)
+                    if (part := (t >= since) & (t < since + PART_S)).sum() > 2
+                ],
                 "MiB first": round(float(memory[0]), 1),
                 "MiB last": round(float(memory[-1]), 1),
                 "MiB most": round(float(memory.max()), 1),
@@ -73,6 +80,11 @@ class Curve:
                 "handles last": mine[-1][4],
             }
         return out
+
+
+def slope(t: np.ndarray, memory: np.ndarray) -> float:
+    """Growth per minute, by least squares."""
+    return round(float(np.polyfit(t / 60, memory, 1)[0]), 3)
 
 
 def children(pid: int) -> list[int]:

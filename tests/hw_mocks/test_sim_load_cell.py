@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 import os
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +39,7 @@ def first(cell: LoadCell, n: int) -> list[LoadSample]:
     return samples
 
 
+@pytest.mark.timed
 def test_force_is_the_programmes_within_noise() -> None:
     cell, specimen = opened("sim:?seconds=0.6&hold=0.1&rate=200&noise_N=0.5")
     with cell:
@@ -65,15 +65,6 @@ def test_events_and_info_carry_the_address() -> None:
         first(cell, 2)
     assert cell.info.address == "sim:?rate=200&seed=4" and cell.info.protocol == "ascii"
     assert events and {event.source for event in events} == {"sim:?rate=200&seed=4"}
-
-
-def test_stop_from_another_thread() -> None:
-    cell, _ = opened("sim:?rate=100")
-    with cell:
-        stopper = threading.Timer(0.05, cell.stop)
-        stopper.start()
-        assert len(list(cell)) < 100
-        stopper.join()
 
 
 def test_port_is_gone_after_close() -> None:
@@ -216,3 +207,12 @@ def test_server_writes_lines_at_its_rate() -> None:
             data += os.read(reader, 1000)
         os.close(reader)
     assert set(data.split(b"\r\n")[1:-1]) == {b"5.0 N"}
+
+
+def test_on_nominal_time_a_weight_hangs_on_the_cell_and_forces_are_rounded() -> None:
+    cell, specimen = opened("sim:?lockstep=yes&seconds=2&rate=50&noise_N=0&resolution_N=2&weight_N=37")
+    samples = list(cell)
+    assert cell.noise_N == pytest.approx(2 / math.sqrt(12))
+    assert {sample.force % 2 for sample in samples} == {0.0}
+    truth = specimen.force([sample.t for sample in samples]) + 37
+    assert np.abs(truth - [sample.force for sample in samples]).max() <= 1.0

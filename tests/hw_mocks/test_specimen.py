@@ -199,3 +199,37 @@ def test_a_power_law_has_its_exponent_and_its_anisotropy() -> None:
     below = np.linspace(0, 0.99 * metal.yield_strain, 9)
     np.testing.assert_allclose(metal.stress(below) * (1 + below), metal.E * np.log1p(below), rtol=1e-12)
     assert specimen_from(parse_address("sim:uniform?n=0.2&r=1.6&max_strain=0.3")).material == metal
+
+
+def test_an_address_has_the_units_of_its_keys() -> None:
+    text = (
+        "sim:uniform?E_GPa=200&nu=0.3&yield_MPa=300&section_mm2=50&px_per_mm=12.5&rotation_deg=45"
+        "&seconds=10&hold=3&end=2&max_strain=0.02&axis=x&drift_x=4&drift_y=-3"
+    )
+    specimen = specimen_from(parse_address(text))
+    assert (specimen.E, specimen.nu, specimen.material.yield_strain) == pytest.approx((200e9, 0.3, 1.5e-3))
+    assert (specimen.area_m2, specimen.px_per_m) == pytest.approx((50e-6, 12.5e3))
+    assert specimen.rotation_rad == pytest.approx(math.pi / 4)
+    assert specimen.drift_px == (4.0, -3.0) and specimen.axis == "x"
+    p = specimen.programme
+    assert (p.hold_s, p.ramp_s, p.end_s, p.max_strain) == pytest.approx((3, 5, 2, 0.02))
+
+
+def test_a_test_that_stays_elastic_pulls_evenly_and_never_yields() -> None:
+    specimen = specimen_from(parse_address("sim:?seconds=10&hold=0&end=0&max_strain=1e-3"))
+    assert specimen.yield_s == math.inf
+    assert specimen.axial_strain([0.0, 2.5, 5.0, 10.0]) == pytest.approx([0, 2.5e-4, 5e-4, 1e-3])
+    assert float(specimen.force(5.0)) == pytest.approx(70e9 * 5e-4 * 40e-6)
+
+
+def test_the_strains_of_a_neck_fall_off_from_its_middle() -> None:
+    """sech^2 of the distance over its width, along and across the load, in the lower part of the picture."""
+    metal = PowerLaw(0.2, 1.5)
+    specimen = VirtualSpecimen(neck_px=40.0, material=metal, programme=Programme(max_strain=0.45))
+    middle, off = 0.2 * 512 + 511 / 2, np.array([0.0, 40.0, -40.0])
+    du_dx, _, _, dv_dy = specimen.gradient(np.full(3, 319.5), middle + off, 20.0)
+    share = 1 / np.cosh(off / 40.0) ** 2
+    most = 0.45 - metal.uniform_strain
+    assert dv_dy == pytest.approx(metal.uniform_strain + most * share, rel=1e-9)
+    across = [float(metal.transverse(one)) for one in (metal.uniform_strain, 0.45)]
+    assert du_dx == pytest.approx(across[0] + (across[1] - across[0]) * share, rel=1e-9)

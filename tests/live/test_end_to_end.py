@@ -30,7 +30,7 @@ from live.run.live_run import LiveRun, run_live
 from live.run.outcome import Outcome
 from live.setup.devices import Rig
 from live.ui.terminal.screen import TerminalScreen
-from tests.live.replay.batch.running import until
+from tests.live.ui.waiting import until
 
 SIM = "sim:woven?lockstep=yes&seconds=3&fps=15&width=224&height=192&bits=12"
 SMALL = {
@@ -296,12 +296,7 @@ def test_an_armed_run_records_from_a_little_before_the_order_to_the_end_of_it(
     assert answers[4].startswith("ok: with ") and answers[8] == "ok"
     assert (answers[5], answers[9]) == ("no: recording already", "no: not recording")
     frame_counts = outcome.run_state.frame_counts
-    assert (
-        frame_counts.adds_up
-        and frame_counts.measured == 14 * 3
-        and 4 < frame_counts.recorded < 32
-        and not frame_counts.loss
-    )
+    assert frame_counts.adds_up and frame_counts.measured == 14 * 3 and not frame_counts.loss
     left = frame_counts.grabbed - frame_counts.recorded
     assert f"not recorded 0 and {left} on purpose; adds up" in frame_counts.line()
     session = str(folder / "session.h5")
@@ -310,7 +305,11 @@ def test_an_armed_run_records_from_a_little_before_the_order_to_the_end_of_it(
         assert main(["replay", session, *extra, "--out", str(again), "--no-view", "--no-rrd"]) == 0
     live, replayed = strains(folder), strains(again)
     rows = [list(live["time_s"]).index(t) for t in replayed["time_s"]]
-    assert rows == whole_bursts(session) and {4, 5, 6, 7} <= set(rows) < set(range(14))
+    # How far the camera is ahead of the orders depends on the machine, so the first and the last are not fixed.
+    assert rows == whole_bursts(session) == list(range(rows[0], rows[-1] + 1))
+    assert rows[0] > 0 and {4, 5, 6, 7} <= set(rows)
+    if mode == "bursts":
+        assert frame_counts.recorded == 4 + 3 * len(rows)
     np.testing.assert_allclose(
         replayed["eyy"], live["eyy"][rows], atol=2e-5
     )  # sigma is 2e-4; the start is another

@@ -10,8 +10,9 @@ from acquire.events import Event
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
 from live.pipeline.consumer import Consumer
-from live.pipeline.history import History, Thinned
+from live.pipeline.history import History
 from live.pipeline.measurement import Measurement, TimeStep
+from live.pipeline.queues import Thinned
 from live.pipeline.run_state import RunState
 from live.results.summary import StatusCard
 from live.ui.rerun.view import View

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from live.pipeline.history import Thinned
+from live.pipeline.queues import Thinned
 from live.pipeline.snapshot import Snapshot
 from live.ui.rerun.messages import (
     Row,

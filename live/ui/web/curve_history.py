@@ -6,7 +6,7 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
-from live.pipeline.history import Thinned
+from live.pipeline.queues import Thinned
 
 MAX_POINTS = 4000
 

@@ -102,6 +102,7 @@ GOLDEN = [
     Golden("hbm-aed", "decimals=2", b"-0012345", -123.45),
     Golden("hbm-aed", "nominal=200", b"+0500000,31,008", 100.0, None, True),
     Golden("hbm-aed", "nominal=200", b"+0500000,31,000", 100.0, None, False, UNSTABLE),
+    Golden("hbm-aed", "nominal=200", b"+0999999,31,001", NAN, None, None, OVER),
     Golden("hbm-aed", "nominal=200", b"+0999999,31,002", NAN, None, None, OVER),
     Golden("hbm-aed", "nominal=200", b"-0999999,31,004", NAN, None, None, UNDER),
     Golden("hbm-aed", "nominal=200", b"+0500000,008", 100.0, None, True),

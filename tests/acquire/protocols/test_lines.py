@@ -15,6 +15,7 @@ from acquire.load_sample import LoadFlag
 from acquire.protocols.lines import PRESETS, load_preset, parser_from
 from acquire.protocols.modbus import ModbusParser, crc16, frame
 from acquire.protocols.modbus_profile import load_profile, profile_from
+from acquire.protocols.units import newtons_per
 from tests.acquire.protocols.conversation import parser
 
 OWN = r"""
@@ -203,3 +204,27 @@ def test_profiles_of_ours_are_sound() -> None:
         load_profile("nobody")
     with pytest.raises(ConfigError, match="my-own"):
         load_profile("my-own.toml")
+
+
+@pytest.mark.parametrize(
+    ("unit", "newtons"),
+    [("mN", 1e-3), ("gf", 9.80665e-3), ("kp", 9.80665), ("ozf", 0.2780138509), ("klbf", 4448.2216153)],
+)
+def test_forces_in_newtons(unit: str, newtons: float) -> None:
+    assert newtons_per(unit) == newtons_per(unit.lower()) == pytest.approx(newtons, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("unit", "kg"),
+    [("g", 1e-3), ("mg", 1e-6), ("t", 1e3), ("lb", 0.45359237), ("lbs", 0.45359237), ("oz", 0.028349523125)],
+)
+def test_masses_weigh_as_under_standard_gravity(unit: str, kg: float) -> None:
+    assert newtons_per(unit, mass_reads_force=True) == pytest.approx(9.80665 * kg, rel=1e-9)
+    with pytest.raises(ConfigError, match=rf"1 {unit} is then"):
+        newtons_per(unit)
+
+
+@pytest.mark.parametrize("unit", ["MN", "MG"])
+def test_a_capital_m_is_milli_or_mega(unit: str) -> None:
+    with pytest.raises(ConfigError, match="milli or mega"):
+        newtons_per(unit, mass_reads_force=True)

@@ -6,7 +6,11 @@ import math
 
 import pytest
 
+from acquire.addresses import parse_address
 from acquire.load_sample import LoadFlag
+from acquire.protocols.base import Reading
+from acquire.serial_line.scaling import Scaling, TareZero
+from acquire.serial_line.settings import read_settings
 from tests.acquire.serial_line.fake_port import FakeLine
 
 FIRST = b"partial\r\n"
@@ -35,3 +39,39 @@ def test_beyond_the_capacity_there_is_no_force(value: bytes, flag: LoadFlag | No
     assert math.isnan(sample.force) == (flag is not None)
     assert (LoadFlag.OUT_OF_RANGE in sample.flags) == (flag is not None)
     assert flag is None or flag in sample.flags
+
+
+def seen(period_s: float, seconds: float, step_s: float = 0.0) -> TareZero:
+    """A still load of 10 N, until now (0 s); 30 N until ``step_s`` before that."""
+    zero = TareZero()
+    for k in range(round(seconds / period_s), -1, -1):
+        zero.saw(-k * period_s, 30.0 if -k * period_s < -step_s < 0 else 10.0)
+    return zero
+
+
+@pytest.mark.parametrize(
+    ("period_s", "step_s", "why"),
+    [
+        (0.0125, 0.6, ""),  # half a second counts
+        (0.0125, 0.4, "the load is not still"),
+        (0.5, 0.0, ""),  # of a slow device a few samples
+        (2.0, 0.0, "only 2 samples in the last 3.0 s"),
+    ],
+)
+def test_a_tare_looks_at_half_a_second_or_a_few_samples(period_s: float, step_s: float, why: str) -> None:
+    assert seen(period_s, 20.0, step_s).why_not(0.0).partition(":")[0] == why
+
+
+def test_a_tare_takes_the_mean_of_half_a_second() -> None:
+    zero = TareZero()
+    for t, gross in ((0.0, 100.0), (0.4, 10.0), (0.6, math.nan), (0.8, 14.0)):
+        zero.saw(t, gross)
+    assert zero.load() == 12.0
+
+
+def test_the_last_digit_is_the_smallest_that_the_display_has_shown() -> None:
+    """In newtons: a hundredth of a kilonewton, also while the value ends in a zero."""
+    scaling = Scaling(read_settings(parse_address("/dev/fake?unit=kN")), lambda level, text: None)
+    for value in (12.3, 12.25, 12.0):
+        scaling.sample(Reading(value, None, b"", 0), 0.0)
+    assert scaling.zero.step_N == pytest.approx(10.0)

@@ -88,6 +88,16 @@ def test_recover_makes_a_clean_copy(tmp_path: Path) -> None:
         recover(path)
 
 
+def test_the_folder_of_a_run_stands_for_its_session(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    run.mkdir()
+    with writer(run / "session.h5") as session:
+        session.write_frame(frame(0))
+    with Session.open(run) as read:
+        assert len(read) == 1
+    assert recover(run).path == run / "session.recovered.h5"
+
+
 def test_a_frame_that_cannot_be_read_becomes_a_counted_loss(tmp_path: Path) -> None:
     path = tmp_path / "session.h5"
     with writer(path) as session:
@@ -226,9 +236,24 @@ def test_a_folder_that_may_not_be_written(tmp_path: Path) -> None:
         writer(Path("/proc/session.h5"))
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("after_s", [0.0, 0.113, 0.351])
 def test_only_the_youngest_are_lost(tmp_path: Path, after_s: float) -> None:
     remains = kill_once(tmp_path, after_s, fps=100, size=256)
     # How long a flush waits for a core depends on the machine's load here; the script measures it.
     assert remains.oldest_missing_s < 0.2, remains
     assert remains.frames_found > (after_s - 0.2) * 100 * 0.8, remains
+
+
+def test_frames_without_a_time_are_lost_before_the_next_one(tmp_path: Path) -> None:
+    path = tmp_path / "session.h5"
+    with writer(path) as session:
+        for number in range(6):
+            session.write_frame(frame(number, lost_before=(0, 0, 4, 2, 0, 0)[number]))
+    with h5py.File(path, "r+") as file:
+        file["entry/frames/monotonic_s"][1:3] = math.nan
+    found = recover(path)
+    assert found.frames == 4
+    with Session.open(found.path) as back:
+        assert back.indices.tolist() == [5, 8, 9, 10]
+        assert [one.lost_before for one in back.frames()] == [0, 2 + 4 + 2, 0, 0]

@@ -14,11 +14,12 @@ from pathlib import Path
 import pytest
 
 from acquire.errors import Interrupted
+from acquire.system import signal_handler
 from analysis import PICTURE_KINDS, share_compiled
 from live import cli
 from live.setup.compiling import compile_ahead, progress_text
 from tests.bench.soak import children
-from tests.live.replay.batch.running import until
+from tests.live.ui.waiting import until
 
 ROOT = Path(__file__).parents[3]
 CAMERA = "sim:uniform?seconds=60&fps=20&width=160&height=128"
@@ -127,7 +128,9 @@ def test_whoever_handles_a_signal_hears_of_it(
 def test_ctrl_c_in_a_command_without_a_handler(monkeypatch: pytest.MonkeyPatch) -> None:
     """As ``demo`` and ``warm-up``: it says what is kept."""
     never_ending(monkeypatch)
-    with pytest.raises(Interrupted, match="what is compiled is kept"):
+    # Python's own handler: a shell that starts the tests in the background has SIGINT ignored.
+    handler = signal_handler(signal.default_int_handler, signal.SIGINT)
+    with handler, pytest.raises(Interrupted, match="what is compiled is kept"):
         compile_ahead(("uint8",), show=lambda text: os.kill(os.getpid(), signal.SIGINT))
 
 

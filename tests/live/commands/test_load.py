@@ -6,7 +6,6 @@ import argparse
 import io
 import socket
 import threading
-import time
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -31,7 +30,7 @@ from live.ui.rerun import view as viewer
 from live.ui.terminal.screen import TerminalScreen
 from tests.acquire.session.test_damage import abandoned
 from tests.live.made_up import CAMERA, START, make_grid
-from tests.live.replay.batch.running import until
+from tests.live.ui.waiting import LONG_S, until
 
 
 class Bench:
@@ -140,7 +139,7 @@ def test_the_simulated_rig_is_at_rest_before_a_run(
     moving = "sim:?seconds=4&hold=0.01"
     assert main(["load-check", "--load", moving, "--seconds", "1"]) == 0
     small = ["--roi", "all", "--zoi", "48", "--step", "48", "--reference-burst", "8"]
-    camera = "sim:uniform?seconds=2&hold=0.01&end=0.01&fps=50&width=320&height=256"
+    camera = "sim:uniform?lockstep=yes&seconds=2&hold=0.01&end=0.01&fps=50&width=320&height=256"
     assert main(["check", "--camera", camera, "--load", "sim:", *small]) == 0
     assert "LOOK" not in capsys.readouterr().out
 
@@ -168,12 +167,10 @@ def test_the_port_that_is_told_is_the_one_that_is_served(tmp_path: Path) -> None
         consumers = standard_consumers(TerminalScreen())(about, run_state)
         outputs = Outputs(consumers, run_state.loads, run_state.event_log, run_state.history)
         try:
-            end = time.monotonic() + 60
-            while run_state.health.view_port is None and time.monotonic() < end:
-                time.sleep(0.05)
+            until(lambda: run_state.health.view_port is not None)
             port = run_state.health.view_port
             assert port is not None and port != wanted
-            socket.create_connection(("127.0.0.1", port), 5).close()
+            socket.create_connection(("127.0.0.1", port), LONG_S).close()
         finally:
             outputs.end()
 

@@ -41,6 +41,11 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str]:
     return code, said
 
 
+def test_a_folder_that_is_not_there_is_refused_before_the_check(capsys: pytest.CaptureFixture[str]) -> None:
+    code, said = refused(capsys, "check", "--camera", "sim:", "--snapshot", "nowhere/x.png")
+    assert code == 2 and "nowhere/x.png: there is no folder nowhere; make it" in said
+
+
 LONG = "x" * 300
 OF_A_FILE = [
     ("replay", LONG),

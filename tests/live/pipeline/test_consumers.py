@@ -27,6 +27,7 @@ from live.ui.rerun.consumer import CardWriter, FiguresWriter, RerunConsumer
 from live.ui.web.page_consumer import PageConsumer
 from tests.live.fakes import frame
 from tests.live.made_up import START, make_loads, make_measurement
+from tests.live.ui.waiting import LONG_S
 
 
 class RecordingConsumer(Consumer):
@@ -42,7 +43,7 @@ class RecordingConsumer(Consumer):
 
     def measurement(self, measurement: Measurement) -> None:
         self.busy.set()
-        self.go.wait(10)
+        self.go.wait(LONG_S)
         if self.fails_at == len(self.rows):
             raise self.error
         self.rows.append(measurement.number)
@@ -87,7 +88,7 @@ def test_one_that_falls_behind_is_served_as_its_policy_says(policy: Policy, kept
     taker.go.clear()
     out, _ = outputs(taker)
     give(out, [0])
-    assert taker.busy.wait(10)  # it has the first one in hand
+    assert taker.busy.wait(LONG_S)  # it has the first one in hand
     give(out, range(1, 10))  # returns at once
     taker.go.set()
     out.end()
@@ -113,9 +114,9 @@ def test_one_that_puts_things_off_is_asked_when_nothing_comes() -> None:
     taker.go.clear()
     out.add(make_measurement(0))
     taker.go.set()
-    assert taker.busy.wait(10)
+    assert taker.busy.wait(LONG_S)
     taker.go.clear()
-    assert taker.go.wait(10)  # it was asked, although nothing came
+    assert taker.go.wait(LONG_S)  # it was asked, although nothing came
     out.end()
     assert taker.rows == [0]
 
@@ -126,11 +127,11 @@ def test_one_that_waits_holds_the_measurement_up_and_loses_nothing() -> None:
     out, _ = outputs(taker)
     giver = threading.Thread(target=give, args=(out, range(10)))
     giver.start()
-    assert taker.busy.wait(10)
+    assert taker.busy.wait(LONG_S)
     giver.join(0.2)
     assert giver.is_alive()
     taker.go.set()
-    giver.join(10)
+    giver.join(LONG_S)
     out.end()
     assert taker.rows == list(range(10))
 
@@ -169,9 +170,9 @@ def test_one_that_waits_and_fails_lets_the_measurement_go_on() -> None:
     out, _ = outputs(taker)
     giver = threading.Thread(target=give, args=(out, range(10)))
     giver.start()
-    assert taker.busy.wait(10)
+    assert taker.busy.wait(LONG_S)
     taker.go.set()
-    giver.join(10)
+    giver.join(LONG_S)
     assert not giver.is_alive()
     out.end()
 
@@ -181,7 +182,7 @@ def test_one_that_is_stuck_is_left_behind() -> None:
     taker.go.clear()
     out, _ = outputs(taker)
     give(out, [0])
-    assert taker.busy.wait(10)
+    assert taker.busy.wait(LONG_S)
     out.end()
     assert "left behind" in out.reports[0].line()
     taker.go.set()
@@ -198,7 +199,7 @@ class Listener(Consumer):
 
     def begin(self) -> None:
         self.begun.set()
-        self.go.wait(10)
+        self.go.wait(LONG_S)
 
     def frame(self, frame: Any) -> None:
         self.seen["frame"].append(frame.index)
@@ -217,7 +218,7 @@ def test_each_kind_reaches_those_who_define_it() -> None:
     listener, taker = Listener(), RecordingConsumer()
     loads = make_loads(10.0, lambda t: 100.0 * t)
     out, event_log = outputs(listener, taker, loads=loads)
-    assert listener.begun.wait(10)
+    assert listener.begun.wait(LONG_S)
     assert out.wants_frames
     assert not outputs(taker)[0].wants_frames
     give(out, [0, 1])

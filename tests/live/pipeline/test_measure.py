@@ -315,6 +315,23 @@ def test_what_goes_in_comes_out() -> None:
             history.time_steps[beyond]
 
 
+def test_numbers_of_hours_come_out_whether_they_change_or_not() -> None:
+    """In blocks of 1024, of which those without a change are kept as one number."""
+    history, axial = History(), {"axial": GaugeValue(0.25, 0.125)}
+    zeros = [0.0] * 1030 + [-0.0] * 10 + [7.25] * 2000
+    raw = [math.nan] * 2000 + [1.0] * 1040
+    for i, (zero, force) in enumerate(zip(zeros, raw, strict=True)):
+        history.add(replace(some(i), zero=zero, force_raw=force, gauges=axial if i >= 1500 else {}))
+    assert repr(history.column("zero").tolist()) == repr(zeros), "-0.0 is not 0.0"
+    assert np.array_equal(history.column("force_raw"), raw, equal_nan=True)
+    assert np.array_equal(history.column("t"), np.arange(3040) * 0.37)
+    for i in (0, 1023, 1024, 1035, 2999, -1):
+        step = history.time_steps[i]
+        assert repr((step.zero, step.force_raw)) == repr((zeros[i], raw[i]))
+        assert step.refused == f"{range(3040)[i] % 4} LOST"
+    assert [len(history.time_steps[i].gauges) for i in (0, 1499, 1500, 3039)] == [0, 0, 1, 1]
+
+
 def test_a_gauge_that_comes_and_goes() -> None:
     history, late = History(), {"late": GaugeValue(1.0, 0.125)}
     for gauges in ({}, late, {}):
@@ -341,9 +358,49 @@ def test_little_memory() -> None:
     assert grown < 250, "bytes an instant with two gauges"
 
 
+def test_numbers_that_do_not_change_take_no_memory() -> None:
+    history, still = History("y"), make_measurement(0).time_step
+    tracemalloc.start()
+    for i in range(20_480):
+        history.add(replace(still, t=1e-3 * i))
+    grown = tracemalloc.get_traced_memory()[0] / 20_480
+    tracemalloc.stop()
+    assert grown < 8 + 8, "bytes an instant: its time"
+
+
 def test_the_means_of_an_old_file_are_not_called_strains_of_the_region() -> None:
     """Before the extension had columns, exx and eyy were means of the gradients."""
     values = {"exx": np.zeros(3), "eyy": np.arange(3.0)}
     for old, words in ((True, "mean eyy"), (False, "eyy of the region")):
         held = values if old else values | {"extension_y": np.full(3, np.nan)}
         assert curve_of(held.get, (), "y", np.arange(3.0), np.zeros(3)).source == words
+
+
+class NoiseOfKernel:
+    """In place of a kernel: keeps the noise that it is given, loses every ZOI of the second burst, finds all others."""
+
+    def __init__(self, given: list[tuple[str, float | None]]) -> None:
+        self.given = given
+
+    def measure(self, image: np.ndarray, *, noise: float | None, **_: object) -> StrainField:
+        self.given.append(("measured", noise))
+        lost = len(self.given) == 2
+        return StrainField.from_values(GRID, {"u": math.nan if lost else 0.0}, 1e-3)
+
+    def renewed(self, image: np.ndarray, field: StrainField, *, noise: float | None) -> NoiseOfKernel:
+        self.given.append(("renewed", noise))
+        return self
+
+
+def test_every_picture_is_measured_and_renewed_with_the_noise_of_its_own_mean() -> None:
+    """A renewal that the pipeline makes by itself takes the burst before: that of one frame has more noise."""
+    given: list[tuple[str, float | None]] = []
+    told: list[Event] = []
+    tracker = Tracker(NoiseOfKernel(given), 2.0, 0.5, told.append)  # type: ignore[arg-type]
+    still = np.zeros(SHAPE)
+    tracker.measure(burst(still, 0, 4))
+    tracker.measure(burst(still, 1, 16))
+    assert given == [("measured", 1.0), ("measured", 0.5), ("renewed", 1.0), ("measured", 0.5)]
+    tracker.renew_on_demand(burst(still, 2, 64))
+    assert given[4:] == [("measured", 0.25), ("renewed", 0.25)]
+    assert [event.data["n"] for event in told] == [4, 64]

@@ -191,3 +191,13 @@ def bent(load: float, kappa: float, nu: float = 0.3) -> StrainField:
 )
 def test_load_bending_and_shift_are_no_motion_off_the_plane(one: StrainField) -> None:
     assert not warned(one)
+
+
+def test_a_tilt_is_named_where_neither_load_nor_noise_may_have_made_it() -> None:
+    """It rises by 250 um/m; a load makes exx and eyy differ by less, or by more, and the noise may be as much."""
+    tilt = Optics(500.0, settling=PlaneMotion(0.0, math.radians(0.2)))
+    tilted = seen_by(tilt)
+    for load, named in ((1e-4, True), (4e-4, False)):
+        loaded = replace(tilted, parameters=tilted.parameters + bent(load, 0.0).parameters)
+        assert bool(warned(loaded)) == named, load
+    assert not warned(seen_by(tilt, sigma=0.3))

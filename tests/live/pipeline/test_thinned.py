@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from live.pipeline.history import Thinned
+from live.pipeline.queues import Thinned
 
 
 @given(size=st.integers(2, 30), count=st.integers(0, 500))

@@ -25,15 +25,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquire.burst import BurstAccumulator
-from acquire.frame import Burst, Frame, frozen
+from acquire.clock import ClockPair
+from acquire.frame import Burst, CameraInfo, Frame, frozen
+from acquire.load_cell import LoadLog
 from acquire.session import Session
 from analysis import numerics
 from live.cli import main
+from live.config.loading import Config, load_config
 from live.pipeline.measure import Tracker
+from live.pipeline.screen import Screen
 from live.replay.burst_index import burst_ends, index_of_frames
-from live.replay.source import prefetch
+from live.replay.opening import prepare_replay
+from live.replay.source import ReplaySource, prefetch
 from live.results import Strain
-from tests.live.ui.waiting import until
+from live.setup.region import FirstLook
+from tests.live.ui.waiting import LONG_S, until
 
 
 def test_the_same_items_in_order() -> None:
@@ -53,7 +59,7 @@ def test_they_are_taken_while_one_is_worked_on_but_no_more_than_there_is_room() 
 
     bursts = prefetch(items(), queue_size=3)
     assert next(bursts) == 0
-    assert waiting.wait(10), "nothing was read ahead"
+    assert waiting.wait(LONG_S), "nothing was read ahead"
     assert max(taken) <= 5
     bursts.close()
 
@@ -267,3 +273,26 @@ def test_times_are_those_of_the_bursts(recorded: Path) -> None:
         places, accumulator = index_of_frames(session, 2, 3), BurstAccumulator(3)
         bursts = [burst for frame in session.frames(3) if (burst := accumulator.add(frame))]
     assert places.t.tolist() == [burst.t for burst in bursts]
+
+
+@pytest.mark.parametrize(
+    ("n", "noise", "of_mean"), [(16, 2.0, 0.5), (1, math.nan, None), (4, 0.0, None), (4, 0.01, 12**-0.5 / 2)]
+)
+def test_a_specimen_is_looked_for_with_the_noise_of_the_mean_of_its_reference(
+    monkeypatch: pytest.MonkeyPatch, n: int, noise: float, of_mean: float | None
+) -> None:
+    class Seen(Exception):
+        """What ends the preparation."""
+
+    def look(_config: Config, first: FirstLook, _print: object) -> None:
+        raise Seen(first.noise)
+
+    monkeypatch.setattr("live.replay.opening.located_on", look)
+    image = frozen(np.zeros((64, 64), np.float32))
+    reference = Burst(image, n, noise, frozen(image > 0), 8, 0.0, 0.0, 0, n - 1, 0, "nominal")
+    camera = CameraInfo("files:", "files", 64, 64, 8, live=False, clock="nominal")
+    source = ReplaySource(camera, reference, [], LoadLog(), ClockPair.now())
+    config = load_config(None, {"camera.address": "files:", "measure.roi": "auto"})
+    with pytest.raises(Seen) as seen:
+        prepare_replay(source, config, "a test", Screen())
+    assert seen.value.args == (pytest.approx(of_mean) if of_mean else None,)

@@ -28,6 +28,12 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return recorded(tmp_path_factory.mktemp("study"), "hole")
 
 
+@pytest.fixture
+def no_browser(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures without PNG, which take a second of a browser."""
+    monkeypatch.setattr(saving, "find_browser", lambda: None)
+
+
 def rows(out: Path) -> list[dict[str, float]]:
     lines = (out / "study.csv").read_text(encoding="utf-8").splitlines()
     return [{k: float(v) for k, v in row.items() if k != "window"} for row in csv.DictReader(lines)]
@@ -46,9 +52,12 @@ def test_of_a_hole(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     printed = capsys.readouterr().out
     assert f"take {chosen.zoi} px ZOIs, step {chosen.step}" in printed
     assert chosen.zoi < 64
-    assert {path.name for path in (out / "figures").glob("*.svg")} == {"noise.svg", "strain.svg"}
+    kinds = (".svg", ".png") if saving.find_browser() else (".svg",)
+    for kind in kinds:
+        assert {path.stem for path in (out / "figures").glob(f"*{kind}")} == {"noise", "strain"}
 
 
+@pytest.mark.usefixtures("no_browser")
 def test_windows_given_and_missing(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["study", str(session), "--zoi", "48", "--roi", "all", "--out", str(tmp_path / "a")]
     assert main([*words, "--static", "0,2", "--loaded", "5,5.9"]) == 0
@@ -81,6 +90,7 @@ def test_a_browser_that_does_not_work_costs_the_png_alone(
     assert {path.suffix for path in (out / "figures").iterdir()} == {".svg", ".csv"}
 
 
+@pytest.mark.usefixtures("no_browser")
 def test_without_a_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     session = recorded(tmp_path, "uniform", "none:")
     words = ["study", str(session), "--zoi", "32,64", "--roi", "all", "--out", str(tmp_path / "a")]
@@ -90,6 +100,7 @@ def test_without_a_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert "take 64 px ZOIs" in capsys.readouterr().out  # the strain is even
 
 
+@pytest.mark.usefixtures("no_browser")
 def test_nothing_was_still(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The predicted noise stands in the place of the measured one."""
     out = tmp_path / "study"
@@ -102,6 +113,7 @@ def test_nothing_was_still(session: Path, tmp_path: Path, capsys: pytest.Capture
 
 
 @pytest.mark.data
+@pytest.mark.usefixtures("no_browser")
 def test_the_open_hole(data_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What docs/scale.md says of it; its pictures 04 and 07, which are elastic."""
     shots = f"files:{data_dir}/dic_challenge_1_sample12_ohtcfrp/oht_cfrp_*.tiff"

@@ -17,7 +17,7 @@ from live.pipeline.history import History
 from live.pipeline.run_state import FrameCounts, RunState
 from live.results.budget import CameraView, budget_cells, budget_rows
 from live.results.figures import alignment_line, budget_of, elastic_lines, evaluate, figure_lines, lag_line
-from live.results.summary import summary_lines
+from live.results.summary import latency_lines, noise_line, summary_lines
 from tests.analysis.curves import Truth, composite, noisy, ramberg_osgood
 from tests.live.made_up import START, make_measurement
 
@@ -197,3 +197,25 @@ def test_any_section_gives_an_area() -> None:
     assert SpecimenConfig(diameter_mm=10.0).area_m2 == pytest.approx(np.pi / 4 * 1e-4)
     assert SpecimenConfig(area_mm2=7.0, width_mm=1.0, thickness_mm=1.0).area_m2 == pytest.approx(7e-6)
     assert SpecimenConfig(width_mm=1.0).area_m2 is None
+
+
+def test_noise_and_latency_of_a_run_are_the_usual_ones_in_the_units_of_the_line() -> None:
+    """Medians: one burst that took long, or was noisy, is not the noise of the run."""
+    history, one = History(), make_measurement(0).time_step
+    for k in range(21):
+        odd = 50.0 if k == 20 else 1.0
+        history.add(
+            replace(
+                one, noise_GL=2.5 * odd, zoi_sigma=30e-6 * odd, sigma_eyy=4e-6 * odd, latency_s=0.04 + 1e-3 * k,
+                measure_s=12e-3 * odd,
+            )
+        )  # fmt: skip
+    assert noise_line(history) == (
+        "noise: one frame 2.5 GL, strain of one ZOI 30 µm/m, of the region 4 µm/m (predicted, 1 sigma)"
+    )
+    assert latency_lines(history) == [
+        "latency from the last frame of a burst: p50 50 ms, p95 59 ms, largest 60 ms; the kernel took 12.0 ms"
+    ]
+    replayed = History()
+    replayed.add(replace(one, latency_s=math.nan))
+    assert latency_lines(replayed) == []

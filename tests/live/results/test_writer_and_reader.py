@@ -27,6 +27,7 @@ from live.results.layout import MAPS, PLAIN_MAPS
 from live.results.row import StrainRow, maps_of
 from live.results.strain_csv import COLUMNS
 from live.results.strain_h5 import FLUSH_S, StrainWriter, rounded
+from tests.acquire.session.fixtures import writer
 from tests.clock import Clock
 from tests.live.made_up import CAMERA, START, make_grid, make_measurement
 
@@ -47,6 +48,24 @@ def open_results(folder: Path, **more: Any) -> Results:
 def rows_of(path: Path) -> list[dict[str, str]]:
     with path.open() as file:
         return list(csv.DictReader(file))
+
+
+def test_the_last_piece_of_each_column_stays_in_memory(tmp_path: Path) -> None:
+    """HDF5 reads a piece that is larger than its cache from the disk again for each row."""
+    writer(tmp_path / "session.h5").close()
+    open_results(tmp_path).close()
+    sizes = {}
+    for path in (tmp_path / "session.h5", tmp_path / "strain.h5"):
+        with h5py.File(path) as file:
+            datasets: list[h5py.Dataset] = []
+            file.visititems(lambda _, item, found=datasets: found.append(item))  # type: ignore[misc]
+            sizes |= {
+                f"{path.stem} {one.name}": one.chunks[0] * one.dtype.itemsize
+                for one in datasets
+                if isinstance(one, h5py.Dataset) and one.chunks and one.ndim == 1
+            }
+    assert len(sizes) > 50
+    assert max(sizes.values()) <= child.CACHE_BYTES, sizes
 
 
 def test_what_was_written_comes_back(tmp_path: Path) -> None:
@@ -344,6 +363,7 @@ for k in itertools.count():
 """
 
 
+@pytest.mark.timed
 def test_a_killed_writer_leaves_what_is_older_than_its_last_flush(tmp_path: Path) -> None:
     command = [sys.executable, "-c", WRITER, str(tmp_path)]
     with subprocess.Popen(
@@ -420,3 +440,19 @@ def test_unknown_maps_and_rows_are_refused(tmp_path: Path) -> None:
             strain.maps("ezz")
         with pytest.raises(DataError, match="no row 1"):
             strain.maps("exx", 1)
+
+
+@pytest.mark.parametrize(
+    ("measure", "strain"),
+    [("small", 0.02), ("engineering", 0.02), ("green", 0.0202), ("hencky", math.log(1.02))],
+)
+def test_true_strain_and_stress_are_those_of_the_stretch_in_any_measure(measure: Any, strain: float) -> None:
+    """Where no strips show the elongation, the stretch follows from the strain of the region."""
+    m = make_measurement(0, 0.02, force=3000.0)
+    step = dataclasses.replace(m.time_step, extension_y=math.nan, exx=0.0, eyy=strain)
+    field = dataclasses.replace(m.field, measure=measure)
+    info = dataclasses.replace(INFO, strain_measure=measure, area_m2=20e-6)
+    values = StrainRow.of(dataclasses.replace(m, field=field, time_step=step), info).values
+    assert values["stress_Pa"] == pytest.approx(150e6)
+    assert values["true_strain"] == pytest.approx(math.log(1.02), rel=1e-9)
+    assert values["true_stress_Pa"] == pytest.approx(153e6, rel=1e-9)

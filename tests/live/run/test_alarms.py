@@ -30,6 +30,7 @@ from live.ui.terminal.screen import TerminalScreen
 from tests.live.run.test_strain_output import Listener, free_port, read
 from tests.live.run.test_tcp_lines import Caller
 from tests.live.test_end_to_end import live_run
+from tests.live.ui.waiting import LONG_S
 
 
 def changes(alarm: Alarm, *values: float) -> list[bool]:
@@ -310,7 +311,7 @@ def test_a_test_with_all_that_there_is(tmp_path: Path) -> None:
         outcome = live_run(folder, CAMERA, each=order, **more)
         first = json.loads(udp.recv(1000))
     controls.close()
-    listeners[0].join(5)
+    listeners[0].join(LONG_S)
     got = [said for _, said in listeners[0].got]
     assert len(got) > 40 and first["gauge_axial"] is not None
     assert json.loads(read(serial, 1)[0])["frame"] == first["frame"]

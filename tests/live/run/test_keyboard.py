@@ -103,7 +103,7 @@ def test_a_true_terminal_gives_single_keys_and_is_put_back_as_it_was() -> None:
     child, master = pty.fork()
     if child == 0:
         os.execv(sys.executable, [sys.executable, "-c", program])
-    got, until = b"", time.monotonic() + 30
+    got, until = b"", time.monotonic() + LONG_S
     sent = False
     while b"CALLS" not in got or not got.endswith(b"\n"):
         assert time.monotonic() < until, got
@@ -141,7 +141,7 @@ def test_a_terminal_gives_single_keys_again_after_ctrl_z() -> None:
     os.waitpid(child, os.WUNTRACED)
     termios.tcsetattr(master, termios.TCSANOW, lines)
     os.kill(child, signal.SIGCONT)
-    until = time.monotonic() + 30
+    until = time.monotonic() + LONG_S
     while has_lines(master):
         assert time.monotonic() < until
         time.sleep(0.02)
@@ -158,7 +158,7 @@ def has_lines(master: int) -> bool:
 
 def wait_for(master: int, words: bytes) -> None:
     """Wait for the output ``words``."""
-    got, until = b"", time.monotonic() + 30
+    got, until = b"", time.monotonic() + LONG_S
     while words not in got:
         assert time.monotonic() < until, got
         if select.select([master], [], [], 0.2)[0]:

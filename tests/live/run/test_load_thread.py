@@ -12,6 +12,7 @@ from acquire.load_sample import LoadSample
 from live.pipeline.consumer_thread import Outputs
 from live.pipeline.run_state import RunState
 from live.run.load_thread import LoadThread
+from tests.live.ui.waiting import LONG_S
 
 
 class SilentCell(NoLoadCell):
@@ -27,7 +28,7 @@ class SilentCell(NoLoadCell):
             yield LoadSample(self._now[0], 1.0)
         self.silent.set()
         if not self._ends:
-            self._stopped.wait(10)
+            self._stopped.wait(LONG_S)
 
     def stop(self) -> None:
         self._stopped.set()
@@ -47,7 +48,7 @@ def test_samples_that_are_missing_at_the_end(
         cell, run_state, Outputs([], run_state.loads, run_state.event_log, run_state.history), None
     )
     thread.start()
-    assert cell.silent.wait(10)
+    assert cell.silent.wait(LONG_S)
     if ends:
         thread.join()
     now[0] += silent_s

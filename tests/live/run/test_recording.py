@@ -34,7 +34,7 @@ class FakeWriter:
         self.go.set()
 
     def write_frame(self, item: Any) -> int:
-        self.go.wait(10)
+        self.go.wait(LONG_S)
         if self._fails_at is not None and len(self.frames) >= self._fails_at:
             raise self._error
         self.frames.append(item.index)

@@ -108,7 +108,7 @@ def test_to_any_number_of_clients() -> None:
 def test_by_udp() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.bind(("127.0.0.1", 0))
-        listener.settimeout(5)
+        listener.settimeout(LONG_S)
         out = UdpOut("127.0.0.1", listener.getsockname()[1], LineFormat(readings(), ("frame",), "json"))
         out.measurement(make_measurement(1))
         assert listener.recv(100) == b'{"frame":8}\n'
@@ -185,10 +185,10 @@ def test_from_the_stamp_of_the_frame_to_the_read_of_the_client(tmp_path: Path) -
         if not listeners:
             listeners.extend([Listener(port), Caller(port, receive_buffer=2048)])
 
-    real = "sim:uniform?seconds=4&fps=20&width=224&height=192&bits=12"
+    real = "sim:uniform?seconds=3&fps=20&width=224&height=192&bits=12"
     outcome = live_run(tmp_path / "run", real, each=note, **{"measure.burst": 1, "strain_out.tcp": str(port)})
     good, stalled = listeners
-    good.join(5)
+    good.join(LONG_S)
     stalled.close()
     late = [at - stamps[said["frame"]] for at, said in good.got]
     assert len(late) > 0.9 * len(stamps) > 30

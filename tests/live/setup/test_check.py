@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -62,6 +63,8 @@ def test_a_bad_picture_is_not(
     message: str,
 ) -> None:
     monkeypatch.setattr("live.setup.check.sample.at_rest", lambda address: address)
+    if not arguments:  # the table of other sizes and bursts tells nothing of the picture
+        monkeypatch.setattr("live.setup.check.check_list.SIZES", ())
     code, output = checked(capsys, more, *arguments)
     assert code == 6, output
     assert message in output
@@ -166,6 +169,18 @@ def test_the_snapshot_and_the_gauges(capsys: pytest.CaptureFixture[str], tmp_pat
     assert (cv2.imread(str(tmp_path / "red.png")) == np.array(POOR)).all(axis=2).sum() > 500
     assert main(["check", "--camera", STILL, "--snapshot", str(shot)]) == 2
     assert "nothing is overwritten" in capsys.readouterr().err
+
+
+def test_both_cameras_are_checked(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """NO-GO where one of them is not ready, with the picture of each."""
+    drawn = str(tmp_path / "seen.png")
+    dark = STILL.replace("?", "?contrast=2&")
+    code, output = checked(capsys, "", "--back", dark, "--snapshot", drawn)
+    assert code == 6 and "NO-GO" in output
+    front, back = output.split(f"back: {dark}")
+    assert f"front: {STILL}" in front and "LOOK" not in front and "LOOK" in back
+    assert {path.name for path in tmp_path.glob("*.png")} == {"seen-front.png", "seen-back.png"}
+    assert checked(capsys, "", "--back", STILL)[0] == 0
 
 
 def test_a_gauge_beside_the_specimen_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -380,3 +395,83 @@ def test_automatic_controls_by_name_and_value() -> None:
     }
     found = automatic_controls(controls)
     assert found == ("auto_exposure", "white_balance_automatic", "exposure_dynamic_framerate")
+
+
+def test_the_noise_of_each_zoi_is_that_of_a_burst_of_the_test() -> None:
+    """Half of the frames against the other half is scaled to reference and burst of the test, as in the table."""
+    found = figures("&bits=12&noise=1", zoi=48)
+    assert found.floor is not None
+    one = found.floor.of(found.burst)
+    assert one is not None
+    assert np.nanmedian(found.zois.sigma) == pytest.approx(one.predicted, rel=0.1)
+
+
+@pytest.fixture(scope="module")
+def whole(taken: FrameStack) -> CheckFigures:
+    """Figures of a good picture."""
+    config = Config()
+    return examine(taken, replace(config, measure=replace(config.measure, zoi=48)), table=False)
+
+
+def with_exposure(figures: CheckFigures, **values: float) -> CheckFigures:
+    return replace(figures, exposure=replace(figures.exposure, **values))
+
+
+def with_still(figures: CheckFigures, name: str, **values: float) -> CheckFigures:
+    series = replace(getattr(figures.still, name), **values)
+    return replace(figures, still=replace(figures.still, **{name: series}))
+
+
+def with_drift(figures: CheckFigures, exx: float, eyy: float) -> CheckFigures:
+    return with_still(with_still(figures, "exx", drift=exx, noise=0.0), "eyy", drift=eyy, noise=0.0)
+
+
+LIMITS: dict[str, tuple[str, Callable[[CheckFigures, float], CheckFigures], float, float]] = {
+    "light": ("light", lambda f, value: with_exposure(f, high=value), 0.31, 0.29),
+    "saturation": ("saturated pixels", lambda f, value: with_exposure(f, saturated=value), 0.9e-4, 1.1e-4),
+    "flicker": ("flicker", lambda f, value: with_still(f, "light", rms=value), 0.009, 0.011),
+    "drift of the light": ("flicker", lambda f, value: with_still(f, "light", drift=-value), 0.009, 0.011),
+    "contrast": (
+        "contrast (std)",
+        lambda f, value: replace(f, zois=replace(f.zois, contrast=0 * f.zois.contrast + value * 255)),
+        0.051,
+        0.049,
+    ),
+    "gradients": (
+        "SSSIG of a ZOI",
+        lambda f, value: replace(
+            f, zois=replace(f.zois, sssig=0 * f.zois.sssig + 2 * (f.noise / value) ** 2)
+        ),
+        0.049,
+        0.051,
+    ),
+    "drift": ("drift", lambda f, value: with_still(f, "u", drift=-value), 0.045, 0.055),
+    "distance": ("distance", lambda f, value: with_drift(f, -value, -value), 4.9e-5, 5.1e-5),
+    "vibration": ("vibration", lambda f, value: with_still(f, "v", rms=value, noise=0.0), 0.049, 0.051),
+    "noise": ("strain noise", lambda f, value: with_floor(f, value, value), 0.99e-3, 1.01e-3),
+    "noise over its prediction": (
+        "strain noise",
+        lambda f, value: with_floor(f, 1e-4, value),
+        1.4e-4,
+        1.6e-4,
+    ),
+}
+
+
+def with_floor(figures: CheckFigures, predicted: float, measured: float) -> CheckFigures:
+    assert figures.floor is not None
+    floor = replace(figures.floor, noises=(StrainNoise(figures.burst, predicted, measured),))
+    return replace(figures, floors=(floor,))
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_the_limits_of_a_check(whole: CheckFigures, name: str) -> None:
+    what, changed, good, bad = LIMITS[name]
+    for value, expected in ((good, True), (bad, False)):
+        (line,) = (line for line in check_lines(changed(whole, value)) if line.what == what)
+        assert line.good == expected, line.text()
+
+
+def test_strains_that_drift_apart_are_no_change_of_distance(whole: CheckFigures) -> None:
+    lines = check_lines(with_drift(whole, 4e-4, -4e-4))
+    assert "distance" not in [line.what for line in lines]

@@ -252,3 +252,10 @@ def test_a_narrow_specimen_has_no_width() -> None:
 def test_too_short_a_specimen_is_refused() -> None:
     with pytest.raises(ConfigError, match="1 rows of ZOIs lie along the load"):
         auto_gauges(ZoiGrid.cover(Roi(10, 10, 200, 36), 32, 8), "y")
+
+
+def test_the_noise_of_a_first_look_is_that_of_the_mean_of_its_frames() -> None:
+    """2 % of 255 GL in each of four frames: rounding adds next to nothing."""
+    config = load_config(None, {"camera.address": "sim:uniform?bits=8&noise=2&fps=100&hold=10&seconds=20"})
+    found = first_look(config, lambda text: None)
+    assert found.camera.live and found.noise == pytest.approx(0.02 * 255 / 2, rel=0.1)

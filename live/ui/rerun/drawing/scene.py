@@ -13,7 +13,7 @@ import numpy as np
 
 from acquire.events import Event, EventKind
 from analysis.field import Status
-from live.pipeline.history import Thinned
+from live.pipeline.queues import Thinned
 from live.pipeline.snapshot import Snapshot
 from live.results.maps.colours import MICROSTRAIN, number, ramp
 from live.results.maps.field_maps import FieldMaps, Painted

@@ -8,8 +8,7 @@ import json
 import os
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from unittest.mock import patch
@@ -19,6 +18,7 @@ import numpy as np
 
 from live.replay.batch import cluster
 from live.replay.batch.worker import NEEDED
+from tests.live.ui.waiting import until
 
 ROOT = Path(__file__).parents[4]
 
@@ -49,13 +49,6 @@ def differing(one: Path, other: Path) -> set[str]:
     assert first.keys() == second.keys()
     differ = {name for name in first if first[name].tobytes() != second[name].tobytes()}
     return differ - {"entry/config", "entry/mean/kernel_s", "entry/versions"}
-
-
-def until(true: Callable[[], bool], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end, "it did not come to that"
-        time.sleep(0.01)
 
 
 def started(*words: object) -> subprocess.Popen[bytes]:

@@ -26,7 +26,8 @@ from live.replay.batch.test_list import find_tests
 from live.results import strain_h5
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.replay.batch.conftest import SETTINGS
-from tests.live.replay.batch.running import datasets, differing, is_gone, parts, pid_of, rows, started, until
+from tests.live.replay.batch.running import datasets, differing, is_gone, parts, pid_of, rows, started
+from tests.live.ui.waiting import until
 
 ROOT = Path(__file__).parents[4]
 
@@ -84,10 +85,8 @@ def test_a_full_disk_is_a_line_of_each_test(runs: Path, tmp_path: Path, limit: i
 
 @pytest.mark.parametrize("name", ["uniform-1", "hole-2", "woven-4"])
 def test_bit_equal_to_a_replay(runs: Path, done: Path, tmp_path: Path, name: str) -> None:
-    """In a process of its own: this one may have compiled loops for other tests, with another last digit."""
     words = ["replay", str(runs / name / "session.h5"), *SETTINGS, "--no-view", "--no-rrd"]
-    command = [sys.executable, "-m", "live.cli", *words, "--out", str(tmp_path / "alone")]
-    subprocess.run(command, check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
+    assert main([*words, "--out", str(tmp_path / "alone")]) == 0
     assert not differing(done / name / "strain.h5", tmp_path / "alone" / "strain.h5")
 
 

@@ -18,7 +18,8 @@ from live.cli import main
 from live.results import Strain
 from tests.live.made_run import session_writer
 from tests.live.made_up import START, make_frame
-from tests.live.replay.batch.running import is_gone, parts, pid_of, rows, started, until
+from tests.live.replay.batch.running import is_gone, parts, pid_of, rows, started
+from tests.live.ui.waiting import until
 
 SETTINGS = ["--zoi", "48", "--step", "16"]
 CHUNK = ["--chunk", "10", "--workers", "2"]

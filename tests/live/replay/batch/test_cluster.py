@@ -33,8 +33,8 @@ from tests.live.replay.batch.running import (
     rows,
     running,
     started,
-    until,
 )
+from tests.live.ui.waiting import until
 
 pytestmark = pytest.mark.slow
 

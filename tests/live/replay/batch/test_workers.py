@@ -18,6 +18,7 @@ from live.replay.batch.test_list import find_tests
 from live.replay.batch.worker_processes import Pool, WorkerProcess, WorkerProcesses
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.replay.batch.running import is_gone
+from tests.live.ui.waiting import LONG_S
 
 
 class Counted(WorkerProcesses):
@@ -145,7 +146,7 @@ def test_no_worker_can_be_started_any_more(tmp_path: Path, caplog: pytest.LogCap
     rows: list[BatchRow] = []
     tasks = [Task(str(k), str(tmp_path), "nothing.h5", key="key") for k in range(3)]
     pool = Pool(tasks, 2, lambda task, progress: None, lambda task, row: rows.append(row) or (), Empty(0))
-    assert pool.wait(10.0)
+    assert pool.wait(LONG_S)
     assert len(rows) == 3
     assert all("memory enough" in str(row.values["error"]) for row in rows)
     assert "too many" in caplog.text

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
+import math
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import cv2
@@ -12,7 +15,9 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
+from acquire.load_sample import LoadSample
 from live.cli import main
+from live.results.export.tables import load_table
 from live.results.quantities import Display
 from live.results.run_folder import open_run
 from tests.live.results.export import vti
@@ -39,12 +44,15 @@ def test_long_table(run_dir: Path, tmp_path: Path) -> None:
     with open_run(run_dir) as run:
         active = run.strain.grid.active
         eyy, v = (run.strain.maps(name)[:, active].ravel() for name in ("eyy", "v"))
-        y = run.strain.grid.y[np.nonzero(active)[0]]
+        rows, places = np.nonzero(active)
+        x, y = run.strain.grid.x[places], run.strain.grid.y[rows]
         force = run.force
     n = int(active.sum())
     np.testing.assert_allclose(columns["eyy_percent"], 100 * eyy, rtol=1e-6)
     np.testing.assert_allclose(columns["v_mm"], -SCALE * v, rtol=1e-6, equal_nan=True)
     np.testing.assert_allclose(columns["y_mm"][:n], -SCALE * y)
+    np.testing.assert_allclose(columns["x_mm"][:n], SCALE * x)
+    np.testing.assert_array_equal([columns["row"][:n], columns["column"][:n]], [rows, places])
     np.testing.assert_allclose(columns["force_N"], np.repeat(force, n))
     assert set(columns["status"]) == {0, 7}
     for name in columns:
@@ -207,3 +215,12 @@ def test_xarray(run_dir: Path) -> None:
         np.testing.assert_array_equal(data["y"], -run.strain.grid.y)
         np.testing.assert_array_equal(data["force"], run.force)
         np.testing.assert_allclose(data["mean_eyy"], 100 * run.strain.values["eyy"])
+
+
+def test_a_table_of_loads_counts_from_the_start_of_the_test() -> None:
+    run, file = SimpleNamespace(start_monotonic=100.0), io.StringIO()
+    load_table(run, [LoadSample(100.5, 12.5), LoadSample(101.25, math.nan)], file)  # type: ignore[arg-type]
+    heads, *rows = csv.reader(io.StringIO(file.getvalue()))
+    assert heads == ["time_s", "force_N"]
+    (half, known), (later, unknown) = ([float(cell) for cell in row] for row in rows)
+    assert (half, known, later) == (0.5, 12.5, 1.25) and math.isnan(unknown)

@@ -12,9 +12,12 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from acquire.frame import CameraInfo
+from analysis.evaluate import NoiseFloor
 from live.cli import main
 from live.commands import report as command
 from live.results.report.page import Html, safe
+from live.results.report.practice import PracticeValues, reporting_table
 from live.results.report.report import ReportRequest, make_report
 from live.results.report.saving import find_browser
 from live.results.report.svg import MAX_POINTS, Plot, PlotLine, draw
@@ -264,3 +267,13 @@ def test_words_are_escaped_once() -> None:
     assert safe("<&") == "&lt;&amp;"
     assert safe(safe("<")) == "&lt;"
     assert isinstance(safe("<"), Html)
+
+
+def test_the_reporting_table_has_the_camera_in_the_units_it_names(run_dir: Path) -> None:
+    camera = CameraInfo("v4l2:", "a camera", 1280, 960, 12, True, "device", fps=25.0, exposure_s=0.008)
+    with open_run(run_dir) as run:
+        floors = {"u": NoiseFloor(0.004, 0.005), "exx": NoiseFloor(40e-6, 50e-6)}
+        text = re.sub("<[^>]*>", "|", reporting_table(PracticeValues(run, camera, None, floors, 0.05)))
+    for shown in ("1280 x 960 px, 12 bits", "64 x 48 mm", "0.05 mm/px", "25 frames/s", "8 ms"):
+        assert f"|{shown}|" in text, shown
+    assert "|u 0.004 px (1 standard deviation" in text and "|exx 40 µm/m (1 standard deviation" in text

@@ -29,8 +29,8 @@ from live.ui.rerun.drawing.shapes import (
     thinned,
     with_heads,
 )
-from live.ui.rerun.drawing.sinks import Rates, RerunSink
-from live.ui.rerun.messages import PictureMessage, ViewSetup, row_of
+from live.ui.rerun.drawing.sinks import Rates, RerunSink, write
+from live.ui.rerun.messages import PictureMessage, ViewSetup, ViewTarget, row_of
 from tests.live.made_up import START, make_field, make_frame, make_grid, make_measurement
 
 
@@ -152,6 +152,20 @@ def test_what_a_server_forgets_is_sent_again(tmp_path: Path) -> None:
             times.update(part.to_record_batch().column("time").cast("int64").to_pylist())
     assert len(times) == 30
     assert max(times.values()) >= 2
+
+
+def test_a_file_of_a_minute_has_few_parts_of_a_curve(tmp_path: Path) -> None:
+    """The memory of rerun grows with each part of a file, and is not freed before its end."""
+    path, setup = tmp_path / "view.rrd", make_setup()
+    scene = ViewScene([write(setup, ViewTarget(None, str(path), "a-test"))], setup)
+    scene.begin()
+    for k in range(600):
+        scene.means([(START + 0.1 * k, *(1e-6 * k, 1e-5) * 3)])
+        scene.loads([(START + 0.1 * k, 1.0 * k)])
+    scene.end()
+    parts = Counter(str(part.entity_path) for part in chunk.RrdReader(path).stream() if not part.is_static)
+    assert 1 <= parts["/strain/exx"] <= 7 and 1 <= parts["/load/force"] <= 7
+    assert rows_in(path)["/strain/exx"] == 601, "with its style"
 
 
 def test_what_does_not_change_is_not_drawn_again(tmp_path: Path) -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 import socket
 import struct
-import time
 from urllib.parse import urlsplit
+
+from tests.live.ui.waiting import LONG_S
 
 
 class HttpPage:
@@ -25,7 +26,7 @@ class HttpPage:
     def _opened(self) -> socket.socket:
         opened = socket.socket()
         opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)  # soon full
-        opened.settimeout(10)
+        opened.settimeout(LONG_S)
         opened.connect(("127.0.0.1", self.port))
         return opened
 
@@ -37,12 +38,12 @@ class HttpPage:
             one.sendall(self._request(path, cookie))
             return one.recv(4096).decode()
 
-    def read_for(self, seconds: float) -> int:
-        """Number of bytes read in this time."""
-        end, got = time.monotonic() + seconds, 0
-        while time.monotonic() < end:
-            got += len(self.socket.recv(2**16))
-        return got
+    def read(self, size: int) -> None:
+        """Read at least ``size`` bytes."""
+        while size > 0:
+            piece = self.socket.recv(2**16)
+            assert piece, f"it closes the connection {size} bytes too early"
+            size -= len(piece)
 
     def read_all(self) -> None:
         """Read until the server closes the connection, and keep nothing."""

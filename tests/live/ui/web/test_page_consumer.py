@@ -16,6 +16,7 @@ import pytest
 
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
+from analysis import StrainField
 from analysis.evaluate import GAUGE_KINDS, GaugeValue
 from live.config.loading import Config, load_config
 from live.pipeline.consumer import Consumer
@@ -25,8 +26,9 @@ from live.pipeline.run_state import RunState
 from live.results.maps.field_maps import FIELD_MAPS
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.curve_history import MAX_POINTS, CurveHistory
-from live.ui.web.map_view import plate_shapes
+from live.ui.web.map_view import MapView, plate_shapes
 from live.ui.web.page_consumer import PageConsumer, elongation_length
+from live.ui.web.painting import shrunk, traffic_light
 from tests.live.made_up import make_frame, make_measurement
 from tests.live.ui.waiting import until
 from tests.live.ui.web.sentences import (
@@ -237,6 +239,20 @@ def test_the_value_at_a_place_of_the_map(config: Config) -> None:
     assert consumer.map.value_at(-500, -500)["value"] is None
 
 
+def test_the_value_is_that_of_the_zoi_that_has_moved_to_the_place(config: Config) -> None:
+    m = measurement()
+    grid = m.field.grid
+    x, y = np.meshgrid(grid.x, grid.y)
+    field = StrainField.from_values(grid, {"dv_dy": 1e-5 * x + 3e-7 * y}, 1e-5)
+    view = MapView(config)
+    view.draw(replace(m, field=field, time_step=replace(m.time_step, u=20.0, v=-13.0)))
+    for row, column in ((1, 2), (3, 4)):
+        found = view.value_at(grid.x[column] + 20.0 + 5, grid.y[row] - 13.0 - 5)
+        assert found["value"] == pytest.approx(1e-5 * grid.x[column] + 3e-7 * grid.y[row])
+    for off, there in ((7.9, True), (8.1, False)):  # half a step beyond the last centre
+        assert (view.value_at(grid.x[-1] + 20.0 + off, grid.y[2] - 13.0)["value"] is not None) == there
+
+
 def test_a_recording_shows_figures_of_one_instant(config: Config) -> None:
     """Its load samples come far ahead of its pictures: the newest force is of another instant."""
     broadcaster, run = Broadcaster(), Run(config)
@@ -333,3 +349,20 @@ def test_plates_are_drawn_beside_the_gauges_and_cannot_be_dragged() -> None:
     consumer.measurement(measurement())
     consumer.idle()
     assert set(consumer.state()["picture"]["gauges"]) == {"axial", "plate left"}
+
+
+def test_the_noise_of_zois_from_green_over_yellow_to_red() -> None:
+    """By its logarithm: yellow is at the geometric mean of the two limits."""
+    noise = np.array([0.5e-4, 1e-4, 3e-4, 9e-4, 5e-3, np.nan])
+    colours = traffic_light(noise, 1e-4, 9e-4)
+    green, yellow, red = (40, 170, 80), (240, 200, 30), (220, 50, 40)
+    wanted = np.array([green, green, yellow, red, red, red])
+    assert np.abs(colours[:, :3].astype(int) - wanted).max() <= 1
+
+
+def test_a_large_picture_is_reduced_and_its_grey_levels_fill_those_of_the_screen() -> None:
+    image = np.full((600, 1920), 1023, np.uint16)
+    image[:, 960:] = 512
+    picture, scale = shrunk(image, 10)
+    assert (picture.shape, scale) == ((300, 960, 3), 0.5)
+    assert (picture[:, :470] == 255).all() and (picture[:, 490:] == 127).all()

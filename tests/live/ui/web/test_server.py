@@ -203,7 +203,7 @@ def test_a_frozen_page_delays_nothing() -> None:
 
 def connected(page: PageServer, text: bytes) -> socket.socket:
     """A connection that has sent this."""
-    opened = socket.create_connection(("127.0.0.1", page.guard.port), timeout=5)
+    opened = socket.create_connection(("127.0.0.1", page.guard.port), timeout=LONG_S)
     opened.sendall(text)
     return opened
 
