@@ -316,3 +316,11 @@ def test_mean_strain_and_sharpness_of_compressed_pictures() -> None:
     means = [field.mean(name) for name in ("exx", "eyy")]
     assert all(abs(mean) < 3 * sigma for mean, sigma in means)
     assert abs(mean_blur(field).px) < 0.2
+
+
+@pytest.mark.parametrize("stated", [None, 2.0])
+def test_half_of_the_noise_is_that_of_the_reference(stated: float | None) -> None:
+    """Where both pictures have the same, whether it is stated or not; so much of it all later fields have in common."""
+    field = PhaseKernel(picture(2.0, 1), GRID, noise=stated).measure(picture(2.0, 2, **MOTION), noise=stated)
+    of_reference = field.covariance_reference[0][field.ok] / field.covariance[0][field.ok]
+    assert np.median(of_reference) == pytest.approx(0.5, abs=0.05)

@@ -108,6 +108,12 @@ def test_a_twentieth_of_the_weight_may_be_clipped(share: float, status: Status) 
     assert kernel.measure(picture(), clipped=saturated(share)).status[5, 6] == status
 
 
+@pytest.mark.parametrize(("share", "status"), [(0.045, Status.OK), (0.08, Status.CLIPPED)])
+def test_a_twentieth_of_the_weight_may_be_clipped_in_the_reference(share: float, status: Status) -> None:
+    kernel = PhaseKernel(picture(), GRID, noise=4.0, clipped=saturated(share))
+    assert kernel.measure(picture()).status[5, 6] == status
+
+
 def test_clipping_is_looked_up_where_the_zoi_is_now() -> None:
     """The specimen has moved by a window to the right; a glare stays where it was."""
     kernel, image = PhaseKernel(picture(), GRID, noise=4.0), picture(u=32.0)

@@ -11,10 +11,13 @@ import cv2
 import numpy as np
 import pytest
 
+from acquire.errors import DataError
+from acquire.frame import CameraInfo
 from acquire.session import Session
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
+from live.replay.pictures import reference_from
 from live.replay.replay import replay
 from live.replay.source import ReplayRequest
 from live.results import Strain
@@ -210,3 +213,15 @@ def test_automatic_gauges_that_do_not_fit_another_grid_are_left_out(
     assert gauges == {"gauge_axial", "gauge_mine"}
     assert main(["replay", session, *coarse, "--config", str(rig), *words, str(tmp_path / "mine")]) == 2
     assert "gauges.area: no ZOI is there" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("top", "fits"), [(1023, True), (1024, False)])
+def test_a_reference_has_no_more_than_the_bits_of_the_pictures(tmp_path: Path, top: int, fits: bool) -> None:
+    camera = CameraInfo("files:", "files", 4, 2, 10, live=False, clock="nominal")
+    path, image = tmp_path / "a.png", np.array([[0, 5, 6, 7], [8, 9, 10, top]], np.uint16)
+    cv2.imwrite(str(path), image)
+    if fits:
+        assert np.array_equal(reference_from(str(path), camera).mean, image)
+        return
+    with pytest.raises(DataError, match="16-bit samples up to 1024, the pictures have 10 bits"):
+        reference_from(str(path), camera)

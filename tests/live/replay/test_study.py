@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import csv
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from acquire.errors import ConfigError
+from analysis import Roi, StrainField, ZoiGrid
 from live.cli import main
 from live.config.loading import load_config
-from live.replay.study import StudyResult, StudySetting, recommended
+from live.replay.study import StudyResult, StudySetting, _found, recommended
 from live.results.report import saving
 
 SIZE = "lockstep=yes&seconds=6&fps=10&width=320&height=288&bits=12&hole=24&hold=2&end=1"
@@ -161,3 +164,19 @@ def test_the_knee() -> None:
     assert "smallest tried" in recommended(tried[1:2] + tried[3:]).why
     with pytest.raises(ConfigError, match="above its noise"):
         recommended(tried[:1])
+
+
+def test_the_largest_strain_and_its_uncertainty_are_those_of_the_other_half_of_the_bursts() -> None:
+    """Its place is found in one half of them, its value read in the other: a mean of three less one of two."""
+    grid, rng = ZoiGrid.cover(Roi(0, 0, 160, 128), 32, 16), np.random.default_rng(4)
+    peak = np.where((grid.x == grid.x[3]) & (grid.y == grid.y[2])[:, None], 5e-3, 1e-3)
+
+    def fields(count: int, strain: np.ndarray) -> list[StrainField]:
+        noise = rng.normal(0, 1e-4, (count, *grid.shape))
+        return [StrainField.from_values(grid, {"dv_dy": strain + one}, 1e-4) for one in noise]
+
+    result = _found(StudySetting(32, 16, 1, "gaussian"), "y", fields(4, 0 * peak), fields(6, peak))
+    assert result.noise == pytest.approx(1e-4, rel=0.15) and result.predicted == pytest.approx(1e-4)
+    assert result.sigma == pytest.approx(result.noise * math.sqrt(1 / 3 + 1 / 2))
+    assert result.seen == pytest.approx(5e-3, abs=4 * result.sigma)
+    assert result.gradient == pytest.approx(4e-3 / 16, rel=0.1)

@@ -21,10 +21,12 @@ import pytest
 from acquire.errors import DataError
 from acquire.hdf5 import damage as child
 from analysis import Roi, ZoiGrid
+from analysis.field import PAIR_INDEX
 from live.pipeline.measurement import Measurement
 from live.results import Results, ResultsInfo, Strain
 from live.results.layout import MAPS, PLAIN_MAPS
 from live.results.row import StrainRow, maps_of
+from live.results.stored_fields import read_field
 from live.results.strain_csv import COLUMNS
 from live.results.strain_h5 import FLUSH_S, StrainWriter, rounded
 from tests.acquire.session.fixtures import writer
@@ -456,3 +458,16 @@ def test_true_strain_and_stress_are_those_of_the_stretch_in_any_measure(measure:
     assert values["stress_Pa"] == pytest.approx(150e6)
     assert values["true_strain"] == pytest.approx(math.log(1.02), rel=1e-9)
     assert values["true_stress_Pa"] == pytest.approx(153e6, rel=1e-9)
+
+
+def test_the_uncertainty_of_the_shear_comes_back_with_that_of_its_two_gradients(tmp_path: Path) -> None:
+    """In the file are three standard deviations; what two gradients have in common follows from them."""
+    m = make_measurement(0)
+    covariance = np.array(m.field.covariance)
+    covariance[PAIR_INDEX[2, 4]] = 0.6e-10  # of du_dy and dv_dx, each with 1e-5
+    with open_results(tmp_path) as results:
+        results.add(dataclasses.replace(m, field=dataclasses.replace(m.field, covariance=covariance)))
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        field = read_field(strain, 0)
+    assert field.covariance[PAIR_INDEX[2, 4]][field.ok] == pytest.approx(0.6e-10, rel=0.01)
+    assert field.sigma_exy[field.ok] == pytest.approx(math.sqrt(2e-10 + 1.2e-10) / 2, rel=1e-3)
