@@ -14,7 +14,7 @@ from typing import TextIO
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.printable import brief, printable
 from live.commands.arguments import Command, parse
-from live.commands.environment import check_environment
+from live.commands.environment import check_environment, limit_threads
 from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.signals import ended_by_sigterm
 from live.commands.streams import nonblocking_streams
@@ -24,10 +24,8 @@ _WRONG_PATH = {errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    # Read when numpy is loaded. Its matrices are small: a second thread of OpenBLAS mostly spins, and keeps the camera
-    # and the recording from their cores. Preparing a reference of 5 megapixels took 2.2 s of processor time, now 1.0.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _replace_closed_streams()
+    limit_threads()
     try:
         with ended_by_sigterm():
             command, arguments = parse(sys.argv[1:] if argv is None else argv)

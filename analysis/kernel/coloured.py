@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from analysis.field.picture_error import Cause
 from analysis.fit.validity import AGREES
 from analysis.kernel.lines import inner, left_by_fit, lines_along, some, zois_of
-from analysis.kernel.prepared import PreparedReference
+from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.solve import Solution
 from analysis.kernel.white_noise import halves
 from analysis.picture.blocks import BLOCKS, blockiness
@@ -164,14 +164,16 @@ def coloured_bias(solution: Solution, own: OwnError) -> tuple[Floats, Floats]:
     return moved, step[:, -3] + step[:, -2]
 
 
-def own_error(ready: PreparedReference, which: Places, left: Pixels, cause: Cause, share: float) -> OwnError:
+def own_error(
+    reference: ReferencePicture, which: Places, left: Pixels, cause: Cause, share: float
+) -> OwnError:
     """The part of the error that is the reference's.
 
     The filter that makes f shows in the cross spectrum of f and the reference as it was recorded.
 
     Parameters
     ----------
-    ready : PreparedReference
+    reference : ReferencePicture
     which, left : (N,), (N, n, n), GL
         Some ZOIs, and what the fits leave of them.
     cause : str
@@ -182,7 +184,7 @@ def own_error(ready: PreparedReference, which: Places, left: Pixels, cause: Caus
     size = left.shape[1]
     window, often = _window(size), halves(size)
     of_left = _spectra(left, window)
-    level, raw = (_spectra(zois_of(ready.images[k], ready.origins[which], size), window) for k in (2, 3))
+    level, raw = _recorded(reference, which)
     power, recorded = (np.mean(np.abs(spectra) ** 2, axis=0) * often for spectra in (of_left, raw))
     shared, passed = (np.mean((of * raw.conj()).real, axis=0) * often for of in (-of_left, level))
     response = passed / recorded
@@ -219,16 +221,35 @@ def _of_reference(power: Floats, shared: Floats, passed: Floats, weight: Floats,
     return float(np.clip((gain * seen - both * seen_gain) / determinant, 0, 1))
 
 
-def by_frequency(solution: Solution, ok: NDArray[np.bool_]) -> Floats:
+def _recorded(reference: ReferencePicture, which: Places) -> NDArray[np.complex64]:
+    """Spectra of some ZOIs of the filtered pattern and of the reference as it was recorded, (2, N, n, n // 2 + 1).
+
+    The last ones are remembered: as a rule these ZOIs are the same in every picture.
+    """
+    ready, kept, key = reference.prepared, reference.kept, which.tobytes()
+    found = kept.get(key)  # another thread may measure with this reference
+    if found is None:
+        size, at = reference.grid.size, ready.origins[which]
+        found = np.stack([_spectra(zois_of(ready.images[k], at, size), _window(size)) for k in (2, 3)])
+        kept.clear()
+        kept[key] = found
+    return found
+
+
+def left_of_some(solution: Solution, ok: NDArray[np.bool_]) -> tuple[Places, Pixels]:
+    """As many of the ZOIs ``ok`` (A,) as spectra need, (N,), and what the fits leave of them, (N, n, n)."""
+    which = some(ok, SPECTRA // solution.reference.grid.size**2)
+    return which, left_by_fit(solution, which)
+
+
+def by_frequency(reference: ReferencePicture, left: Pixels) -> Floats:
     """Variance of u, its gradients, v and its over that which the shapes of third degree have by the same error, (6,).
 
-    By the spectrum of what the fits leave.
+    By the spectrum of what the fits leave of some ZOIs, (N, n, n).
     """
-    size = solution.reference.grid.size
-    left = _without_planes(left_by_fit(solution, some(ok, SPECTRA // size**2)))
-    window = _window(size)
-    power = np.mean(np.abs(_spectra(left, window)) ** 2, axis=0)
-    seen = np.sum(solution.reference.response * power, axis=(1, 2))
+    window = _window(reference.grid.size)
+    power = np.mean(np.abs(_spectra(_without_planes(left), window)) ** 2, axis=0)
+    seen = np.sum(reference.response * power, axis=(1, 2))
     return np.asarray(seen[:6] / seen[6:].repeat(3))
 
 

@@ -5,7 +5,7 @@ The first is made by ``ReferencePicture.first``, one that goes on from a later p
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,6 +83,8 @@ class ReferencePicture:
         Whether it had wild pixels, which were replaced; later pictures are then cleaned, too.
     period : (A,) float64, px
         Smallest displacement at which a ZOI looks like itself (``repeating.periods``); infinite: none.
+    kept : dict
+        By ZOIs, spectra of what they recorded (``coloured``).
     """
 
     grid: ZoiGrid
@@ -105,6 +107,7 @@ class ReferencePicture:
     response: Floats
     cleaned: bool
     period: Floats
+    kept: dict[bytes, NDArray[np.complex64]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def first(

@@ -15,14 +15,13 @@ from analysis.fit.validity import AGREES, COLOURED
 from analysis.follow.renewal import UNSHARED, Placement
 from analysis.kernel.coloured import (
     SOME_BLUR,
-    SPECTRA,
     beside_strain,
     by_frequency,
     coloured_bias,
     error_cause,
+    left_of_some,
     own_error,
 )
-from analysis.kernel.lines import left_by_fit, some
 from analysis.kernel.solve import Solution
 
 Floats = NDArray[np.float64]
@@ -48,6 +47,7 @@ class _Noise(NamedTuple):
 
     ``colour`` (6,) is the variance of u, its gradients, v and its over that of white noise, ``seen`` (2,) that of u and
     v as the shapes show it, ``over`` the standard deviation of both images over that as given, NaN where not found.
+    ``left`` is what the fits leave of some ZOIs (``left_of_some``); None: not looked at.
     """
 
     reference: Floats
@@ -55,6 +55,7 @@ class _Noise(NamedTuple):
     colour: Floats
     over: float
     seen: Floats
+    left: tuple[NDArray[np.intp], NDArray[np.float32]] | None = None
 
     def share(self, gain: Floats, ok: NDArray[np.bool_]) -> float:
         """What of the variance is the reference's, median of some ZOIs."""
@@ -132,13 +133,12 @@ def _corrected(
     error = PictureError(noise.over, (float(noise.colour[0]), float(noise.colour[3])))
     if not solution.had_lines and noise.over * float(noise.seen.max()) ** 0.5 <= LIMIT:
         return error, p, growth, none
-    which = some(ok, SPECTRA // reference.grid.size**2)
-    left = left_by_fit(solution, which)
+    which, left = noise.left or left_of_some(solution, ok)
     error = replace(error, cause="bands" if solution.had_lines else error_cause(solution, ok, left))
     if reference.sensors is not None:
         return error, p, growth, none
     share = noise.share(found.nuisance[:, 0], ok)
-    own = own_error(reference.prepared, which, left, error.cause, share)
+    own = own_error(reference, which, left, error.cause, share)
     moved, sharper = coloured_bias(solution, own)
     return error, p + moved, growth + sharper, own.attenuation
 
@@ -158,7 +158,7 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     if common is None or solution.retried or np.count_nonzero(ok) < FEW_REFUSED * len(ok):
         common = solution.pooled(np.flatnonzero(ok))
     if common is not None:
-        seen, colour, ratio = common.colour, common.colour.repeat(3), common.ratio
+        seen, colour, ratio, some_left = common.colour, common.colour.repeat(3), common.ratio, None
         over = common.usual if ok.all() else float(np.median(ratio[ok]))
         doubtful = max(colour.max(), over) > DOUBTFUL and not (common.apart or solution.had_lines)
         rest = beside_strain(solution, ok) if doubtful else None
@@ -170,9 +170,11 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
             # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
             colour = np.maximum(colour, 1)
         elif np.abs(np.log(seen)).max() > np.log(COLOURED):
-            colour = colour * by_frequency(solution, ok)
+            some_left = left_of_some(solution, ok)
+            colour = colour * by_frequency(solution.reference, some_left[1])
         whole = ratio * solution.expected(np.s_[:], gain)
-        return _Noise(*_parted(whole, reference * gain**2, gain, solution), colour, math.sqrt(over), seen)
+        parts = _parted(whole, reference * gain**2, gain, solution)
+        return _Noise(*parts, colour, math.sqrt(over), seen, some_left)
     if solution.noise is not None or not ok.any():
         return _Noise(reference, current, white, float("nan"), white[:2])
     left = solution.found.left / solution.reference.prepared.freedom

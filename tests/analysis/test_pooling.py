@@ -10,6 +10,7 @@ from analysis import KernelSettings, PhaseKernel, Roi, Status, StrainField, ZoiG
 from analysis.field import mean_blur
 from analysis.fit.kernel_args import CONVERGED, OutArgs, ReferenceArgs
 from analysis.fit.pooling import pooled
+from analysis.kernel import coloured
 from analysis.kernel.coloured import own_error
 from analysis.kernel.images import as_image, as_recorded, rounding_variance
 from analysis.kernel.lines import left_by_fit
@@ -253,6 +254,24 @@ def test_hot_pixels_that_stand_still_do_not_pull() -> None:
     assert np.sqrt(np.mean((field.u - MOTION["u"])[field.ok] ** 2)) < 0.02
 
 
+def test_spectra_of_the_reference_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the ZOIs that were looked at last: they are the same in the next picture, and no value depends on it."""
+    images = [picture(5, k, **MOTION) for k in (2, 3)]  # all ZOIs have values
+    calls: list[int] = []
+    spectra = coloured._spectra
+    monkeypatch.setattr(coloured, "_spectra", lambda *given: calls.append(1) or spectra(*given))
+    kernel, fields, counts = PhaseKernel(picture(1, 0), GRID, noise=1.0), [], []
+    for image in images:
+        fields.append(kernel.measure(image, noise=1.0))
+        counts.append(len(calls))
+        calls.clear()
+    alone = PhaseKernel(picture(1, 0), GRID, noise=1.0).measure(images[1], noise=1.0)
+    assert alone.picture is not None and alone.picture.cause
+    np.testing.assert_array_equal(fields[1].parameters, alone.parameters)
+    np.testing.assert_array_equal(fields[1].covariance, alone.covariance)
+    assert counts[0] - counts[1] == 2 and len(kernel.reference.kept) == 1
+
+
 def test_blocks_are_seen_wherever_they_begin() -> None:
     raw = picture(1, 1)
     assert blockiness(raw) < 1.1
@@ -331,7 +350,7 @@ def test_grainy_noise_of_the_reference_is_no_pattern(later: float) -> None:
     image = as_recorded(grainy(later, 1, 2), "")
     solution = Solution(made, image, None, np.zeros((GRID.n_active, 6)))
     which = np.arange(GRID.n_active)
-    own = own_error(made.prepared, which, left_by_fit(solution, which), "filter", 0.5)
+    own = own_error(made, which, left_by_fit(solution, which), "filter", 0.5)
     clean = 255 * Speckle(3.0, 1, span=400).at(*affine(SHAPE))
     for k, seen in enumerate(own.attenuation):
         found, true = made.prepared.images[k, : SHAPE[0], : SHAPE[1]], np.gradient(clean, axis=1 - k)

@@ -1,7 +1,8 @@
 """The benchmark, ``make bench``; it stops with advice where OpenCV does not work."""
 
-import live  # noqa: F401 - what it sets in the environment, before numpy is loaded
+from live.commands.environment import limit_threads
 
+limit_threads()  # as the program does, before numpy is loaded
 try:
     import cv2
 
