@@ -32,15 +32,18 @@ demo: $(VENV)/base
 
 # Side by side, a file a process; tests in real time then one after another, with the machine to themselves.
 PARALLEL := -n auto --dist loadfile
+TIMED     = $(shell grep -rl mark.timed tests --include='test_*.py')
+# Modules are compiled once for all processes of the tests, also where Python is told to keep nothing.
+test test-all newest lowest: export PYTHONDONTWRITEBYTECODE =
 
 test: $(VENV)/test
 	@$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not timed"
-	@$(BIN)/python -m pytest -m "timed and not slow"
+	@$(BIN)/python -m pytest $(TIMED) -m "timed and not slow"
 
 # And those that take long.
 test-all: test
 	@$(BIN)/python -m pytest $(PARALLEL) -m "slow and not timed"
-	@$(BIN)/python -m pytest -m "slow and timed"
+	@$(BIN)/python -m pytest $(TIMED) -m "slow and timed"
 
 lint: $(VENV)/dev
 	@$(BIN)/ruff check .
@@ -72,14 +75,14 @@ newest:
 	@rm -rf $(VENV)-$@ && $(PYTHON) -m venv $(VENV)-$@
 	@$(VENV)-$@/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
 	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest $(PARALLEL) -m "not timed"
-	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest -m timed
+	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest $(TIMED) -m timed
 
 lowest:
 	@rm -rf $(VENV)-$@ && $(PYTHON) -m venv $(VENV)-$@
 	@$(VENV)-$@/bin/python -m pip install --quiet --disable-pip-version-check uv
 	@$(VENV)-$@/bin/uv pip install --quiet --python $(VENV)-$@/bin/python --resolution lowest-direct --editable '.[test]'
 	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest $(PARALLEL) -m "not timed"
-	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest -m timed
+	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest $(TIMED) -m timed
 
 # After make newest has passed: its versions are those of demo and test from then on.
 constraints:

@@ -56,6 +56,9 @@ less has the same picture before it."""
 MANY_STEPS, SLOW_SIGMA = 8, 0.065
 """A fit that took so many steps, where u or v is more uncertain than this (px), has been led along an edge of the
 specimen or through clutter (seen on a polymer bar and an open hole; a pattern takes one to five)."""
+CORNER_STEPS, CORNER_SIGMA, CORNER_VARIANCE = 6, 0.1, 10.0
+"""The same where u and v are more certain than this (px), but vary as many times more than those of a ZOI with nothing
+else to find: a small one on the corner of a box (speckles of 3 px radius in ZOIs of 12 px: 0.4 % of them)."""
 MIN_GAIN, MAX_GAIN = 0.2, 5.0
 PATTERN_OVER_NOISE = 3.0
 """Gradient energy of a ZOI over that of filtered noise alone; less is no pattern."""
@@ -71,8 +74,9 @@ INFORMATION_OVER_NOISE = 1.4
 QUIETER = 2.0
 """Standard deviations that a ZOI must leave less than expected for its noise to be taken as less."""
 SHOWN_SHARE = 0.5
-"""Variance of a ZOI as it was recorded over that of its filtered pattern: with less, what is in it was spread there by
-the filter."""
+"""Mean square difference of pixels of a ZOI as it was recorded over that of the gradients of its filtered pattern: with
+less along x or y, what is in it was spread there by the filter. The noise of the picture is not taken off first: where
+it is dark it has less."""
 CLIPPED_SHARE = 0.05
 """Share of the window weight on clipped pixels from which on a ZOI is refused."""
 

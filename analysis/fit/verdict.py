@@ -17,6 +17,9 @@ from analysis.fit.validity import (
     BENDING_SHARE,
     CHANCE,
     COLOURED,
+    CORNER_SIGMA,
+    CORNER_STEPS,
+    CORNER_VARIANCE,
     EMPTY_SHARES,
     EMPTY_SIGMA,
     INFORMATION_OVER_NOISE,
@@ -116,8 +119,14 @@ def _is_noise(known: Any, z: int, left: Any, expected: Any) -> Any:
 
 @inlined
 def _slow(found: Any, z: int, known: Any, variance: Any) -> Any:
-    """Whether a weak pattern was followed in so many small steps that it may have been led away."""
-    return found.iterations[z] >= MANY_STEPS and known.centre[z] * math.sqrt(variance) > SLOW_SIGMA
+    """Whether a fit took so many small steps that it may have been led away: along a weak pattern, or by a corner.
+
+    A corner looks alike at every scale; its fit is slow although it is certain.
+    """
+    sigma, steps = known.centre[z] * math.sqrt(variance), found.iterations[z]
+    if steps >= MANY_STEPS and sigma > SLOW_SIGMA:
+        return True
+    return steps >= CORNER_STEPS and sigma < CORNER_SIGMA and _beyond(known, z, CORNER_VARIANCE) > 1
 
 
 @inlined

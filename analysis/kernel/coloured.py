@@ -41,6 +41,8 @@ EXPLAINED, MIN_CORNER = 0.5, 0.01
 known."""
 BOTH_ALIKE = "compression"
 """Cause that spoils the reference as much as the picture. Its error goes with the pattern, which hides whose it is."""
+MIN_PATTERN = 0.2
+"""Share of the gradients of a reference that is pattern, at least."""
 MIN_APART = 0.1
 """Share of the spectrum of the error that must be unlike that of the pattern to show which picture has the error."""
 
@@ -199,7 +201,7 @@ def own_error(
     return OwnError(
         errors * (1, -1, -1) / (scale * size**2),
         share * float(np.sum(power / often * weight) / np.sum(weight) / scale),
-        (patterns - errors)[1:] / squares[1:],
+        np.clip((patterns - errors)[1:] / squares[1:], MIN_PATTERN, 1),
     )
 
 

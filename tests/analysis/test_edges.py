@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 
-from analysis import PhaseKernel, Roi, Status, ZoiGrid
+from analysis import KernelSettings, PhaseKernel, Roi, Status, ZoiGrid
 from analysis.fit.kernel_args import CONVERGED, OutArgs, PooledError, ReferenceArgs, VerdictArgs
 from analysis.fit.validity import information
 from analysis.fit.verdict import judge
@@ -84,4 +86,39 @@ def test_a_fit_that_follows_the_noise_of_the_reference(
     )
     rule = VerdictArgs(True, np.array([1.5, 0.5]), 5.0, 0.05, 4.0)
     judge(found, left * one, one, PooledError.none(1), known, rule, out)
+    assert Status(int(out[0])) == status
+
+
+@pytest.mark.parametrize("size", [12, 16, 20, 24])
+@pytest.mark.parametrize("order", [1, 2])
+def test_small_zois_on_a_sharp_box_are_right_or_have_no_value(size: int, order: Literal[1, 2]) -> None:
+    """Beside an edge, only what the filter made has a gradient along it."""
+    grid = ZoiGrid.cover(Roi(8, 8, 304, 304), size, 6)
+    kernel = PhaseKernel(np.rint(box(0.0, 0.0)).astype(np.uint8), grid, KernelSettings(order=order))
+    for motion in (0.0, 3.3):
+        field = kernel.measure(np.rint(box(motion, 0.0)).astype(np.uint8))
+        off = np.hypot(field.u - motion, field.v - motion / 2)
+        assert not (field.ok & (off > 0.1)).any()
+
+
+@pytest.mark.parametrize(
+    ("steps", "sigma", "beyond", "status"),
+    [
+        (6, 0.05, 11.0, Status.NOT_CONVERGED),
+        (5, 0.05, 11.0, Status.OK),
+        (6, 0.05, 9.0, Status.OK),
+        (6, 0.12, 11.0, Status.OK),  # a weak pattern takes its time
+        (8, 0.12, 1.0, Status.NOT_CONVERGED),
+    ],
+)
+def test_a_slow_fit_that_seems_certain_is_on_a_corner(
+    steps: int, sigma: float, beyond: float, status: Status
+) -> None:
+    found, out, one = OutArgs.starting(np.zeros((1, 6))), np.empty(1, np.uint8), np.ones(1)
+    found.left[:], found.bending[:], found.nuisance[:] = 1, 0, (1, 0, 0)
+    found.state[:], found.iterations[:] = CONVERGED, steps
+    unit = np.full((1, 2), sigma**2 / beyond)
+    known = ReferenceArgs(900 * one, 350 * one, unit, sigma * one, np.ones(2), 1.0, 100 * one)
+    rule = VerdictArgs(True, np.array([1.5, 0.5]), 5.0, 0.05, 2.5)
+    judge(found, one, one, PooledError.none(1), known, rule, out)
     assert Status(int(out[0])) == status

@@ -11,7 +11,11 @@ from analysis.field import mean_blur
 from analysis.fit.kernel_args import CONVERGED, OutArgs, ReferenceArgs
 from analysis.fit.pooling import pooled
 from analysis.kernel import coloured
-from analysis.kernel.images import rounding_variance
+from analysis.kernel.coloured import own_error
+from analysis.kernel.images import as_image, as_recorded, rounding_variance
+from analysis.kernel.lines import left_by_fit
+from analysis.kernel.reference import ReferencePicture
+from analysis.kernel.solve import Solution
 from analysis.kernel.white_noise import white_cubic
 from analysis.picture.blocks import BLOCKS, blockiness
 from analysis.picture.impulses import without_impulses
@@ -316,6 +320,42 @@ def test_mean_strain_and_sharpness_of_compressed_pictures() -> None:
     means = [field.mean(name) for name in ("exx", "eyy")]
     assert all(abs(mean) < 3 * sigma for mean, sigma in means)
     assert abs(mean_blur(field).px) < 0.2
+
+
+def grainy(noise: float, grain: float, seed: int, **motion: float) -> np.ndarray:
+    """A pattern of 3 px blobs with noise of grains of a size, px."""
+    rng = np.random.default_rng(seed)
+    added = cv2.GaussianBlur(rng.normal(0, 1, SHAPE), (0, 0), grain)
+    level = 128 + 255 * (Speckle(3.0, 1, span=400).at(*affine(SHAPE, **motion)) - 0.5)
+    level += noise * added / added.std() + rng.normal(0, 0.5, SHAPE)
+    return np.clip(np.rint(level), 0, 255).astype(np.uint8)
+
+
+def test_grainy_noise_of_the_later_picture_alone_is_not_taken_for_that_of_both() -> None:
+    kernel = PhaseKernel(grainy(0, 0.5, 1), GRID)
+    field = kernel.measure(grainy(12, 0.5, 2, **MOTION))
+    assert field.picture is not None and field.picture.cause == "filter"
+    for name in ("u", "v", "exx", "eyy"):
+        ratio = predicted_over_observed(field, name, MOTION.get(name, 0.0))
+        assert ratio == pytest.approx(1, abs=0.12)  # it was 0.6 to 0.75
+    mean, sigma = field.mean("exx")
+    assert abs(mean) < 3 * sigma  # it was 9
+
+
+@pytest.mark.parametrize("later", [0.0, 12.0])
+def test_grainy_noise_of_the_reference_is_no_pattern(later: float) -> None:
+    """Found: how much of the error is the reference's, and what it adds to the gradients that the fits rely on."""
+    first = grainy(12, 1, 1)
+    made = ReferencePicture.first(as_image(first, ""), GRID, KernelSettings(), None, None)
+    image = as_recorded(grainy(later, 1, 2), "")
+    solution = Solution(made, image, None, np.zeros((GRID.n_active, 6)))
+    which = np.arange(GRID.n_active)
+    own = own_error(made, which, left_by_fit(solution, which), "filter", 0.5)
+    clean = 255 * Speckle(3.0, 1, span=400).at(*affine(SHAPE))
+    for k, seen in enumerate(own.attenuation):
+        found, true = made.prepared.images[k, : SHAPE[0], : SHAPE[1]], np.gradient(clean, axis=1 - k)
+        assert seen == pytest.approx(np.mean(found * true) / np.mean(found**2), abs=0.1)
+    assert own.moments[0] == pytest.approx(12**2, rel=0.15)
 
 
 @pytest.mark.parametrize("stated", [None, 2.0])

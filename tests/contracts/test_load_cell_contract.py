@@ -180,14 +180,17 @@ def test_closing_twice_and_unentered(
 def test_tare_makes_the_load_zero_and_is_an_event(
     name: str, tmp_path: Path, stack: ExitStack, events: list[Event]
 ) -> None:
-    until = time.monotonic() + LONG_S
+    """Asked again where a busy machine has let too few samples through, and it was refused."""
+    until, asked = time.monotonic() + LONG_S, 0
     with opened(name, tmp_path, stack, events) as cell:
         for count, sample in enumerate(cell):
-            if count == 4:
-                cell.tare()
-            tared = count > 4 and abs(sample.force) < 6 and any(e.kind is EventKind.TARE for e in events)
-            if tared or time.monotonic() > until:
+            told = any(event.kind is EventKind.TARE for event in events)
+            if (told and abs(sample.force) < 6) or time.monotonic() > until:
                 break
+            refused = sum(event.data.get("tared") is False for event in events)
+            if count >= 4 and not told and asked == refused:
+                cell.tare()
+                asked += 1
     assert abs(sample.force) < 6
     assert [event.kind for event in events].count(EventKind.TARE) == 1
 

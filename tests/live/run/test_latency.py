@@ -70,5 +70,5 @@ print(len(os.listdir("/proc/self/task")))
     without = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
     done = subprocess.run(
         [sys.executable, "-c", code], env=without, capture_output=True, text=True, check=True
-    )  # fmt: skip
+    )
     assert done.stdout.split()[-1] == "1"

@@ -18,6 +18,7 @@ from typing import Any
 import pytest
 
 from live.results.report.saving import find_browser
+from tests.live.ui.waiting import LONG_S
 
 ROOT = Path(__file__).parents[4]
 FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
@@ -67,9 +68,9 @@ class Program:
             self.process.send_signal(signal.SIGCONT)
 
     def end(self) -> int:
-        """Wait for its end; kill it after 30 s."""
+        """Wait for its end; kill it after ``LONG_S``."""
         try:
-            self.output += self.process.communicate(timeout=30)[0]
+            self.output += self.process.communicate(timeout=LONG_S)[0]
         except subprocess.TimeoutExpired:
             self.kill()
         return self.process.returncode

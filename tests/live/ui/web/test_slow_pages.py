@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from live.config.loading import load_config
 from live.pipeline.consumer_thread import ConsumerThread
 from live.ui.web.broadcaster import MAX_PAGES
 from live.ui.web.page_controller import PageController
+from tests.live.ui.waiting import until
 from tests.live.ui.web.browser import Program
 from tests.live.ui.web.http_page import HttpPage
 from tests.live.ui.web.test_page_consumer import costs_of, measurement
@@ -93,11 +93,9 @@ def test_eight_pages_that_do_not_read_cost_under_a_millisecond_a_measurement() -
         pages = [HttpPage(controller.address) for _ in range(MAX_PAGES)]
         streams = list(controller._broadcaster._subscribers)
         controller._broadcaster.publish("large", "x" * 200_000)
-        until = time.monotonic() + 10
-        while not all(stream._waiting for stream in streams) and time.monotonic() < until:
-            time.sleep(0.05)
+        until(lambda: all(stream._waiting for stream in streams))  # they are blocked
         costs = costs_of(worker, m)
-        assert len(streams) == MAX_PAGES and all(stream._waiting for stream in streams), "they are blocked"
+        assert len(streams) == MAX_PAGES and all(stream._waiting for stream in streams)
         worker.end()
         for page in pages:
             page.kill()
