@@ -15,7 +15,8 @@ def limit_threads() -> None:
     """Give OpenBLAS one thread, where the environment gives no number; to be called before numpy is loaded.
 
     The matrices are small: a second thread mostly spins, and keeps the camera and the recording from their cores.
-    Preparing a reference of 5 megapixels took 2.2 s of processor time and takes 1.0 (November 2026).
+    Preparing a reference of 5 megapixels took 10 s beside busy programs and takes 4; alone 1.0 and 1.1, with a tenth
+    less of processor time (2 cores, November 2026).
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
