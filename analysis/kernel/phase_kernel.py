@@ -7,6 +7,8 @@ numbers for a ZOI depend on the two images, the settings and that ZOI's own star
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import replace
 
@@ -78,7 +80,7 @@ class PhaseKernel:
         image = as_image(reference, "the reference")
         made = ReferencePicture.first(image, grid, settings or KernelSettings(), noise, clipped)
         self.reference = replace(made, period=periods(made))
-        self._room = room_for(image.shape)
+        self._rooms = [room_for(image.shape)]
         check_machine(self.settings, grid.size)
 
     @property
@@ -179,17 +181,32 @@ class PhaseKernel:
             )
         model = None if noise is None else as_model(noise)
         saturated = clipped_pixels(image, clipped, model)
-        if start is None:
-            solution = Solution(reference, image, model, reference.searched(image), self._room)
+        with self._room() as room:
+            if start is None:
+                solution = Solution(reference, image, model, reference.searched(image), room)
+                mend(solution)
+                retry_lost(solution, None, saturated)
+                return field_of(solution)
+            before, carried = self._before(start), self._carried_motion(start)
+            predicted = before + carried.ahead
+            solution = Solution(reference, image, model, reference.local(predicted), room)
             mend(solution)
-            retry_lost(solution, None, saturated)
-            return field_of(solution)
-        before, carried = self._before(start), self._carried_motion(start)
-        predicted = before + carried.ahead
-        solution = Solution(reference, image, model, reference.local(predicted), self._room)
-        mend(solution)
-        retry_lost(solution, reference.local(before), saturated)
-        return field_of(solution, PredictedMotion(predicted, carried))
+            retry_lost(solution, reference.local(before), saturated)
+            return field_of(solution, PredictedMotion(predicted, carried))
+
+    @contextmanager
+    def _room(self) -> Iterator[NDArray[np.float32]]:
+        """Memory for the coefficients of one picture; another thread that measures meanwhile takes its own."""
+        from analysis.picture.prefilter import room_for
+
+        try:
+            room = self._rooms.pop()
+        except IndexError:
+            room = room_for(self.reference.prepared.shape)
+        try:
+            yield room
+        finally:
+            self._rooms.append(room)
 
     def _before(self, start: StrainField) -> Floats:
         """Parameters of the field before, (A, modes); NaN for a ZOI without."""
