@@ -277,6 +277,8 @@ class VerdictArgs(NamedTuple):
         What the displacement at the centre may be wrong by.
     far : float
         Of ``validity.CENTRE_VARIANCE``.
+    corner_steps : float
+        ``validity.CORNER_STEPS``; infinite for phases, whose fits take more.
     """
 
     noise_known: bool
@@ -284,6 +286,7 @@ class VerdictArgs(NamedTuple):
     lever: float
     limit: float
     far: float
+    corner_steps: float
 
 
 class ReferenceImages(NamedTuple):

@@ -56,7 +56,7 @@ less has the same picture before it."""
 MANY_STEPS, SLOW_SIGMA = 8, 0.065
 """A fit that took so many steps, where u or v is more uncertain than this (px), has been led along an edge of the
 specimen or through clutter (seen on a polymer bar and an open hole; a pattern takes one to five)."""
-CORNER_STEPS, CORNER_SIGMA, CORNER_VARIANCE = 6, 0.1, 10.0
+CORNER_STEPS, CORNER_SIGMA, CORNER_VARIANCE = 6.0, 0.1, 10.0
 """The same where u and v are more certain than this (px), but vary as many times more than those of a ZOI with nothing
 else to find: a small one on the corner of a box. Of speckles of 3 px radius in ZOIs of 12 px it refuses up to 0.7 %."""
 MIN_GAIN, MAX_GAIN = 0.2, 5.0

@@ -18,7 +18,6 @@ from analysis.fit.validity import (
     CHANCE,
     COLOURED,
     CORNER_SIGMA,
-    CORNER_STEPS,
     CORNER_VARIANCE,
     EMPTY_SHARES,
     EMPTY_SIGMA,
@@ -79,7 +78,7 @@ def judge(
             out[z] = OUTSIDE
         elif not left[z] <= allowed + LOST_SHARE * pattern:
             out[z] = LOST
-        elif found.state[z] != CONVERGED or _slow(found, z, known, expected[z]):
+        elif found.state[z] != CONVERGED or _slow(found, z, known, expected[z], rule):
             out[z] = NOT_CONVERGED
         elif _is_empty(known, z, left[z], expected[z], error) or _is_noise(known, z, left[z], expected[z]):
             out[z] = NO_PATTERN
@@ -118,7 +117,7 @@ def _is_noise(known: Any, z: int, left: Any, expected: Any) -> Any:
 
 
 @inlined
-def _slow(found: Any, z: int, known: Any, variance: Any) -> Any:
+def _slow(found: Any, z: int, known: Any, variance: Any, rule: Any) -> Any:
     """Whether a fit took so many small steps that it may have been led away: along a weak pattern, or by a corner.
 
     A corner looks alike at every scale; its fit is slow although it is certain.
@@ -126,7 +125,7 @@ def _slow(found: Any, z: int, known: Any, variance: Any) -> Any:
     sigma, steps = known.centre[z] * math.sqrt(variance), found.iterations[z]
     if steps >= MANY_STEPS and sigma > SLOW_SIGMA:
         return True
-    return steps >= CORNER_STEPS and sigma < CORNER_SIGMA and _beyond(known, z, CORNER_VARIANCE) > 1
+    return steps >= rule.corner_steps and sigma < CORNER_SIGMA and _beyond(known, z, CORNER_VARIANCE) > 1
 
 
 @inlined

@@ -135,7 +135,9 @@ def _corrected(
         return error, p, growth, none
     which, left = noise.left or left_of_some(solution, ok)
     error = replace(error, cause="bands" if solution.had_lines else error_cause(solution, ok, left))
-    if reference.sensors is not None:
+    if (
+        reference.sensors is not None or error.cause == "blur"
+    ):  # that leaves pattern, and no error of the reference
         return error, p, growth, none
     share = noise.share(found.nuisance[:, 0], ok)
     own = own_error(reference, which, left, error.cause, share)

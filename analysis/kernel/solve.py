@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from analysis.fit.kernel_args import (
     ReferenceArgs,
     VerdictArgs,
 )
-from analysis.fit.validity import CENTRE_VARIANCE, CLIPPED_SHARE
+from analysis.fit.validity import CENTRE_VARIANCE, CLIPPED_SHARE, CORNER_STEPS
 from analysis.kernel.images import NoiseModel, rounding_variance
 from analysis.kernel.quadrature import Sensors
 from analysis.kernel.reference import SPILL_PX, Places, ReferencePicture
@@ -219,8 +220,9 @@ class Solution:
         reference, ready, settings = self.reference, self.reference.prepared, self.reference.settings
         known, expected = self._known, self.expected(which, found.nuisance[:, 0])
         far = CENTRE_VARIANCE[settings.order - 1]
+        corner_steps = math.inf if settings.estimator == "phase" else CORNER_STEPS
         rule = VerdictArgs(
-            self.is_given, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far
+            self.is_given, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far, corner_steps
         )
         left = self._left(which, found)
         most = 2 * len(expected) > len(self._places[0])  # some that are retried forgive nothing

@@ -216,7 +216,7 @@ def _rest() -> None:
         OutArgs.starting(np.empty((0, 6))),
         ReferenceArgs(none, none, pairs, none, np.ones(2), 1.0, none),
     )
-    rule = VerdictArgs(True, np.empty(2), 1.0, 0.05, 4.0)
+    rule = VerdictArgs(True, np.empty(2), 1.0, 0.05, 4.0, 6.0)
     judge(found, none, none, PooledError.none(0), known, rule, np.empty(0, np.uint8))
     explained(found, none, none, known, np.empty(0, np.intp), 1, pairs)
     medians(np.ones((2, 2)))

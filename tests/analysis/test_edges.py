@@ -84,7 +84,7 @@ def test_a_fit_that_follows_the_noise_of_the_reference(
     known = ReferenceArgs(
         900 * one, 350 * one, np.full((1, 2), 1e-4), 0.01 * one, np.ones(2), 1.0, information_over_noise * one
     )
-    rule = VerdictArgs(True, np.array([1.5, 0.5]), 5.0, 0.05, 4.0)
+    rule = VerdictArgs(True, np.array([1.5, 0.5]), 5.0, 0.05, 4.0, 6.0)
     judge(found, left * one, one, PooledError.none(1), known, rule, out)
     assert Status(int(out[0])) == status
 
@@ -119,6 +119,6 @@ def test_a_slow_fit_that_seems_certain_is_on_a_corner(
     found.state[:], found.iterations[:] = CONVERGED, steps
     unit = np.full((1, 2), sigma**2 / beyond)
     known = ReferenceArgs(900 * one, 350 * one, unit, sigma * one, np.ones(2), 1.0, 100 * one)
-    rule = VerdictArgs(True, np.array([1.5, 0.5]), 5.0, 0.05, 2.5)
+    rule = VerdictArgs(True, np.array([1.5, 0.5]), 5.0, 0.05, 2.5, 6.0)
     judge(found, one, one, PooledError.none(1), known, rule, out)
     assert Status(int(out[0])) == status

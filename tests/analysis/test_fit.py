@@ -243,7 +243,7 @@ def verdict(
             1.0,
             one * 1e3,
         ),
-        VerdictArgs(known, np.array([1.5, 0.5]), 5.0, limit, 4.0),
+        VerdictArgs(known, np.array([1.5, 0.5]), 5.0, limit, 4.0, 6.0),
     )
     judge(found, one * left, one * expected, common or PooledError.none(1), zoi, rule, out)
     return int(out[0])

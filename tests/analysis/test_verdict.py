@@ -40,7 +40,7 @@ def verdict(
         1.0,
         np.full(1, 1e3),
     )
-    rule = VerdictArgs(noise_known, np.array([1.0, 1.0]), 32 / 6, 0.05, 4.0)
+    rule = VerdictArgs(noise_known, np.array([1.0, 1.0]), 32 / 6, 0.05, 4.0, 6.0)
     out = np.empty(1, np.uint8)
     common = PooledError.none(1)._replace(forgiven=np.full(1, usual))
     judge(found, found.left, np.full(1, EXPECTED), common, known, rule, out)
