@@ -90,7 +90,8 @@ def test_ctrl_c_leaves_the_table(capsys: pytest.CaptureFixture[str], monkeypatch
 
     monkeypatch.setattr(check_watch, "peak_line", counted_peak_line)
     before = signal.getsignal(signal.SIGINT)
-    assert main(["check", "--watch", "--camera", STILL + "&seconds=10000&hold=9000&lockstep=yes", *SMALL]) == 0
+    camera = STILL + "&seconds=10000&hold=9000&lockstep=yes"
+    assert main(["check", "--watch", "--camera", camera, *SMALL]) == 0
     assert signal.getsignal(signal.SIGINT) is before
     output = capsys.readouterr().out
     assert "sharpness 0." in output
