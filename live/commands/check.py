@@ -88,11 +88,12 @@ def command(arguments: argparse.Namespace) -> int:
         ready = _shown(figures, one, target, snapshots[first], screen)
         screen.print(_verdict([figures], ready))
         return 0 if ready else NOT_READY
+    stacks = {name: take(one, report_warnings(screen.print)) for name, one in cameras.items()}
     load, every, ready = _load(config), list[CheckFigures](), True
     for name, one in cameras.items():
         if name:
             screen.print(f"{name}: {one.camera.address}")
-        every.append(examine(take(one, report_warnings(screen.print)), one, load))
+        every.append(examine(stacks[name], one, load))
         ready &= _shown(every[-1], one, target, snapshots[name], screen)
         if name:
             screen.print("")

@@ -113,6 +113,7 @@ def played(folder: Path, paths: Sequence[Path], noise: float, light: float) -> s
 
 
 @pytest.mark.slow
+@pytest.mark.timed
 def test_the_simulated_rig(tmp_path: Path) -> None:
     sim = "sim:hole?seconds=10&hold=5&fps=15&width=320&height=320&hole=30"
     found = gone_through(tmp_path, sim, "--section", "10,2", "--zoi", "48")
