@@ -107,10 +107,10 @@ class CameraPreview:
             self._draft.change_all({"camera.address": before})
             raise error
 
-    def recent(self) -> list[Frame]:
-        """The last frames of this camera, ``RECENT`` of them, or all of a shorter recording; else none."""
+    def recent(self, least: int = RECENT) -> list[Frame]:
+        """The last frames of this camera, ``least`` to ``RECENT``, or all of a shorter recording; else none."""
         with self._lock:
-            return list(self._recent) if len(self._recent) == RECENT or self._whole else []
+            return list(self._recent) if len(self._recent) >= least or self._whole else []
 
     def collect(self) -> None:
         """Keep the next frames, as many as a whole check needs; the first ones of a recording."""

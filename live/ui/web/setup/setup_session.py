@@ -177,8 +177,8 @@ class SetupSession:
         return info
 
     def _recent(self) -> NDArray[np.float32]:
-        """(N, H, W), the last frames."""
-        frames = self.preview.recent()
+        """(N, H, W), the last frames; a slow camera has given few."""
+        frames = self.preview.recent(1)
         if not frames:
             raise DataError("the camera has given no picture yet")
         return recent_stack(frames)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -17,11 +18,13 @@ from live.setup.devices import at_rest
 from live.setup.pictures import read_mask
 from live.setup.scale import from_board
 from live.ui.web.broadcaster import Broadcaster
+from live.ui.web.setup.camera_preview import RECENT, CameraPreview
 from live.ui.web.setup.config_draft import ConfigDraft, next_name
 from live.ui.web.setup.draft_changes import CHANGES
 from live.ui.web.setup.drawn_region import DrawnRegion
 from live.ui.web.setup.setup_session import SetupSession
 from tests.live.setup.test_scale import CHARUCO, CHECKER, seen
+from tests.live.ui.waiting import until
 
 PX_PER_MM = 9.0
 AS_CHECKER = {"columns": 9, "rows": 6, "square": 5, "marker": 0, "dictionary": "4X4_50"}
@@ -36,7 +39,7 @@ class FixedPreview:
     def __init__(self) -> None:
         self.frames: list[Frame] = []
 
-    def recent(self) -> list[Frame]:
+    def recent(self, least: int = 8) -> list[Frame]:
         return self.frames
 
 
@@ -55,6 +58,31 @@ def opened(tmp_path: Path) -> Iterator[Opened]:
 
 def show(preview: FixedPreview, picture: np.ndarray) -> None:
     preview.frames = [Frame(frozen(picture), k, k / 10, "nominal", 0, 8, k / 10) for k in range(3)]
+
+
+@pytest.fixture
+def slow_camera(tmp_path: Path) -> Iterator[CameraPreview]:
+    """A camera that gives a picture of a board, and the next one half a minute later."""
+    (tmp_path / "shots").mkdir()
+    for k in range(9):
+        cv2.imwrite(str(tmp_path / "shots" / f"{k}.png"), seen(CHARUCO, PX_PER_MM))
+    rig = tmp_path / "slow.toml"
+    rig.write_text(f'[camera]\naddress = "files:{tmp_path}/shots?fps=0.03"\n')
+    draft = ConfigDraft(load_config(rig, {}), rig, {})
+    preview = CameraPreview(draft, lambda info: None, lambda frame: 0.0, lambda info: RECENT)
+    preview.start()
+    yield preview
+    preview.close()
+
+
+def test_the_first_picture_of_a_slow_camera_gives_the_scale(
+    opened: Opened, slow_camera: CameraPreview
+) -> None:
+    session, _ = opened
+    session.preview = slow_camera
+    until(lambda: bool(slow_camera.recent(1)))
+    CHANGES["board"](session, AS_CHARUCO)
+    assert session.draft.config.scale.px_per_mm == pytest.approx(PX_PER_MM, rel=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -199,7 +199,9 @@ def test_the_scale_from_a_board(browser: Any, tmp_path: Path, start: Callable[..
         cv2.imwrite(str(tmp_path / "shots" / f"{k:03}.png"), picture)
     program = start("page", "--camera", "files:shots?fps=10", "--roi", "all", "--page-port", "0")
     page = opened(browser, program)
-    page.until(lambda: bool(page.text("camera")), "the camera is seen")
+    page.until(
+        lambda: page.page.evaluate("() => document.getElementById('live').naturalWidth > 0"), "a picture"
+    )
     page.page.keyboard.press("b")
     assert "inner corners" in page.text("hint")
     for name, value in (("columns", 8), ("rows", 6), ("square", 6), ("marker", 4.5)):
