@@ -65,6 +65,9 @@ def network_share(
 SYNC_S, CLOSE_TIMEOUT_S = 1.0, 10.0
 """Between two times that a file is brought to its disk, and the longest wait for the last one."""
 
+SYNC_BYTES, LOOK_S = 32 << 20, 0.1
+"""So much is brought sooner; time between two looks at it. A second of fast pictures at once holds others up."""
+
 KEPT_BYTES = 8 << 20
 """Of the end of a file, which is written to again, stay in memory."""
 
@@ -105,7 +108,9 @@ class FlushTimer:
 
 
 class DiskSync:
-    """Brings what stands in a file to its disk once a second, and frees the memory, on a thread of its own.
+    """Brings what stands in a file to its disk, and frees the memory, on a thread of its own.
+
+    It does so once a second, and after ``SYNC_BYTES``.
 
     Left to itself the system keeps half a minute of pictures in memory: gone with the power, written all at once when
     they must, and a disk that fails is not noticed. Memory that is used again and again is cheaper too: on a virtual
@@ -126,6 +131,7 @@ class DiskSync:
     def __init__(self, path: Path, every_s: float = SYNC_S) -> None:
         self.failure: OSError | None = None
         self._every_s, self._ended = every_s, threading.Event()
+        self._brought_bytes, self._brought_t = 0, time.monotonic()
         self._file = os.open(path, os.O_RDONLY)
         self._thread = threading.Thread(target=self._work, name="disk", daemon=True)
         self._thread.start()
@@ -137,16 +143,22 @@ class DiskSync:
 
     def _work(self) -> None:
         try:
-            while not self._ended.wait(self._every_s):
-                self._bring()
+            while not self._ended.wait(min(LOOK_S, self._every_s)):
+                if self._is_due():
+                    self._bring()
             self._bring()
         except OSError as error:
             self.failure = None if error.errno in _CANNOT else error
         finally:
             os.close(self._file)
 
+    def _is_due(self) -> bool:
+        grown = os.fstat(self._file).st_size - self._brought_bytes
+        return grown >= SYNC_BYTES or time.monotonic() >= self._brought_t + self._every_s
+
     def _bring(self) -> None:
-        size = os.fstat(self._file).st_size
+        size = self._brought_bytes = os.fstat(self._file).st_size
+        self._brought_t = time.monotonic()
         to_disk(self._file)
         if size > KEPT_BYTES:
             forget_pages(self._file, size - KEPT_BYTES)

@@ -41,10 +41,10 @@ class _Queue(Generic[Stored]):
 
 
 class LatestQueue(_Queue[Item]):
-    """Holds one item, and a newer one replaces it: the measuring path never waits for old bursts.
+    """Holds few items, and where there are more only the newest: the measuring path never waits for old bursts.
 
     With ``waits=True`` ``put`` waits until the queue is empty, so that nothing is skipped: for
-    sources that wait for their reader. Of replaced items ``brief`` is kept until ``take_skipped``.
+    sources that wait for their reader. Of skipped items ``brief`` is kept until ``take_skipped``.
 
     Parameters
     ----------
@@ -52,17 +52,25 @@ class LatestQueue(_Queue[Item]):
     at_first : int
         Size of the queue until the reader, which has to prepare first, has caught up; after as many
         items, or after ``CATCH_UP_S``, it continues with the newest in any case.
+    keeps : int
+        Size of the queue for a reader that is late now and then. One that lets it fill is too slow: it gets the
+        newest item each time, until it has to wait for one again.
     brief : callable
         What is kept of an item that is skipped, without its pictures: many are while the reader prepares.
     """
 
     def __init__(
-        self, *, waits: bool = False, at_first: int = 1, brief: Callable[[Item], Item] = lambda item: item
+        self,
+        *,
+        waits: bool = False,
+        at_first: int = 1,
+        keeps: int = 1,
+        brief: Callable[[Item], Item] = lambda item: item,
     ) -> None:
         super().__init__()
-        self._waits, self._brief = waits, brief
+        self._waits, self._brief, self._keeps = waits, brief, keeps
         self._size = self._catch_up_items = at_first
-        self._reading, self._catch_up_t = False, 0.0
+        self._reading, self._catching_up, self._catch_up_t = False, True, 0.0
         self._skipped: list[Item] = []
 
     def begin(self) -> None:
@@ -70,35 +78,41 @@ class LatestQueue(_Queue[Item]):
         self._reading, self._catch_up_t = True, time.monotonic() + CATCH_UP_S
 
     def put(self, item: Item) -> None:
-        """Put ``item``; the one that it replaces counts as skipped. After ``close`` ``item`` itself is skipped."""
+        """Put ``item``; those that it replaces count as skipped. After ``close`` ``item`` itself is skipped."""
         with self._change:
             while self._waits and self._items and not self._closed:
                 self._change.wait()
             if self._closed:
                 self._skipped.append(self._brief(item))
                 return
-            while len(self._items) >= self._size:
-                self._skipped.append(self._brief(self._items.popleft()))
             self._items.append(item)
+            if len(self._items) > self._size:
+                self._skip_oldest(self._size if self._catching_up else 1)
             self._change.notify_all()
 
     def get(self, timeout_s: float | None = None) -> Item | None:
         """Take an item, waiting up to ``timeout_s``; None where there is none, or when closed and empty."""
         with self._change:
-            self._check_caught_up()
+            if self._reading:
+                self._resize()
             self._change.wait_for(lambda: self._items or self._closed, timeout_s)
             item = self._items.popleft() if self._items else None
             self._change.notify_all()
             return item
 
-    def _check_caught_up(self) -> None:
-        if not self._reading or self._size == 1:
-            return
+    def _resize(self) -> None:
         self._catch_up_items -= 1
-        if not self._items or self._catch_up_items < 0 or time.monotonic() > self._catch_up_t:
-            self._size = 1
-            while len(self._items) > 1:
-                self._skipped.append(self._brief(self._items.popleft()))
+        if not self._items:
+            self._size, self._catching_up = self._keeps, False
+        elif self._catching_up and (self._catch_up_items < 0 or time.monotonic() > self._catch_up_t):
+            self._catching_up = False
+            self._skip_oldest(1)
+
+    def _skip_oldest(self, size: int) -> None:
+        """Skip all but the newest ``size`` items; the queue holds no more from now on."""
+        self._size = size
+        while len(self._items) > size:
+            self._skipped.append(self._brief(self._items.popleft()))
 
     def take_skipped(self) -> list[Item]:
         """The items skipped since the last call."""

@@ -67,7 +67,7 @@ class BurstQueue:
         return self.next_reference()
 
     def bursts(self) -> Iterator[Burst | NewReference]:
-        """The newest burst each time, and a new reference before the bursts that follow it.
+        """Bursts in order, the newest where the reader is late; a new reference before the bursts that follow it.
 
         The bursts that arrived while the first reference was prepared come first, until the reader has caught up.
         """

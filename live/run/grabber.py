@@ -30,6 +30,8 @@ from live.pipeline.run_state import RunState
 log = logging.getLogger(__name__)
 HELD_BYTES, HELD_S = 256_000_000, 1.0
 """Limits of the bursts that wait for the first measurement: bytes of means, seconds of frames."""
+LATE_S = 0.25
+"""Seconds of frames that may wait for a measurement later on: others use the processor now and then."""
 _AT_WORK, _OF_REFERENCE = 3, 3
 """Bursts beside those that wait: averaged, measured, shown; and a reference with its two halves."""
 
@@ -91,7 +93,7 @@ class Grabber:
     ----------
     references : queue of ReferenceBurst
     bursts : LatestQueue of Burst
-        Keeps the newest; with a source that waits for its reader, nothing is skipped.
+        With a source that waits for its reader, nothing is skipped.
     error : Exception or None
         The error that ended the camera.
     begun_t, arrived_t : float, s
@@ -119,6 +121,7 @@ class Grabber:
         self.bursts: LatestQueue[Burst] = LatestQueue(
             waits=not camera.info.live,
             at_first=_held_at_first(camera.info),
+            keeps=min(_held_at_first(camera.info), max(int(LATE_S * (camera.info.fps or 0) / plan.burst), 1)),
             brief=Burst.without_pictures,
         )
         self._memory = _memory_for(camera.info, plan) if camera.info.live else PictureMemory()

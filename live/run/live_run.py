@@ -1,7 +1,8 @@
 """A live run: devices, threads and outputs joined.
 
 Threads: grab (``Grabber``), load (``LoadThread``), record (``Recorder``), measure (``MeasureThread``) and
-one for each consumer that may block. The measuring thread takes the newest burst each time (``LatestQueue``).
+one for each consumer that may block. The measuring thread takes bursts in order, and the newest where it is
+late (``LatestQueue``).
 """
 
 from __future__ import annotations

@@ -302,6 +302,24 @@ def test_it_is_brought_again_and_again_and_at_the_end(
     assert len(brought) == count and to_disk.failure is None
 
 
+def test_what_grows_fast_is_brought_sooner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, brought, plain = tmp_path / "a", list[int](), os.fdatasync
+
+    def bring(file: int) -> None:
+        brought.append(os.fstat(file).st_size)
+        plain(file)
+
+    monkeypatch.setattr(os, "fdatasync", bring)
+    monkeypatch.setattr(pace_module, "SYNC_BYTES", 1000)
+    path.write_bytes(b"1")
+    to_disk = DiskSync(path, every_s=1e6)
+    path.write_bytes(bytes(1000))
+    until(lambda: brought == [1000])
+    path.write_bytes(bytes(1999))
+    to_disk.close()
+    assert brought == [1000, 1999], "the rest at the end alone"
+
+
 def test_the_memory_of_what_was_brought_is_let_go_but_for_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -100,6 +100,36 @@ def test_a_slow_reader_is_not_kept_in_the_past(monkeypatch: pytest.MonkeyPatch) 
     assert box.take_skipped() == list(range(2, 39))
 
 
+def test_a_reader_that_is_late_now_and_then_gets_all() -> None:
+    box: LatestQueue[int] = LatestQueue(keeps=3)
+    box.begin()
+    assert box.get(0) is None
+    for late in range(4):
+        for i in range(3):
+            box.put(3 * late + i)
+        assert [box.get(0) for _ in range(3)] == [3 * late, 3 * late + 1, 3 * late + 2]
+        assert box.get(0) is None
+    assert box.take_skipped() == []
+
+
+def test_a_reader_that_is_too_slow_gets_the_newest_until_it_waits_again() -> None:
+    box: LatestQueue[int] = LatestQueue(keeps=3)
+    box.begin()
+    assert box.get(0) is None
+    for i in range(4):
+        box.put(i)
+    assert box.take_skipped() == [0, 1, 2], "it was full: the newest alone counts"
+    box.put(4)
+    assert box.get(0) == 4 and box.take_skipped() == [3]
+    box.put(5)
+    box.put(6)
+    assert box.get(0) == 6 and box.take_skipped() == [5]
+    assert box.get(0) is None, "it has caught up"
+    for i in (7, 8, 9):
+        box.put(i)
+    assert [box.get(0), box.get(0), box.get(0)] == [7, 8, 9] and box.take_skipped() == []
+
+
 def test_closing_frees_a_waiting_producer() -> None:
     box: LatestQueue[int] = LatestQueue(waits=True)
     box.put(1)
