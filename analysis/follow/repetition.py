@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,16 +60,25 @@ def _firsts(first: int, length: int, side: int) -> NDArray[np.intp]:
     return np.unique(np.linspace(first, first + length - side, math.ceil(length / side)).astype(np.intp))
 
 
+@lru_cache(maxsize=1)
+def _window(side: int) -> tuple[Image, Image]:
+    """A Hann window, (side, side), and its autocorrelation."""
+    from scipy.fft import irfft2, rfft2
+
+    line = np.hanning(side + 2)[1:-1].astype(np.float32)
+    window = np.outer(line, line)
+    return window, irfft2(np.abs(rfft2(window)) ** 2, window.shape)
+
+
 def _peaks(tile: Image) -> list[tuple[int, int]]:
     """The nearest side peaks (x, y) of the autocorrelation under a Hann window, over that of the window."""
     from scipy.fft import irfft2, rfft2
     from scipy.ndimage import maximum_filter
 
     side = len(tile)
-    line = np.hanning(side + 2)[1:-1].astype(np.float32)
-    window = np.outer(line, line)
+    window, overlap = _window(side)
     level = (tile - np.average(tile, weights=window)) * window
-    product, overlap = (irfft2(np.abs(rfft2(part)) ** 2, part.shape) for part in (level, window))
+    product = irfft2(np.abs(rfft2(level)) ** 2, level.shape)
     reach = int(REACH * side)
     down, across = np.meshgrid(np.arange(reach + 1), np.arange(-reach, reach + 1), indexing="ij")
     share = product[down, across] / overlap[down, across]

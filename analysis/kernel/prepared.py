@@ -18,7 +18,13 @@ from analysis.fit.validity import (
     information,
     least_information,
 )
-from analysis.kernel.images import NoiseModel, continue_rim, padded, rounding_variance, second_differences
+from analysis.kernel.images import (
+    NoiseModel,
+    continue_rim,
+    padded,
+    rounding_variance,
+    with_second_differences,
+)
 from analysis.kernel.settings import KernelSettings
 from analysis.picture.spectrum import Pattern, filtered_pattern
 
@@ -122,7 +128,7 @@ def prepare_reference(
     images = padded(pattern.grad_x, pattern.grad_y, pattern.level, image - np.float32(mean))
     continue_rim(images, 2, image.shape)
     pattern = _within(pattern, images, image.shape)
-    channels = np.concatenate([images, second_differences(images)])
+    channels = with_second_differences(images)
     by_level = _by_level(channels, pattern, mean, noise)
     out, shapes = _fits(channels, by_level, origins, line, settings.order)
     energy = out.energy

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from analysis.field import PAIR_INDEX
 from analysis.fit.kernel_args import PictureArgs, StopArgs
-from analysis.kernel.images import second_differences
+from analysis.kernel.images import with_second_differences
 from analysis.kernel.prepared import PreparedReference
 
 BAND = 0.30
@@ -81,7 +81,7 @@ def make_sensors(ready: PreparedReference, line: NDArray[np.float64], size: int)
     line : (n,)
         The least-squares weight along one axis.
     """
-    basis, channels = _basis(line), np.concatenate([ready.images, second_differences(ready.images)])
+    basis, channels = _basis(line), with_second_differences(ready.images)
     count = len(ready.origins)
     weights = np.zeros((count, 7, size, size), np.float32)
     covariance = np.zeros((count, 21), np.float32)

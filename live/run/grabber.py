@@ -28,8 +28,8 @@ from live.pipeline.reference import ReferenceBurst, ReferenceTaker
 from live.pipeline.run_state import RunState
 
 log = logging.getLogger(__name__)
-HELD_BYTES, HELD_S = 256_000_000, 1.0
-"""Limits of the bursts that wait for the first measurement: bytes of means, seconds of frames."""
+HELD_BYTES, HELD_S, A_MEGAPIXEL_S = 512_000_000, 1.0, 0.25
+"""Limits of the bursts that wait for the first measurement: bytes, seconds; a large reference takes longer."""
 LATE_S = 0.25
 """Seconds of frames that may wait for a measurement later on: others use the processor now and then."""
 _AT_WORK, _OF_REFERENCE = 3, 3
@@ -60,17 +60,22 @@ class GrabPlan:
         return cls(burst, reference, seconds)
 
 
-def _held_at_first(camera: CameraInfo) -> int:
+def _held_at_first(camera: CameraInfo, plan: GrabPlan) -> int:
     """Bursts that may wait while the reference is prepared, for about as long as that takes."""
-    return int(
-        min(max(HELD_BYTES // (4 * camera.width * camera.height), 1), max(HELD_S * (camera.fps or 0), 1))
-    )
+    return _held(camera, plan, max(HELD_S, A_MEGAPIXEL_S * camera.width * camera.height / 1e6))
+
+
+def _held(camera: CameraInfo, plan: GrabPlan, seconds: float) -> int:
+    """Bursts of ``seconds`` that may wait: a mean and a mask each."""
+    a_pixel = 1 + (4 if plan.burst > 1 else 1 + (camera.bits > 8))
+    bound = HELD_BYTES // (a_pixel * camera.width * camera.height)
+    return max(1, min(bound, math.ceil(seconds * (camera.fps or 0) / plan.burst)))
 
 
 def _memory_for(camera: CameraInfo, plan: GrabPlan) -> PictureMemory:
-    """Memory of the bursts of ``HELD_S``, so that the first ones take no longer to average than all others."""
+    """Memory of the bursts that may wait, so that the first ones take no longer to average than all others."""
     memory, shape = PictureMemory(), (camera.height, camera.width)
-    bursts = _AT_WORK + min(_held_at_first(camera), math.ceil(HELD_S * (camera.fps or 0) / plan.burst))
+    bursts = _AT_WORK + _held_at_first(camera, plan)
     memory.prepare(_OF_REFERENCE + bursts, shape, np.bool_)
     memory.prepare(_OF_REFERENCE + bursts * (plan.burst > 1), shape, np.float32)
     memory.prepare(_OF_REFERENCE, shape, np.uint32)
@@ -120,8 +125,8 @@ class Grabber:
         self.references: queue.SimpleQueue[ReferenceBurst] = queue.SimpleQueue()
         self.bursts: LatestQueue[Burst] = LatestQueue(
             waits=not camera.info.live,
-            at_first=_held_at_first(camera.info),
-            keeps=min(_held_at_first(camera.info), max(int(LATE_S * (camera.info.fps or 0) / plan.burst), 1)),
+            at_first=_held_at_first(camera.info, plan),
+            keeps=_held(camera.info, plan, LATE_S),
             brief=Burst.without_pictures,
         )
         self._memory = _memory_for(camera.info, plan) if camera.info.live else PictureMemory()

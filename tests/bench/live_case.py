@@ -174,8 +174,8 @@ def figures(case: argparse.Namespace, outcome: Outcome, rows: np.ndarray) -> dic
 
 
 def skipped_at_start(case: argparse.Namespace, rows: np.ndarray) -> int:
-    """Bursts behind the reference (the first 32 frames) that were not measured, up to a second of measurements."""
-    early = rows[rows[:, 0] < rows[0, 0] + 1.0]
+    """Bursts behind the reference (the first 32 frames) that were not measured, up to a second after the first."""
+    early = rows[rows[:, 0] < rows[0, 0] + rows[0, 3] + 1.0]
     missing = early[-1, 2] + 1 - 32 - (early[:, 2] - early[:, 1] + 1).sum()
     return round(missing / case.burst)
 

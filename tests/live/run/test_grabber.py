@@ -215,6 +215,9 @@ class Watch(Consumer):
         self._each(measurement)
 
 
+CAMERA = f"bench:?width=192&height=160&fps={FPS:g}&pictures=8&buffers=64"
+
+
 def disturbed(
     folder: Path,
     each: Callable[[Measurement], None] = lambda m: None,
@@ -222,7 +225,7 @@ def disturbed(
 ) -> tuple[Outcome, np.ndarray]:
     """A run of two and a half seconds, and time and latency of each result."""
     settings = {
-        "camera.address": f"bench:?width=192&height=160&fps={FPS:g}&seconds=2.5&pictures=8&buffers=64",
+        "camera.address": CAMERA + "&seconds=2.5",
         "measure.zoi": 48,
         "measure.step": 32,
         "measure.burst": 1,
@@ -251,12 +254,12 @@ def test_a_measurement_held_up_skips_and_catches_up(tmp_path: Path) -> None:
 
     def hold(m: Measurement) -> None:
         if m.number == 5:
-            time.sleep(0.7)
+            time.sleep(1.4)
             paused.append(time.monotonic())
 
-    outcome, rows = disturbed(tmp_path, hold)
+    outcome, rows = disturbed(tmp_path, hold, **{"camera.address": CAMERA + "&seconds=4"})
     frame_counts = outcome.run_state.frame_counts
-    assert frame_counts.skipped >= 0.5 * FPS
+    assert frame_counts.skipped >= 0.35 * FPS, "a second of bursts may wait while the first result is late"
     assert (frame_counts.unrecorded, frame_counts.lost) == (0, 0)
     assert frame_counts.recorded == frame_counts.grabbed
     assert recovered(rows, paused[0])
