@@ -116,7 +116,9 @@ def test_planes_stay_as_they_are_even_beside_gaps(steps: int, sharpened: int) ->
     assert np.nanmax(np.abs(found - values)) < 1e-9
 
 
-@pytest.mark.parametrize(("steps", "sharpened"), [(7, 0), (15, 0), (2, 4), (7, 2)])
+@pytest.mark.parametrize(
+    ("steps", "sharpened"), [(7, 0), (15, 0), pytest.param(2, 4, marks=pytest.mark.slow), (7, 2)]
+)
 def test_beside_gaps_no_noise_grows_more_than_the_worst_wave_of_a_whole_map(
     steps: int, sharpened: int
 ) -> None:

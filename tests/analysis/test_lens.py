@@ -203,6 +203,7 @@ def test_shifted_pictures_give_the_lens_whatever_the_specimen_does_off_its_plane
     assert strain_of_shift(square.lens, GRID, 20.0)[1] < 0.15 * strain
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("square", [False, True])
 def test_the_stated_uncertainty_of_the_strain_covers_the_truth(square: bool) -> None:
     """Errors of the mean strain of a part of the region, after a shift by 20 px, over their sigma: 95 % within 1.96."""

@@ -61,9 +61,8 @@ def changed(t: float) -> TimeStep:
     return replace(STEP, **{name: k + 1e-6 * t for k, name in enumerate(FLOATS)}, t=t, n_valid=int(t))
 
 
-@pytest.mark.parametrize(
-    ("hours", "fps"), [(10, 1), pytest.param(2, 30, marks=pytest.mark.slow)], ids=["1 fps", "30 fps"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("hours", "fps"), [(10, 1), (2, 30)], ids=["1 fps", "30 fps"])
 def test_memory_of_hours(hours: float, fps: int) -> None:
     kept, frames, half = Kept(), round(hours * 3600 * fps), 0
     every = max(fps // LOAD_HZ, 1)
