@@ -35,7 +35,7 @@ from live.ui.terminal.screen import TerminalScreen
 
 PORT = 19_876
 SETTLED_S = 2.0
-"""Skips and latencies count from so long after the first measurement."""
+"""Skips and latencies count from so long after the first measurement was there; those before count as at the start."""
 
 
 class Watch(Consumer):
@@ -152,7 +152,7 @@ def _is_served() -> bool:
 
 
 def figures(case: argparse.Namespace, outcome: Outcome, rows: np.ndarray) -> dict[str, Any]:
-    late = rows[rows[:, 0] > rows[0, 0] + SETTLED_S]
+    late = rows[rows[:, 0] > settled_t(rows)]
     p50, p95 = np.percentile(late[:, 3], (50, 95)) * 1e3
     frame_counts = outcome.run_state.frame_counts
     return {
@@ -173,9 +173,14 @@ def figures(case: argparse.Namespace, outcome: Outcome, rows: np.ndarray) -> dic
     }
 
 
+def settled_t(rows: np.ndarray) -> float:
+    """From when on a run is settled: its own time, s."""
+    return float(rows[0, 0] + rows[0, 3] + SETTLED_S)
+
+
 def skipped_at_start(case: argparse.Namespace, rows: np.ndarray) -> int:
-    """Bursts behind the reference (the first 32 frames) that were not measured, up to a second after the first."""
-    early = rows[rows[:, 0] < rows[0, 0] + rows[0, 3] + 1.0]
+    """Bursts behind the reference (the first 32 frames) that were not measured until it was settled."""
+    early = rows[rows[:, 0] < settled_t(rows)]
     missing = early[-1, 2] + 1 - 32 - (early[:, 2] - early[:, 1] + 1).sum()
     return round(missing / case.burst)
 
