@@ -277,6 +277,7 @@ GAUGES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.timed
 def test_a_test_with_all_that_there_is(tmp_path: Path) -> None:
     folder, again, port, serial = tmp_path / "run", tmp_path / "again", free_port(), PtyPort()

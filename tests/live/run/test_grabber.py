@@ -248,6 +248,7 @@ def recovered(rows: np.ndarray, after: float) -> bool:
     return len(later) > 5 and float(np.median(later[:, 1])) < 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.timed
 def test_a_measurement_held_up_skips_and_catches_up(tmp_path: Path) -> None:
     paused: list[float] = []
@@ -265,6 +266,7 @@ def test_a_measurement_held_up_skips_and_catches_up(tmp_path: Path) -> None:
     assert recovered(rows, paused[0])
 
 
+@pytest.mark.slow
 @pytest.mark.timed
 @pytest.mark.parametrize(("buffer_MB", "gap"), [(512.0, False), (1.0, True)], ids=["buffer", "no buffer"])
 def test_a_slow_disk_is_borne_by_the_buffer_or_leaves_a_counted_gap(
@@ -296,6 +298,7 @@ class Flood(NoLoadCell):
         yield from (LoadSample(now + 1e-6 * k, float(k), raw=b"+1.0 N") for k in range(10_000))
 
 
+@pytest.mark.slow
 @pytest.mark.timed
 def test_a_flood_of_load_lines_does_not_hold_up_the_pictures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -310,6 +313,7 @@ def test_a_flood_of_load_lines_does_not_hold_up_the_pictures(
     assert recovered(rows, float(rows[0, 0]) + 0.8)
 
 
+@pytest.mark.slow
 @pytest.mark.timed
 def test_another_program_on_a_core_loses_no_frame(tmp_path: Path) -> None:
     burn = [sys.executable, "-c", "while True: pass"]
