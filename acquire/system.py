@@ -210,7 +210,8 @@ def processor_times() -> tuple[float, float] | None:
 def _children() -> list[str]:
     found: list[str] = []
     for task in Path("/proc/self/task").iterdir():
-        found += (task / "children").read_text().split()
+        with contextlib.suppress(OSError):  # it has just ended
+            found += (task / "children").read_text().split()
     return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -242,6 +243,17 @@ def test_this_machine_says_who_uses_it() -> None:
     assert after is not None
     assert after.own > before.own
     assert after.all >= before.all > 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc is on Linux only")
+def test_a_thread_that_has_just_ended_hides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    threads = Path.iterdir
+
+    def with_one_gone(folder: Path) -> list[Path]:
+        return [folder / "0", *threads(folder)]
+
+    monkeypatch.setattr(Path, "iterdir", with_one_gone)
+    assert processor_use() is not None
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="threads have a nice value of their own on Linux only")
