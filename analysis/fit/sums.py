@@ -169,7 +169,7 @@ def unit_variance(name: str, covariance: NDArray[np.float32]) -> Floats:
 
 @helper
 def blurred(f: Any, i: int, pitch: int, along_x: Any, along_y: Any, across: Any) -> Any:
-    """The second differences of an image at one pixel (``images.second_differences``), each with its factor."""
+    """The second differences of an image at one pixel (``images.with_second_differences``), each with its factor."""
     out = along_x * (f[i - 1] + f[i + 1] - 2 * f[i]) + along_y * (f[i - pitch] + f[i + pitch] - 2 * f[i])
     return out + across * (f[i + pitch + 1] + f[i - pitch - 1] - f[i + pitch - 1] - f[i - pitch + 1]) / 4
 

@@ -132,16 +132,12 @@ def continue_rim(images: NDArray[np.float32], which: int, shape: tuple[int, ...]
     flat[first - pitch - 1 : first + image.size - 1 : pitch] = np.append(image[0, 0], image[:, 0])
 
 
-def second_differences(images: NDArray[np.float32]) -> NDArray[np.float32]:
-    """f_xx, f_yy and f_xy of the third of ``padded`` images by differences of pixels, (3, H + 1, pitch), GL/px^2.
-
-    At high frequencies they fall behind the derivatives, as the spectrum of a real blur does behind its series.
-    """
-    return with_second_differences(images)[len(images) :]
-
-
 def with_second_differences(images: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A copy of ``padded`` images, and ``second_differences`` behind them."""
+    """A copy of K ``padded`` images, and f_xx, f_yy and f_xy of the third behind them, (K + 3, H + 1, pitch).
+
+    These are differences of pixels, GL/px^2. At high frequencies they fall behind the derivatives, as the spectrum of
+    a real blur does behind its series.
+    """
     n, pitch, size, flat = len(images), images.shape[2], images[0].size, images.reshape(-1)
 
     def moved(by: int) -> NDArray[np.float32]:

@@ -37,7 +37,7 @@ from analysis.fit.shapes import (
     product_moments,
     shapes_of,
 )
-from analysis.kernel.images import second_differences
+from analysis.kernel.images import with_second_differences
 
 PARTS = 64
 
@@ -244,7 +244,7 @@ def test_moments_of_the_difference(size: int) -> None:
     energy = of_the_difference(
         images.ravel(), HEIGHT * PITCH, top * PITCH + left, PITCH, g.ravel(), line, size, shapes.rows, columns, out
     )  # fmt: skip
-    second = second_differences(images)[:, top : top + size, left : left + size].astype(float)
+    second = with_second_differences(images)[4:, top : top + size, left : left + size].astype(float)
     fx, fy, f, raw = images[:, top : top + size, left : left + size].astype(float)
     d, rows = g[:, :size] - raw, shapes.rows[:, :size].astype(float)
     assert energy == pytest.approx(rows[0] @ d**2 @ rows[0], rel=1e-5)
