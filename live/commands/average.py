@@ -21,8 +21,8 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic average``: average frames to a dark frame (lens covered) or a flat frame (evenly lit)."""
     from acquire.burst import average_bursts, compile_loops, save_mean
     from acquire.errors import DataError
-    from live.pipeline.warm_up import picture_kinds
     from live.setup.devices import at_rest, open_rig
+    from live.setup.dry_run import picture_kinds
 
     screen = TerminalScreen()
     given = getattr(arguments, "camera.crop")

@@ -68,10 +68,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic study``."""
-    from live.pipeline.warm_up import picture_kinds
     from live.replay.opening import open_source
     from live.replay.source import ReplayRequest
     from live.replay.study import recommended, study, take_windows
+    from live.setup.dry_run import picture_kinds
 
     screen, out = TerminalScreen(), Path(arguments.folder)
     check_free(out)

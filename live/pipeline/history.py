@@ -1,7 +1,4 @@
-"""The history of a test: the time steps in memory, as columns, and the load axis found from them.
-
-A test of a day has millions of time steps, so they take little memory.
-"""
+"""The history of a test: its time steps as columns, and the load axis found from them."""
 
 from __future__ import annotations
 
@@ -15,6 +12,7 @@ from numpy.typing import NDArray
 
 from acquire.load_cell import LoadLog
 from analysis.evaluate import Curve, GaugeValue, LoadAxis, load_axis
+from live.pipeline.columns import BlockFile, NumberColumn, TextColumn
 from live.pipeline.measurement import AXIAL, TRANSVERSE, TimeStep, extension_along, strains_along
 from live.pipeline.queues import Thinned
 
@@ -22,7 +20,6 @@ Array = NDArray[np.float64]
 
 MAX_KEPT = 2000
 """Time steps that ``AxisFinder`` keeps, evenly thinned."""
-_ROWS = 1024  # of a block of the history
 _GROWTH = 1.1  # of the time steps from one search for the axis to the next
 _COUNTS = ("n_valid", "n_zoi")
 SHORT = (
@@ -40,12 +37,14 @@ _TYPES = {
 class TimeSeries(Sequence[TimeStep]):
     """A list that one thread appends to and any thread reads: numbers as columns, each text once.
 
-    At most 180 bytes for each time step and 25 more for each gauge; of ``sigma`` and the like seven digits.
+    A time step takes at most 180 bytes, and 25 more for each gauge, in memory only while it is among the newest; of
+    ``sigma`` and the like seven digits are kept.
     """
 
     def __init__(self) -> None:
-        self._numbers = {name: _NumberColumn(kind) for name, kind in _TYPES.items()}
-        self._refused = _TextColumn()
+        self._file = BlockFile()
+        self._numbers = {name: NumberColumn(kind, self._file) for name, kind in _TYPES.items()}
+        self._refused = TextColumn(self._file)
         self._gauges: dict[str, _GaugeColumn] = {}
         self._count = 0
 
@@ -56,7 +55,7 @@ class TimeSeries(Sequence[TimeStep]):
         self._refused.append(time_step.refused)
         for name in time_step.gauges:
             if name not in self._gauges:
-                self._gauges[name] = _GaugeColumn(self._count)
+                self._gauges[name] = _GaugeColumn(self._count, self._file)
         for name, gauge in self._gauges.items():
             gauge.append(time_step.gauges.get(name))
         # Counted last: another thread then reads whole time steps only.
@@ -107,59 +106,14 @@ class TimeSeries(Sequence[TimeStep]):
         return TimeStep(**numbers, refused=self._refused[i], gauges=gauges)
 
 
-class _NumberColumn:
-    """Numbers in blocks of ``_ROWS``; a full block of equal numbers takes the memory of one.
-
-    Blocks and no array that grows: that leaves gaps in the memory wherever it is moved.
-    """
-
-    def __init__(self, kind: str) -> None:
-        self._kind, self._count = kind, 0
-        self._blocks: list[NDArray[Any]] = []
-
-    def append(self, value: float) -> None:
-        at = self._count % _ROWS
-        if at == 0:
-            self._blocks.append(np.zeros(_ROWS, self._kind))
-        block = self._blocks[-1]
-        block[at] = value
-        if at == _ROWS - 1 and block.tobytes() == block[:1].tobytes() * _ROWS:
-            self._blocks[-1] = np.broadcast_to(block[0], _ROWS)
-        self._count += 1
-
-    def __getitem__(self, i: int) -> Any:  # float or int
-        return self._blocks[i // _ROWS].item(i % _ROWS)
-
-    def copied(self, count: int) -> Array:
-        """The first ``count``, (count,) float64."""
-        return np.concatenate([np.empty(0), *self._blocks])[:count]
-
-
-class _TextColumn:
-    """Texts, each stored once: few of them differ."""
-
-    def __init__(self) -> None:
-        self._numbers: dict[str, int] = {}
-        self._texts: list[str] = []
-        self._column = _NumberColumn("i")
-
-    def append(self, text: str) -> None:
-        if text not in self._numbers:
-            self._texts.append(text)
-            self._numbers[text] = len(self._numbers)
-        self._column.append(self._numbers[text])
-
-    def __getitem__(self, i: int) -> str:
-        return self._texts[int(self._column[i])]
-
-
 class _GaugeColumn:
     """The values of one gauge, which the first ``since`` time steps do not have."""
 
-    def __init__(self, since: int) -> None:
+    def __init__(self, since: int, file: BlockFile) -> None:
         self.since = since
-        self.values, self.sigmas, self._shares = _NumberColumn("d"), _NumberColumn("d"), _NumberColumn("f")
-        self._reasons, self._missing = _TextColumn(), _NumberColumn("b")
+        self.values, self.sigmas = NumberColumn("d", file), NumberColumn("d", file)
+        self._shares, self._missing = NumberColumn("f", file), NumberColumn("b", file)
+        self._reasons = TextColumn(file)
         for _ in range(since):
             self.append(None)
 

@@ -19,11 +19,11 @@ from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
-from live.pipeline.warm_up import dry_run
 from live.results.folder import make_folder
 from live.run.alarms import check_alarms
 from live.run.outcome import StopSignal
 from live.setup.devices import Rig
+from live.setup.dry_run import dry_run
 from live.setup.pictures import read_mask, with_flat_field, with_mask
 from live.setup.prepared import MeasurePlan
 

@@ -2,6 +2,6 @@
 
 ``devices`` opens camera and load cell (the only module that opens simulated ones). ``region`` finds the specimen,
 ``placement`` places gauges on it, ``rig_proposal`` makes a rig file of both. ``scale`` measures mm per px, ``grid``
-places ZOIs, ``pictures`` reads mask, dark and flat frames. ``compiling`` compiles ahead. ``prepared`` has what is
-fixed before the first measurement. ``check`` judges the picture.
+places ZOIs, ``pictures`` reads mask, dark and flat frames. ``compiling`` compiles ahead, ``dry_run`` runs
+everything once. ``prepared`` has what is fixed before the first measurement. ``check`` judges the picture.
 """

@@ -20,8 +20,8 @@ from live.pipeline.guards import DilatationGuard, TiltGuard, standard_guards
 from live.pipeline.measure import Corrections, NewReference, PlateCorrection, Tracker, measure
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import Correction, prepare
-from live.pipeline.warm_up import picture_kinds
 from live.setup.compiling import compile_ahead
+from live.setup.dry_run import picture_kinds
 from live.setup.grid import grid_for, kernel_settings, plates_for
 from live.setup.lens import lens_for
 from live.setup.pictures import correction

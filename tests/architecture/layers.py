@@ -103,7 +103,7 @@ MEASURING = (
     "live.pipeline.measure",
     "live.pipeline.measurement",
     "live.pipeline.reference",
-    "live.pipeline.warm_up",
+    "live.setup.dry_run",
 )
 NEVER_MEASURING = (
     "threading multiprocessing subprocess socket time datetime io os pathlib tempfile shutil rerun serial h5py cv2"

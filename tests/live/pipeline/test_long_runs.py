@@ -1,16 +1,20 @@
 """Queues and histories of hours, in fast motion: what run, page and display keep grows by little, or not at all.
 
-What is kept of each frame is its time step, and of each load sample its time and force.
+What is kept of each load sample is its time and force; the time steps wait in a file.
 """
 
 from __future__ import annotations
 
+import tempfile
 import tracemalloc
 from dataclasses import fields, replace
+from typing import NoReturn
 
+import numpy as np
 import pytest
 
 from acquire.load_sample import LoadSample
+from live.pipeline.history import History
 from live.pipeline.latency import LatencyMonitor, LatencySample
 from live.pipeline.measurement import ForceMatching, TimeStep
 from live.pipeline.run_state import RunState
@@ -77,11 +81,35 @@ def test_memory_of_hours(hours: float, fps: int) -> None:
         grown = tracemalloc.get_traced_memory()[0] - half
     finally:
         tracemalloc.stop()
-    assert len(kept.run_state.history.time_steps) == frames, "nothing is thinned that figures are from"
+    history = kept.run_state.history
+    assert len(history.time_steps) == frames, "nothing is thinned that figures are from"
+    assert history.column("exx") == pytest.approx(FLOATS.index("exx") + 1e-6 * history.column("t"), rel=1e-12)
+    assert history.column("t") == pytest.approx(np.arange(frames) / fps, rel=1e-12)
     # 16 bytes a load sample, in a list that has room for a sixteenth more as it grows; and a block of the history.
-    assert grown == pytest.approx(frames / 2 * (174 + 1.07 * 16 / every), abs=1024 * 180 + frames)
-    per_minute = grown / (hours * 60 / 2) / 2**20
-    assert per_minute < 0.3 * fps / 20
+    assert grown == pytest.approx(frames / 2 * 1.07 * 16 / every, abs=1024 * 180 + frames)
     assert len(kept.curve.since(-1, 0)["rows"]) <= 4001
     assert kept.pending.dropped == 0
     assert kept.matched + len(kept.matching) == frames and len(kept.matching) <= 2
+
+
+def test_time_steps_that_wait_in_a_file_are_read_again() -> None:
+    history, steps = History(), [changed(i / 7) for i in range(5000)]
+    for step in steps:
+        history.add(step)
+    assert history.time_steps[1500].exx == steps[1500].exx
+    assert history.time_steps[4095].n_valid == steps[4095].n_valid
+    assert [one.t for one in history.time_steps] == [one.t for one in steps]
+    assert history.column("eyy").tolist() == [one.eyy for one in steps]
+    assert history.column("sigma_eyy") == pytest.approx([one.sigma_eyy for one in steps], rel=1e-6)
+
+
+def test_time_steps_stay_in_memory_where_no_file_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(**options: object) -> NoReturn:
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", full)
+    history = History()
+    for i in range(5000):
+        history.add(changed(i / 7))
+    assert history.column("t").tolist() == [i / 7 for i in range(5000)]
+    assert history.time_steps[1500].exx == changed(1500 / 7).exx

@@ -173,7 +173,7 @@ def write(setup: ViewSetup, target: ViewTarget) -> RerunSink:
     rates = (
         ALL
         if setup.finished
-        else Rates(1.0, 2.0, 0.1, gather_s=20.0, parcel_bytes=2**16, limit_bytes=RRD_LIMIT_BYTES)
+        else Rates(1.0, 2.0, 0.1, gather_s=60.0, parcel_bytes=2**16, limit_bytes=RRD_LIMIT_BYTES)
     )
     # Two streams with one name in a process would be one stream.
     return _sink(rr.FileSink(str(path)), setup, f"{target.recording}-file", rates)

@@ -18,11 +18,11 @@ from acquire.system import lower_priority
 from live.config.sections import DEFAULT_REFERENCE_BURST
 from live.config.values import AUTO
 from live.pipeline.latency import OUTPUT
-from live.pipeline.warm_up import picture_kinds
 from live.setup.check.check_list import CheckFigures, examine
 from live.setup.check.quick_check import QuickChecker
 from live.setup.check.verdict import CheckLine, check_lines
 from live.setup.compiling import compile_ahead
+from live.setup.dry_run import picture_kinds
 from live.ui.web.setup.camera_preview import MAX_BYTES, RECENT, CameraPreview
 from live.ui.web.setup.check_panel import figure_values, frame_stack, line_values, table_values
 from live.ui.web.setup.config_draft import ConfigDraft
