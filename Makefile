@@ -31,7 +31,7 @@ demo: $(VENV)/base
 	@$(BIN)/phasedic demo
 
 # Side by side, a file a process; tests in real time then one after another, with the machine to themselves.
-PARALLEL := -n auto --dist loadfile
+PARALLEL := -n auto --dist loadfile --no-loadscope-reorder
 TIMED     = $(shell grep -rl mark.timed tests --include='test_*.py')
 # Modules are compiled once for all processes of the tests, also where Python is told to keep nothing.
 test test-all newest lowest: export PYTHONDONTWRITEBYTECODE =

@@ -27,9 +27,10 @@ from live.run.control import ONCE, Controls, answer
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.page_consumer import PageConsumer, Running
+from live.ui.web.page_consumers import PageConsumers
 from live.ui.web.painting import RAMP, as_png
 from live.ui.web.run_result import peaks
-from live.ui.web.server import DEFAULT_PORT, REPORT_POLICY, PageServer, Response, jpeg_response, json_response
+from live.ui.web.server import DEFAULT_PORT, REPORT_POLICY, PageServer, Response, jpeg_response
 from live.ui.web.setup.config_draft import ConfigDraft, next_name, second_draft
 from live.ui.web.setup.draft_changes import CHANGES
 from live.ui.web.setup.drawn_region import DrawnRegion
@@ -75,8 +76,7 @@ class PageController:
         self._second_draft: ConfigDraft | None = None
         self._drawn: Mapping[str, DrawnRegion] = {}
         self._broadcaster = Broadcaster()
-        self._consumer: PageConsumer | None = None
-        self._consumers: dict[str, PageConsumer] = {}
+        self._consumers = PageConsumers(self._broadcaster, {}, {})
         self._live: ControlledRun | None = None
         self._report: Path | None = None
         self._result: dict[str, Any] = {}
@@ -86,13 +86,18 @@ class PageController:
         self._message = ""
         self.viewer: Callable[[int], str] = lambda port: "no: there is no viewer here"
         gets = {
-            "/points": self._points,
+            "/points": lambda query: self._consumers.points(query),
             "/picture": self._picture,
             "/mask": self._mask,
-            "/value": self._value,
+            "/value": lambda query: self._consumers.value(query),
             "/report": self._show_report,
         }
-        posts = {"/order": self._command, "/setup": self._change, "/map": self._map, "/viewer": self._viewer}
+        posts = {
+            "/order": self._command,
+            "/setup": self._change,
+            "/map": lambda request: self._consumers.select_map(request),
+            "/viewer": self._viewer,
+        }
         self.server = PageServer(self._broadcaster, gets, posts, port)
         self._publish_stage()
 
@@ -166,34 +171,24 @@ class PageController:
 
     def begin_all(self, configs: Mapping[str, Config]) -> Mapping[str, PageConsumer]:
         """Begin the stage of a run with these cameras, by name; the consumers of their data."""
-        self._consumers, self._live = {}, None
-        for name, config in configs.items():
-            kind, picture = "second" if self._consumers else "run", self._last_pictures.get(name, b"")
-            self._consumers[name] = PageConsumer(
-                self._broadcaster, config, picture=picture, kind=kind, side=name
-            )
-        self._consumer = next(iter(self._consumers.values()))
+        self._consumers, self._live = PageConsumers(self._broadcaster, configs, self._last_pictures), None
         self._enter(RUN, "")
-        return self._consumers
+        return self._consumers.by_name
 
     def attach(self, live: ControlledRun) -> None:
         """Pass commands to ``live`` from now on."""
         self._live = live
-        if self._consumer is not None:
-            self._consumer.attach(live)
+        self._consumers.attach(live)
 
     def attach_both(self, both: ControlledRun, runs: Mapping[str, Running]) -> None:
         """Pass commands to ``both`` from now on, whose cameras are ``runs``."""
         self._live = both
-        states = {name: run.run_state for name, run in runs.items()}
-        for name, consumer in self._consumers.items():
-            first = consumer is self._consumer
-            consumer.attach(both if first else runs[name], states if first else None)
+        self._consumers.attach_both(both, runs)
 
     def end(self, result: Mapping[str, Any]) -> None:
         """Begin the stage after the run and show its ``result``."""
         self._live, self._report = None, None
-        self._result = {**peaks(self._consumers), **result, "report": None, **self._names()}
+        self._result = {**peaks(self._consumers.by_name), **result, "report": None, **self._names()}
         self._broadcaster.publish("after", self._result)
         self._enter(AFTER, "")
         if self.draft is None:
@@ -241,55 +236,26 @@ class PageController:
 
     # -- requests of the page -----------------------------------------------------------------
 
-    def _points(self, query: Mapping[str, str]) -> Response:
-        if self._consumer is None:
-            raise HttpError(404, "nothing has been measured")
-        edition, count = (query.get(key, "") for key in ("edition", "count"))
-        if not all(word.isascii() and word.isdigit() and len(word) < 10 for word in (edition, count)):
-            raise HttpError(400, "edition and count are whole numbers")
-        return json_response(self._consumer.curve.since(int(edition), int(count)))
-
     def _picture(self, query: Mapping[str, str]) -> Response:
-        side = query.get("side", "")
-        source: SetupSession | PageConsumer | None = self._consumers.get(side, self._consumer)
-        if self.sessions is not None:
-            source = self.sessions.of(side)
-        if source is not None and source.picture:
-            return jpeg_response(source.picture)
+        sessions = self.sessions
+        if sessions is None:
+            picture = self._consumers.picture(query)
+        else:
+            picture = sessions.of(query.get("side")).picture
+        if picture:
+            return jpeg_response(picture)
         return Response(as_png(np.zeros((1, 1), np.uint8)), "image/png")
 
     def _mask(self, query: Mapping[str, str]) -> Response:
-        if self.sessions is None:
+        sessions = self.sessions
+        if sessions is None:
             raise HttpError(404, "nothing is set up")
-        return Response(self.sessions.of(query.get("side")).region.shade(), "image/png")
-
-    def _value(self, query: Mapping[str, str]) -> Response:
-        """The value of the map at a place of the picture, px."""
-        if self._consumer is None:
-            raise HttpError(404, "nothing has been measured")
-        try:
-            x, y = (float(query.get(key, "")) for key in ("x", "y"))
-        except ValueError:
-            raise HttpError(400, "x and y are numbers, in px") from None
-        if not (abs(x) < 1e6 and abs(y) < 1e6):
-            raise HttpError(400, "x and y are numbers, in px")
-        return json_response(self._consumers[self._side(query)].map.value_at(x, y))
-
-    def _side(self, query: Mapping[str, Any]) -> str:
-        """The camera that a request names, else the first."""
-        side = query.get("side")
-        return side if side in self._consumers else next(iter(self._consumers))
+        return Response(sessions.of(query.get("side")).region.shade(), "image/png")
 
     def _show_report(self, query: Mapping[str, str]) -> Response:
         if self._report is None:
             raise HttpError(404, "there is no report yet")
         return Response(self._report.read_bytes(), "text/html; charset=utf-8", REPORT_POLICY)
-
-    def _map(self, request: Mapping[str, Any]) -> dict[str, str]:
-        if self._consumer is None:
-            return {"answer": "no: nothing is measured"}
-        refusal = next(filter(None, [one.select_map(request) for one in self._consumers.values()]), "")
-        return {"answer": f"no: {refusal}" if refusal else "ok"}
 
     def _viewer(self, request: Mapping[str, Any]) -> dict[str, str]:
         """Open the viewer at the actual port of the view, which may differ from the configured one."""

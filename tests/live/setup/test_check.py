@@ -32,6 +32,12 @@ def checked(capsys: pytest.CaptureFixture[str], more: str, *arguments: str) -> t
     return code, capsys.readouterr().out
 
 
+@pytest.fixture
+def own_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No table of other sizes of ZOIs, which takes most of a check."""
+    monkeypatch.setattr("live.setup.check.check_list.SIZES", ())
+
+
 def test_a_good_picture_is_ready(capsys: pytest.CaptureFixture[str]) -> None:
     code, output = checked(capsys, "")
     assert code == 0, output
@@ -85,6 +91,7 @@ def test_a_short_reference_is_checked_with_frames_enough(capsys: pytest.CaptureF
     assert re.search(r"strain noise +\d+ µm/m measured", output)
 
 
+@pytest.mark.usefixtures("own_size")
 @pytest.mark.parametrize("count", [1, 5])
 def test_a_few_pictures_are_judged_by_what_they_show(
     count: int, capsys: pytest.CaptureFixture[str], tmp_path: Path
@@ -139,6 +146,7 @@ def config_values(folder: Path) -> dict[str, object]:
     return {"camera.address": f"files:{folder}", "measure.zoi": 48, "measure.reference_burst": 16}
 
 
+@pytest.mark.usefixtures("own_size")
 def test_the_load_cell_is_listened_to(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -148,6 +156,7 @@ def test_the_load_cell_is_listened_to(
     assert "1/s, noise" in output
 
 
+@pytest.mark.usefixtures("own_size")
 def test_the_snapshot_and_the_gauges(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """ZOIs with a low noise are green, others red; the noise of the gauges is printed."""
     shot = tmp_path / "shot.png"
@@ -171,6 +180,7 @@ def test_the_snapshot_and_the_gauges(capsys: pytest.CaptureFixture[str], tmp_pat
     assert "nothing is overwritten" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("own_size")
 def test_both_cameras_are_checked(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """NO-GO where one of them is not ready, with the picture of each."""
     drawn = str(tmp_path / "seen.png")

@@ -21,7 +21,7 @@ from tests.live.ui.web.http_page import HttpPage
 from tests.live.ui.web.test_page_consumer import costs_of, measurement
 
 ROOT = Path(__file__).parents[4]
-CAMERA = "sim:uniform?width=256&height=192&fps=20&seconds=6"
+CAMERA = "sim:uniform?width=256&height=192&fps=20&seconds=5"
 RUN = [
     "run",
     "--page",
@@ -80,8 +80,12 @@ def program(tmp_path: Path) -> Iterator[Program]:
     started.kill()
 
 
-def test_eight_pages_that_do_not_read_change_no_result(program: Program, tmp_path: Path) -> None:
-    pages = [HttpPage(program.address) for _ in range(MAX_PAGES)]
+def test_pages_that_are_killed_or_do_not_read_change_no_result(program: Program, tmp_path: Path) -> None:
+    pages = [HttpPage(program.address) for _ in range(MAX_PAGES // 2)]
+    for size in (20_000, 1, 0, 1000):  # the last, a later page, gets everything too
+        page = HttpPage(program.address)
+        page.read(size)
+        page.kill()
     ended_well(program)
     for page in pages:
         assert b"event: gone" not in page.rest(), "it read nothing"
@@ -106,12 +110,3 @@ def test_eight_pages_that_do_not_read_cost_under_a_millisecond_a_measurement() -
         for page in pages:
             page.kill()
     assert np.percentile(costs, 95) < 1e-3
-
-
-def test_a_browser_that_is_killed_changes_no_result(program: Program, tmp_path: Path) -> None:
-    for size in (20_000, 1, 0, 1000):  # the last, a later page, gets everything too
-        page = HttpPage(program.address)
-        page.read(size)
-        page.kill()
-    ended_well(program)
-    assert_untouched(tmp_path / "out")
