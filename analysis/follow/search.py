@@ -269,12 +269,12 @@ def _match(
     import cv2
 
     best, found = -2.0, (float(guesses[0][0]), float(guesses[0][1]))
-    for dx, dy in dict.fromkeys(map(tuple, guesses)):
-        top = int(np.clip(at[0] + dy - reach, 0, padded.shape[0] - template.shape[0] - 2 * reach))
-        left = int(np.clip(at[1] + dx - reach, 0, padded.shape[1] - template.shape[1] - 2 * reach))
-        window = padded[
-            top : top + template.shape[0] + 2 * reach, left : left + template.shape[1] + 2 * reach
-        ]
+    height, width = template.shape[0] + 2 * reach, template.shape[1] + 2 * reach
+    for dx, dy in dict.fromkeys(map(tuple, guesses.tolist())):
+        # No np.clip: of single numbers it takes longer than the match.
+        top = min(max(at[0] + dy - reach, 0), padded.shape[0] - height)
+        left = min(max(at[1] + dx - reach, 0), padded.shape[1] - width)
+        window = padded[top : top + height, left : left + width]
         score = cv2.matchTemplate(window, template, cv2.TM_CCOEFF_NORMED)
         _, value, _, place = cv2.minMaxLoc(score)
         if np.isfinite(value) and value > best:
