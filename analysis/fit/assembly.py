@@ -9,12 +9,14 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, parallel
+from analysis.compiled.loops import helper, inlined, parallel
 
 RUN = 1024
 """ZOIs whose covariances are scaled at a time."""
 MIN_NOISE_GAIN, MAX_NOISE_GAIN = 0.1, 5.0
 """The gain by which the noise of the deformed image is divided, and that of the reference multiplied: limits."""
+MIN_AREA = 0.05
+"""Area of a pixel of the reference in the deformed image, px: limit."""
 
 
 @helper
@@ -31,7 +33,7 @@ def expect(gain: Any, reference: Any, current: Any, least: Any, out: Any) -> Non
 
 @helper
 def weigh(
-    measured: Any, left: Any, freedom: Any, gain: Any, reference: Any, current: Any,
+    measured: Any, left: Any, freedom: Any, gain: Any, reference: Any, current: Any, values: Any,
     residual: Any, from_reference: Any, whole: Any,
 ) -> None:  # fmt: skip
     """What is left over what noise explains, and the variance that scales the unit covariances.
@@ -44,6 +46,8 @@ def weigh(
     freedom, gain : (A,)
     reference, current : (A,), GL^2
         Variance a pixel of the two images.
+    values : (A, modes)
+        Parameters: the noise of a picture that is stretched is a mean over more pixels (``area``).
     residual : (A,) float32, written
     from_reference, whole : (A,) float32, GL^2, written
         In grey levels of the reference; NaN where nothing was measured.
@@ -54,7 +58,18 @@ def weigh(
         whole[z] = np.nan
         if measured[z]:
             from_reference[z] = reference[z]
-            whole[z] = reference[z] + current[z] / max(gain[z], MIN_NOISE_GAIN) ** 2
+            whole[z] = reference[z] + current[z] / (max(gain[z], MIN_NOISE_GAIN) ** 2 * area(values, z))
+
+
+@inlined
+def area(values: Any, z: int) -> Any:
+    """Pixels of the deformed image to one of the reference at ZOI ``z``: det F, F = I + grad u.
+
+    At the frequencies of a pattern, which both images have, white noise of the deformed one is so many times less.
+    """
+    half = values.shape[1] // 2
+    stretch = (1 + values[z, 1]) * (1 + values[z, half + 2]) - values[z, 2] * values[z, half + 1]
+    return MIN_AREA if stretch < MIN_AREA else stretch
 
 
 @helper

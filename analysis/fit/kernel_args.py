@@ -77,14 +77,10 @@ class FitArgs(NamedTuple):
     cross : (A + 1, P, 10) float32
     squares : (A, 2) float64
         Sums of w f_x^2 and w f_y^2.
-    units : (modes,) float64
-        Of the parameters, in px (``sensitivity.parameter_scale``).
-    bias : (A, P) float32
-        See ``noise_bias``.
-    noise : (A,) float64, GL^2
-        Variance a pixel of the reference.
-    expected : (A,) float64, GL^2
-        The weighted sum of squares that the noise of both images leaves.
+    units, bias : (modes,) float64 and (A, P) float32
+        See ``sensitivity.parameter_scale`` and ``noise_bias``.
+    noise, expected : (A,) float64, GL^2
+        Variance a pixel of the reference; the weighted sum of squares that the noise of both images leaves.
     """
 
     images: NDArray[np.float32]
@@ -204,10 +200,14 @@ class ReferenceArgs(NamedTuple):
         Standard deviation of the worse of u and v from noise of 1 GL, as it is found.
     white : (2,)
         ``white_noise.white_cubic`` of the kernel.
+    bends : float
+        Mean square of what white noise bends, over its variance of u and v (``shapes.Shapes.noise``).
     independent : float
         ZOIs that a ZOI counts for, since neighbours share pixels; at most 1.
     information : (A,)
         On the least known of u, v and the gradients, over that which the noise of the reference pretends.
+    later : float
+        Share of the noise as stated that is the deformed image's.
     """
 
     signal: Floats
@@ -215,8 +215,10 @@ class ReferenceArgs(NamedTuple):
     unit: Floats
     centre: Floats
     white: Floats
+    bends: float
     independent: float
     information: Floats
+    later: float
 
     def at(self, places: NDArray[np.intp] | slice) -> ReferenceArgs:
         """That of some ZOIs."""
@@ -241,6 +243,8 @@ class PooledError(NamedTuple):
         Standard deviation of what a single ZOI leaves over that; 0 where that is as stated.
     colour : (2,)
         Variance of u and of v over that of white noise of the same variance a pixel.
+    bent : float
+        Square by which the displacement of a usual ZOI bends, over that from white noise; not less than 1.
     apart : bool
         Whether ZOIs whose displacement bends were left out.
     """
@@ -250,12 +254,13 @@ class PooledError(NamedTuple):
     usual: float
     scatter: float
     colour: Floats
+    bent: float
     apart: bool
 
     @classmethod
     def none(cls, count: int) -> PooledError:
         """Of ``count`` ZOIs that leave what is expected."""
-        return cls(np.ones(count), np.ones(count), 1.0, 0.0, np.ones(2), False)
+        return cls(np.ones(count), np.ones(count), 1.0, 0.0, np.ones(2), 1.0, False)
 
     def at(self, places: NDArray[np.intp] | slice) -> PooledError:
         """That of some ZOIs."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper
-from analysis.fit.assembly import MIN_NOISE_GAIN
+from analysis.fit.assembly import MIN_NOISE_GAIN, area
 from analysis.fit.kernel_args import CONVERGED, OutArgs, PooledError, ReferenceArgs
 from analysis.fit.validity import AGREES, COLOURED, LOST_SHARE
 
@@ -35,13 +35,15 @@ GROUP, MAX_GROUPS = 50, 8
 """ZOIs of like contrast whose median counts, at least, and number of such groups at most."""
 COLOUR_SPREAD = 1.0
 """Standard deviation of the logarithm of the ratio that the shapes of one ZOI show."""
-SHOWN = 7
+SHOWN = 8
 """Figures of a ZOI that are pooled (``explained``)."""
 BENT, SOME_BENT = 4.0, 0.1
 """What a fit leaves of a displacement that bends, over the median of noise, that one ZOI in a hundred exceeds by
 chance; share of the ZOIs that bend from which on those that do not are pooled alone, ..."""
 STRAIGHT_COLOUR = 1.3
 """... as long as they are one in ``LOWEST`` and show no more colour than this: coloured errors bend all."""
+WHITE_BENT = 0.83
+"""Median of what white noise bends, over its mean (simulated: 0.80 to 0.85)."""
 SAME = 1e-3
 """What is left over what the noise as stated explains, below which the picture is its own reference: no noise shows."""
 LOWEST, LOWEST_DEVIATION = 5, 0.84
@@ -79,18 +81,19 @@ def pooled(
     straight = _straight(out, known.white)
     if straight is not None:
         out, count = out[:, straight], np.count_nonzero(straight)
-    contrast, ratio, spread, bare, *cubic = out[:6, np.argsort(out[0], kind="stable")]
+    contrast, ratio, spread, bare, *cubic, _, bends = out[:, np.argsort(out[0], kind="stable")]
     if np.count_nonzero(bare < SAME) > count / 2:
         return None
     groups = _alike(count)
     middle, usual = medians(contrast[groups]), medians(ratio[groups])
     number, shares = count * min(1.0, every * known.independent), np.array(cubic) / known.white[:, None]
+    bent = max(1.0, float(_shrunk(medians(bends[None]) / (WHITE_BENT * known.bends), number)[0]))
     if given and usual.min() > AGREES[0] and usual.max() < AGREES[1]:
         colour = _shrunk(medians(shares), number)
         stated = PooledError.none(len(known.signal))._replace(
             forgiven=np.minimum(_at(known.signal, middle, usual), 1)
         )
-        stated = stated._replace(apart=straight is not None)
+        stated = stated._replace(bent=bent, apart=straight is not None)
         return stated if np.abs(np.log(colour)).max() < np.log(COLOURED) else stated._replace(colour=colour)
     trend, of_each = _at(known.signal, middle, usual), _at(contrast, middle, usual)
     scatter = MAD * float(np.median(np.abs(ratio / of_each - 1)))
@@ -98,7 +101,7 @@ def pooled(
     as_stated = (lowest < AS_STATED) | (np.median(lowest) < AS_STATED)
     forgiven = _at(known.signal, middle, np.where(as_stated, np.minimum(usual, 1.0), usual))
     colour = _shrunk(medians(shares / of_each), number)
-    return PooledError(trend, forgiven, float(np.median(trend)), scatter, colour, straight is not None)
+    return PooledError(trend, forgiven, float(np.median(trend)), scatter, colour, bent, straight is not None)
 
 
 @helper
@@ -118,7 +121,7 @@ def explained(
 
     Written to ``out`` (SHOWN, ..) of each: contrast; variance left over that expected, and what this scatters by;
     the same before rounding counts; variance of the shapes of u and of v over that expected of u and of v; that of all
-    shapes, as they bend, over the variance left.
+    shapes, as they bend, over the variance left for the worse of u and v, and for both.
     """
     tried = count = 0
     for i in range(0, len(places), every):
@@ -131,14 +134,16 @@ def explained(
         pattern = known.signal[z] * min(max(gain, 0.0), 1.0) ** 2
         if found.state[i] != CONVERGED or not left[i] < max(LOST_SHARE * pattern, 1.5 * expected[i]):
             continue
-        error = expected[i] / max(gain, MIN_NOISE_GAIN) ** 2
+        of_both = 1 - known.later + known.later / area(found.p, i)
+        error = of_both * expected[i] / max(gain, MIN_NOISE_GAIN) ** 2
         out[0, count] = known.signal[z]
         out[1, count] = left[i] / expected[i]
         out[2, count] = math.sqrt(2 / max(known.pixels[z], 1.0))
         out[3, count] = found.left[i] / (known.pixels[z] * expected[i])
         out[4, count] = found.cubic[i, 0] / (error * of_u)
         out[5, count] = found.cubic[i, 1] / (error * of_v)
-        out[6, count] = found.bending[i] * max(gain, MIN_NOISE_GAIN) ** 2 / (left[i] * max(of_u, of_v))
+        bends = found.bending[i] * max(gain, MIN_NOISE_GAIN) ** 2 / left[i]
+        out[6, count], out[7, count] = bends / max(of_u, of_v), bends / (of_u + of_v)
         count += 1
     return count if count >= MIN_MATCHED * tried else 0
 

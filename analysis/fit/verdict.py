@@ -10,6 +10,7 @@ from typing import Any
 
 from analysis.compiled.loops import helper, inlined
 from analysis.field import Status
+from analysis.fit.assembly import MIN_NOISE_GAIN
 from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, PooledError, ReferenceArgs, VerdictArgs
 from analysis.fit.validity import (
     AGREES,
@@ -88,7 +89,8 @@ def judge(
             by_noise = NOISE_FACTOR * max(noise, error) if rule.noise_known else allowed
             misfit = _used(left[z], by_noise, allowed + MODEL_SHARE * pattern - by_noise)
             many = colour if common.forgiven[z] > 1 else 1.0
-            bent = _bent(found, z, known, many * max(noise, left[z]), rule)
+            variance = max(noise, left[z]) / max(gain, MIN_NOISE_GAIN) ** 2
+            bent = _bent(found, z, known, variance, common.bent, many, rule)
             doubt = (misfit + bent) * _beyond(known, z, rule.far)
             out[z] = OK if doubt <= 1 else POOR_MATCH if misfit > bent else UNEVEN
 
@@ -136,16 +138,19 @@ def _used(value: Any, by_noise: Any, margin: Any) -> Any:
 
 
 @inlined
-def _bent(found: Any, z: int, known: Any, variance: Any, rule: Any) -> Any:
+def _bent(found: Any, z: int, known: Any, variance: Any, bent: Any, colour: Any, rule: Any) -> Any:
     """How far the displacement bends or jumps, in shares of what is allowed; beyond 1 the centre is wrong.
 
     The displacement that the strain makes over the width of the window allows for more: where a
-    specimen necks the strain is steep, but small beside itself; across a crack it is not.
+    specimen necks the strain is steep, but small beside itself; across a crack it is not. What all bend, ``bent``
+    times white noise, counts as noise, as far as it is coloured or within the limit.
     """
     of_u, of_v = variance * known.unit[z, 0], variance * known.unit[z, 1]
+    white = (of_u + of_v) * rule.noise[0]
+    many = max(colour, min(bent, 1 + rule.limit**2 / max(white, 1e-12)))
     spread = math.sqrt(2 * rule.noise[1] * (of_u**2 + of_v**2))
     allowed = rule.limit**2 + BENDING_SHARE**2 * squared_stretch(found.p, z, rule.lever)
-    return _used(found.bending[z], (of_u + of_v) * rule.noise[0], BENDING_CHANCE * spread + allowed)
+    return _used(found.bending[z], many * white, BENDING_CHANCE * many * spread + allowed)
 
 
 @inlined

@@ -87,6 +87,7 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         gain,
         noise.reference,
         noise.current,
+        found.p,
         residual,
         first,
         whole,
@@ -166,9 +167,9 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
         rest = beside_strain(solution, ok) if doubtful else None
         if rest is not None:
             over = 1.0 if solution.is_given and AGREES[0] < rest < AGREES[1] else rest
-            seen, colour = white[:2], white
-            ratio = np.full(len(ok), over)
-        elif colour.min() < 1 and abs(float(np.median(solution.found.nuisance[ok, 2]))) > SOME_BLUR:
+            seen = np.minimum(seen, 1)  # what bends adds to the shapes
+            colour, ratio = seen.repeat(3), np.full(len(ok), over)
+        if colour.min() < 1 and abs(float(np.median(solution.found.nuisance[ok, 2]))) > SOME_BLUR:
             # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
             colour = np.maximum(colour, 1)
         elif np.abs(np.log(seen)).max() > np.log(COLOURED):
@@ -254,6 +255,15 @@ def _composed(
     return placement.carried(local) + renewed, placement.spread(local, from_current)
 
 
+def _areas(values: Floats) -> Floats:
+    """``assembly.area`` of all ZOIs, (A,)."""
+    from analysis.fit.assembly import MIN_AREA
+
+    half = values.shape[1] // 2
+    stretch = (1 + values[:, 1]) * (1 + values[:, half + 2]) - values[:, 2] * values[:, half + 1]
+    return np.maximum(stretch, MIN_AREA)
+
+
 def _level_covariances(solution: Solution, noise: _Noise) -> tuple[Covariance, Covariance]:
     """The two parts (A, 21) with noise that grows with the grey level inside each ZOI."""
     from analysis.fit.assembly import MIN_NOISE_GAIN
@@ -261,7 +271,7 @@ def _level_covariances(solution: Solution, noise: _Noise) -> tuple[Covariance, C
     ready, model, own = solution.reference.prepared, solution.reference.noise_model, solution.noise
     unit, slope = ready.covariance, ready.covariance_level
     gain, offset = solution.found.nuisance[:, 0], solution.found.nuisance[:, 1]
-    by_gain = 1 / np.maximum(gain, MIN_NOISE_GAIN) ** 2
+    by_gain = 1 / (np.maximum(gain, MIN_NOISE_GAIN) ** 2 * _areas(solution.found.p))
     first = noise.reference[:, None] * unit
     second = (noise.current * by_gain)[:, None] * unit
     stated = solution.variances(np.s_[:], gain)

@@ -87,6 +87,7 @@ class Solution:
         self.tolerance = reference.tolerance(self._current_std())
         self._noise, current = self.variances(np.s_[:], np.ones(len(guess)))
         self._noise_left = np.maximum(prepared.freedom * (self._noise + current), 1e-9)
+        self._later = float(current.sum() / max((self._noise + current).sum(), 1e-9))
         able = prepared.status == Status.OK
         known = np.isfinite(guess.sum()) or np.isfinite(guess @ np.ones(guess.shape[1]))  # as a rule all
         which = np.flatnonzero(able & known)
@@ -267,8 +268,10 @@ class Solution:
             reference.share_variance,
             reference.unit_sigma[2],
             reference.white,
+            float(ready.shapes.noise[0]),
             min(1.0, (2 * reference.grid.step / reference.grid.size) ** 2),
             ready.information / np.maximum(self._noise, max(reference.rounding, 1e-9)),
+            self._later,
         )
 
     def _left(self, which: Places, found: OutArgs) -> Floats:

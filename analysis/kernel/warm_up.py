@@ -214,7 +214,7 @@ def _rest() -> None:
     none, pairs, single = np.empty(0), np.empty((0, 2)), np.empty(0, np.float32)
     found, known = (
         OutArgs.starting(np.empty((0, 6))),
-        ReferenceArgs(none, none, pairs, none, np.ones(2), 1.0, none),
+        ReferenceArgs(none, none, pairs, none, np.ones(2), 1.0, 1.0, none, 0.5),
     )
     rule = VerdictArgs(True, np.empty(2), 1.0, 0.05, 4.0, 6.0)
     judge(found, none, none, PooledError.none(0), known, rule, np.empty(0, np.uint8))
@@ -222,8 +222,8 @@ def _rest() -> None:
     medians(np.ones((2, 2)))
     weigh_blur(single, single, single)
     expect(np.ones(2), np.ones(2), np.ones(2), 0.0, np.empty(2))
-    weigh(np.empty(0, np.bool_), none, none, np.empty((2, 2))[:, 0], none, none, single, single, single)
-    origins, p = np.empty((0, 2), np.int64), np.empty((0, 6))
+    origins, p, gain = np.empty((0, 2), np.int64), np.empty((0, 6)), np.empty((2, 2))[:, 0]
+    weigh(np.empty(0, np.bool_), none, none, gain, none, none, p, single, single, single)
     warp_zois(_no_picture(), np.empty(18, np.float32), origins, 32, p, np.empty((0, 32, 32), np.float32))
     unit = np.empty((21, 0), np.float32)
     scale(unit, np.ones(21, np.float32), single, single, unit, unit)

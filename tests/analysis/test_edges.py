@@ -82,8 +82,9 @@ def test_a_fit_that_follows_the_noise_of_the_reference(
     found.state[:], found.iterations[:] = CONVERGED, 3
     one = np.ones(1)
     known = ReferenceArgs(
-        900 * one, 350 * one, np.full((1, 2), 1e-4), 0.01 * one, np.ones(2), 1.0, information_over_noise * one
-    )
+        900 * one, 350 * one, np.full((1, 2), 1e-4), 0.01 * one, np.ones(2), 1.5, 1.0,
+        information_over_noise * one, 0.5,
+    )  # fmt: skip
     rule = VerdictArgs(True, np.array([1.5, 0.5]), 5.0, 0.05, 4.0, 6.0)
     judge(found, left * one, one, PooledError.none(1), known, rule, out)
     assert Status(int(out[0])) == status
@@ -118,7 +119,7 @@ def test_a_slow_fit_that_seems_certain_is_on_a_corner(
     found.left[:], found.bending[:], found.nuisance[:] = 1, 0, (1, 0, 0)
     found.state[:], found.iterations[:] = CONVERGED, steps
     unit = np.full((1, 2), sigma**2 / beyond)
-    known = ReferenceArgs(900 * one, 350 * one, unit, sigma * one, np.ones(2), 1.0, 100 * one)
+    known = ReferenceArgs(900 * one, 350 * one, unit, sigma * one, np.ones(2), 1.5, 1.0, 100 * one, 0.5)
     rule = VerdictArgs(True, np.array([1.5, 0.5]), 5.0, 0.05, 2.5, 6.0)
     judge(found, one, one, PooledError.none(1), known, rule, out)
     assert Status(int(out[0])) == status

@@ -32,12 +32,13 @@ def test_a_zoi_is_weighed_by_the_noise_of_both_images() -> None:
     measured = np.array([True, False, True])
     left, freedom, gain = np.array([8.0, 1.0, 3.0]), np.array([2.0, 1.0, 4.0]), np.array([0.5, 1.0, 0.01])
     reference, current = np.array([4.0, 1.0, 2.0]), np.array([3.0, 1.0, 1.0])
-    residual, first, whole = np.empty((3, 3), np.float32)
-    weigh(measured, left, freedom, gain, reference, current, residual, first, whole)
+    values, (residual, first, whole) = np.zeros((3, 6)), np.empty((3, 3), np.float32)
+    values[2] = 5.0, 0.5, 0.2, -7.0, -0.1, -0.2  # of u, its gradients, v and its
+    weigh(measured, left, freedom, gain, reference, current, values, residual, first, whole)
     assert np.allclose(residual, [4 / (1 + 3), 0.5, 0.75 / (2e-4 + 1)])
     assert np.array_equal(first, [4, np.nan, 2], equal_nan=True)
-    # In grey levels of the reference, by a gain of 0.1 at least.
-    assert np.allclose(whole, [4 + 3 / 0.25, np.nan, 2 + 1 / 0.01], equal_nan=True)
+    # In grey levels of the reference, by a gain of 0.1 at least, over so many pixels as one becomes.
+    assert np.allclose(whole, [4 + 3 / 0.25, np.nan, 2 + 1 / 0.01 / (1.5 * 0.8 + 0.2 * 0.1)], equal_nan=True)
 
 
 def test_unit_covariances_are_scaled_whatever_their_number() -> None:
@@ -240,8 +241,10 @@ def verdict(
             np.full((1, 2), unit),
             one * np.sqrt(unit * beyond),
             np.ones(2),
+            1.5,
             1.0,
             one * 1e3,
+            0.5,
         ),
         VerdictArgs(known, np.array([1.5, 0.5]), 5.0, limit, 4.0, 6.0),
     )
@@ -277,6 +280,27 @@ def test_bending_beyond_its_noise_and_the_limit(bending: float, unit: float, une
         strained = np.array([[0.0, 0.3, 0.0, 0.0, 0.0, 0.0]])
         assert verdict(bending=bending, unit=unit, values=strained) == Status.OK
         assert verdict(bending=bending, unit=unit, limit=np.inf) == Status.OK
+
+
+def test_bending_counts_in_the_contrast_of_the_picture_and_beside_its_like() -> None:
+    """Noise of 1 GL makes 1.5 * 2 * unit of it, 1 of its deviations 1.41 * unit."""
+    unit = 1e-3
+    noise, spread = 3 * unit, 2**0.5 * unit
+    edge = noise + 6 * spread + 0.05**2
+    assert verdict(bending=0.98 * edge, unit=unit) == Status.OK
+    assert verdict(bending=1.02 * edge, unit=unit) == Status.UNEVEN
+    dim = 4 * (noise + 6 * spread) + 0.05**2  # at half of the contrast
+    assert verdict(bending=0.98 * dim, unit=unit, gain=0.5) == Status.OK
+    assert verdict(bending=1.02 * dim, unit=unit, gain=0.5) == Status.UNEVEN
+    like = PooledError.none(1)._replace(bent=1.5)
+    alike = 1.5 * (noise + 6 * spread) + 0.05**2
+    assert verdict(bending=0.98 * alike, unit=unit, common=like) == Status.OK
+    assert verdict(bending=1.02 * alike, unit=unit, common=like) == Status.UNEVEN
+    # No more of what all bend is forgiven than the limit itself.
+    most, all_bend = 1 + 0.05**2 / noise, PooledError.none(1)._replace(bent=50.0)
+    beyond = most * (noise + 6 * spread) + 0.05**2
+    assert verdict(bending=0.98 * beyond, unit=unit, common=all_bend) == Status.OK
+    assert verdict(bending=1.02 * beyond, unit=unit, common=all_bend) == Status.UNEVEN
 
 
 def test_a_little_in_both_residual_and_bending_is_too_much() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis import PhaseKernel, Roi, StrainField, ZoiGrid
+from analysis import KernelSettings, PhaseKernel, Roi, Status, StrainField, ZoiGrid
 
 pytestmark = pytest.mark.data
 
@@ -55,3 +55,17 @@ def test_hardly_any_valid_zoi_is_wrong(data_dir: Path, name: str) -> None:
             assert field.ok.sum() >= least
             valid, astray = valid + int(field.ok.sum()), astray + int(wrong(field, step).sum())
     assert astray <= 0.0005 * valid, f"{astray} of {valid}"
+
+
+@pytest.mark.parametrize(
+    ("later", "most"), [("img_1.tif", 0.004), ("img_2.tif", 0.005), ("img_3.tif", 0.012)]
+)
+def test_what_all_bend_a_little_refuses_few(data_dir: Path, later: str, most: float) -> None:
+    """A polymer that necks at falling contrast: with these ZOIs peers agree within 0.05 px."""
+    first, second = (
+        cv2.imread(str(data_dir / "planar_tension" / n), cv2.IMREAD_GRAYSCALE) for n in ("img_0.tif", later)
+    )
+    grid = ZoiGrid.cover(Roi(48, 48, first.shape[1] - 96, first.shape[0] - 96), 33, 8)
+    field = PhaseKernel(first, grid, KernelSettings(window="uniform")).measure(second)
+    uneven = np.count_nonzero(field.status == Status.UNEVEN)
+    assert uneven < most * (uneven + field.n_valid)

@@ -38,7 +38,9 @@ def verdict(
         np.full(1, 1e-3),
         np.ones(2),
         1.0,
+        1.0,
         np.full(1, 1e3),
+        0.5,
     )
     rule = VerdictArgs(noise_known, np.array([1.0, 1.0]), 32 / 6, 0.05, 4.0, 6.0)
     out = np.empty(1, np.uint8)
