@@ -125,7 +125,9 @@ def test_a_system_time_set_back_changes_no_measured_time(
     again(tmp_path / "out")
 
 
-@pytest.mark.parametrize("hours", [3, pytest.param(12, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "hours", [pytest.param(3, marks=pytest.mark.slow), pytest.param(12, marks=pytest.mark.slow)]
+)
 def test_hours_at_one_frame_a_second(run: Callable[..., Outcome], tmp_path: Path, hours: int) -> None:
     """By the stamps of the frames; only the sums of a minute each are recorded and measured."""
     began, frames = time.monotonic(), hours * 3600

@@ -138,6 +138,7 @@ def test_own_noise_is_what_a_pixel_puts_into_the_filtered_picture() -> None:
     assert found == pytest.approx(made.own_noise, rel=0.05)
 
 
+@pytest.mark.slow
 def test_noise_of_the_reference_leaves_no_bias() -> None:
     """Single frames with much noise: without the correction the mean is -630 +- 40 um/m."""
     rng = np.random.default_rng(8)

@@ -175,8 +175,10 @@ def scatter_over_predicted(
 @pytest.mark.parametrize(
     ("size", "step", "count", "order", "noise"),
     [
-        pytest.param(32, 4, 17, 1, NOISE_GL, marks=pytest.mark.slow), (32, 8, 13, 1, NOISE_GL), (32, 8, 13, 1, None),
-        pytest.param(32, 16, 7, 1, NOISE_GL, marks=pytest.mark.slow), (48, 12, 9, 2, NOISE_GL),
+        pytest.param(32, 4, 17, 1, NOISE_GL, marks=pytest.mark.slow), (32, 8, 13, 1, NOISE_GL),
+        pytest.param(32, 8, 13, 1, None, marks=pytest.mark.slow),
+        pytest.param(32, 16, 7, 1, NOISE_GL, marks=pytest.mark.slow),
+        pytest.param(48, 12, 9, 2, NOISE_GL, marks=pytest.mark.slow),
     ],
 )  # fmt: skip
 def test_means_scatter_as_predicted(

@@ -94,6 +94,7 @@ for taken_by, shift in ((0, 0), (1, 0), (1, 1)):
     assert run(CALLER + code) == ["1 0", "1024 0", f"0 {left}"]
 
 
+@pytest.mark.slow
 def test_the_same_strain_from_the_same_compiled_loops() -> None:
     """What is compiled with one layer is loaded with another, and gives the same bits."""
     code = """

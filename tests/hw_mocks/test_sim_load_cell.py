@@ -86,6 +86,7 @@ def test_unplugged_port_is_reached_again() -> None:
     assert any("again" in event.text for event in events)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("protocol", INDICATORS)
 def test_every_protocol_reads_the_force(protocol: str) -> None:
     """Simulator and reader were written apart from the same descriptions; here they meet.

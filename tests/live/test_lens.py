@@ -235,6 +235,7 @@ VIEWS = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_boards_show_the_lens_with_honest_uncertainty(tmp_path: Path) -> None:
     pictures = [board_seen(turn, place, k) for k, (turn, place) in enumerate(VIEWS)]
     blank = np.full((360, 480), 128, np.uint8)

@@ -187,6 +187,7 @@ def listened(folder: Path, *alarm: str, **cameras: str) -> list[dict[str, float 
     return [{"line": 1.0} if text == "HALT" else json.loads(text) for text in lines]
 
 
+@pytest.mark.slow
 def test_the_mean_goes_out_with_its_sigma(tmp_path: Path) -> None:
     lines = listened(tmp_path / "test", front=LIVE, back=LIVE + BEHIND)
     found, sent = table(tmp_path / "test"), [one for one in lines if one["mean_axial"] is not None]
@@ -204,6 +205,7 @@ def test_the_mean_goes_out_with_its_sigma(tmp_path: Path) -> None:
 ALARM = "[[alarm]]\nchannel = 'mean_axial'\nabove = 0.02\nend = true\nline = 'HALT'"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["front", "back"])
 def test_a_camera_that_fails_sends_no_mean_and_ends_what_an_alarm_on_it_guards(
     side: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -29,6 +29,7 @@ def test_damaged_files_are_refused_or_right(tmp_path: Path) -> None:
     assert {end for _, end in ends} <= {"refused", "right"}, ends
 
 
+@pytest.mark.slow
 def test_a_damaged_unfinished_file_is_tried_in_a_child_with_a_time_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

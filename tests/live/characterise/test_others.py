@@ -56,6 +56,7 @@ def test_a_known_shift(module: str, program: others.Program) -> None:
     assert np.nanmean(program(*pair)) == pytest.approx(0.25, abs=5e-3)
 
 
+@pytest.mark.slow
 def test_a_program_that_fails_is_named_and_the_page_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

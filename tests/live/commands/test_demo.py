@@ -14,7 +14,7 @@ from live.commands import demo
 SHORT = ["--seconds", "2", "--fps", "10", "--reference-burst", "2", "--burst", "2", "--step", "64"]
 
 
-@pytest.mark.parametrize(("agreed", "code"), [(True, 5), (False, 1)])
+@pytest.mark.parametrize(("agreed", "code"), [pytest.param(True, 5, marks=pytest.mark.slow), (False, 1)])
 def test_without_a_modulus_it_says_so(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,

@@ -131,6 +131,7 @@ def test_calibrating_in_simulation_without_a_terminal(
     assert [path.name for path in tmp_path.iterdir()] == ["b.toml"]
 
 
+@pytest.mark.slow
 def test_the_simulated_rig_is_at_rest_before_a_run(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

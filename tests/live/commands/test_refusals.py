@@ -292,7 +292,12 @@ def test_a_folder_whose_name_reads_as_settings(capsys: pytest.CaptureFixture[str
 
 @pytest.mark.parametrize("part", ["the whole", "one picture", "the events"])
 @pytest.mark.parametrize(
-    "command", [("report", "RUN"), ("export", "RUN", "--to", "png"), ("export", "RUN", "--to", "r3xa")]
+    "command",
+    [
+        ("report", "RUN"),
+        pytest.param(("export", "RUN", "--to", "png"), marks=pytest.mark.slow),
+        ("export", "RUN", "--to", "r3xa"),
+    ],
 )
 def test_results_do_not_need_the_recording(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, command: tuple[str, ...], part: str

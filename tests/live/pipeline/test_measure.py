@@ -348,6 +348,7 @@ def test_the_columns_grow_while_they_are_read() -> None:
     assert column.size == 1 and axial is not None and axial.size == 1
 
 
+@pytest.mark.slow
 def test_little_memory() -> None:
     history = History()
     tracemalloc.start()
@@ -358,6 +359,7 @@ def test_little_memory() -> None:
     assert grown < 250, "bytes an instant with two gauges"
 
 
+@pytest.mark.slow
 def test_numbers_that_do_not_change_take_no_memory() -> None:
     history, still = History("y"), make_measurement(0).time_step
     tracemalloc.start()

@@ -98,6 +98,7 @@ def bursts() -> list[Burst]:
     return [one for one in gc.get_objects() if isinstance(one, Burst)]
 
 
+@pytest.mark.slow
 def test_bursts_are_let_go_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     size = "lockstep=yes&seconds=2&fps=10&width=160&height=128&bits=12"
     words = ["--zoi", "48", "--step", "24", "--burst", "2", "--no-view", "--no-rrd"]

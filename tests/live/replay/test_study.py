@@ -115,6 +115,7 @@ def test_nothing_was_still(session: Path, tmp_path: Path, capsys: pytest.Capture
     assert small["seen"] > 1.1 * large["seen"] > 0.008
 
 
+@pytest.mark.slow
 @pytest.mark.data
 @pytest.mark.usefixtures("no_browser")
 def test_the_open_hole(data_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

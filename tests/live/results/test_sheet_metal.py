@@ -16,6 +16,7 @@ from live.commands.more_gauges import add_gauges
 from live.results.report.evaluation import EvaluatedCurve, neck_line
 from live.results.run_folder import open_run
 
+pytestmark = pytest.mark.slow
 METAL = PowerLaw(0.2, 1.5)
 SIM = (
     "sim:uniform?n=0.2&r=1.5&neck=30&max_strain=0.45&seconds=40&hold=2&end=1&fps=15&noise=0.3"

@@ -139,6 +139,7 @@ def test_the_command_writes_a_table(
     assert "sides.csv" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_what_is_not_of_one_test_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     front = make_run(tmp_path / "front")
     same = make_run(tmp_path / "same", session=False)  # by its time: of one run with two cameras

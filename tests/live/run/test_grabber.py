@@ -173,7 +173,10 @@ def run(camera: Path, out: Path) -> int:
     return main(["run", "--camera", str(camera), *bursts, "--no-view", "--no-rrd", "--out", str(out)])
 
 
-@pytest.mark.parametrize("speed", [0.3, 5.0, 20.0, 37.0])
+@pytest.mark.parametrize(
+    "speed",
+    [0.3, pytest.param(5.0, marks=pytest.mark.slow), pytest.param(20.0, marks=pytest.mark.slow), 37.0],
+)
 def test_the_reference_is_taken_once_the_picture_is_still(tmp_path: Path, speed: float) -> None:
     fast = [speed * k for k in range(4)]
     assert run(shots(tmp_path / "shots", [*fast, *[fast[-1]] * 26]), tmp_path / "out") == 0

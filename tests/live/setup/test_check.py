@@ -231,6 +231,7 @@ def test_predicted_and_measured_agree(trial: str) -> None:
         assert one.measured == pytest.approx(one.predicted, rel=0.2), (trial, one)
 
 
+@pytest.mark.slow
 def test_the_table_has_every_zoi_order_and_burst() -> None:
     found = figures("&bits=12&noise=1", 64, table=True)
     rows = {(f.zoi, f.order): f for f in found.floors}

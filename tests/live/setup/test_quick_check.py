@@ -77,6 +77,7 @@ class FakeView:
         self.closed = True
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_the_table(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     FakeView.made = []
     monkeypatch.setattr(check_watch, "View", FakeView)

@@ -71,6 +71,7 @@ def pictures(folder: Path) -> Iterator[Path]:
     yield from sorted(p for p in folder.rglob("*") if p.suffix in (".tif", ".tiff", ".png"))
 
 
+@pytest.mark.slow
 def test_every_real_picture_has_its_specimen(data_dir: Path) -> None:
     """What fills the picture is found all over it, what does not, not."""
     for path in pictures(data_dir):

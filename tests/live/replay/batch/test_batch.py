@@ -36,6 +36,7 @@ def batch(*words: object) -> int:
     return main(["batch", *map(str, words)])
 
 
+@pytest.mark.slow
 def test_twelve_tests_in_one_table(done: Path) -> None:
     table = rows(done)
     assert [row["test"] for row in table] == sorted(
@@ -83,6 +84,7 @@ def test_a_full_disk_is_a_line_of_each_test(runs: Path, tmp_path: Path, limit: i
     assert all("cannot be written (File too large)" in row["error"] for row in rows(tmp_path / "o"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["uniform-1", "hole-2", "woven-4"])
 def test_bit_equal_to_a_replay(runs: Path, done: Path, tmp_path: Path, name: str) -> None:
     """In a process of its own: this one may have compiled loops for other tests, with another last digit."""
@@ -114,6 +116,7 @@ def test_rows_of_a_task_are_flushed_seldom(
     assert paces == [10.0, strain_h5.FLUSH_S]
 
 
+@pytest.mark.slow
 def test_again_only_what_is_missing(runs: Path, done: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = {path: path.stat().st_mtime_ns for path in done.glob("*/strain.h5")}
     words = (runs / "*" / "session.h5", *SETTINGS, "--out", done)

@@ -39,6 +39,7 @@ def cut(long: Path) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_as_the_whole(whole: Path, cut: Path) -> None:
     with Strain.open(whole / "strain.h5") as one, Strain.open(cut / "long" / "strain.h5") as other:
         assert len(one.time_s) == 310
@@ -55,6 +56,7 @@ def test_as_the_whole(whole: Path, cut: Path) -> None:
             assert np.abs(error).max() < 1e-3  # of the means, which the kernel knows more of
 
 
+@pytest.mark.slow
 def test_the_first_chunk_is_bit_equal(whole: Path, cut: Path) -> None:
     with Strain.open(whole / "strain.h5") as one, Strain.open(cut / "long" / "strain.h5") as other:
         for name in ("u", "eyy", "sigma_eyy", "residual", "iterations"):
@@ -62,6 +64,7 @@ def test_the_first_chunk_is_bit_equal(whole: Path, cut: Path) -> None:
         assert np.any(other.maps("u")[90:] != one.maps("u")[90:])  # it was cut indeed
 
 
+@pytest.mark.slow
 def test_files_are_those_of_a_replay(whole: Path, cut: Path) -> None:
     one, other = ((folder / "strain.csv").read_text().splitlines() for folder in (whole, cut / "long"))
     assert one[0] == other[0]
@@ -118,6 +121,7 @@ def changing(folder: Path) -> Path:
     return folder / "changing" / "session.h5"
 
 
+@pytest.mark.slow
 def test_a_renewed_reference_is_not_cut(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -151,6 +155,7 @@ def test_what_is_refused(
     assert says in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_short_one_is_bit_equal(runs: Path, tmp_path: Path) -> None:
     one = runs / "hole-1" / "session.h5"
     words = [*SETTINGS, "--out"]

@@ -134,6 +134,7 @@ def test_set_up_changed_saved_and_started(at: PageSession, tmp_path: Path) -> No
     assert at.command("start").startswith("no:"), "it has been started"
 
 
+@pytest.mark.slow
 def test_two_cameras_are_set_up_checked_saved_and_started_together(tmp_path: Path) -> None:
     at = PageSession(tmp_path, f'back = "{CAMERA}&side=back&seed=3"\n')
     try:

@@ -80,6 +80,7 @@ def program(tmp_path: Path) -> Iterator[Program]:
     started.kill()
 
 
+@pytest.mark.slow
 def test_pages_that_are_killed_or_do_not_read_change_no_result(program: Program, tmp_path: Path) -> None:
     pages = [HttpPage(program.address) for _ in range(MAX_PAGES // 2)]
     for size in (20_000, 1, 0, 1000):  # the last, a later page, gets everything too
