@@ -239,44 +239,25 @@ def _match_blocks(
     reference: Image, deformed: Image, box: Roi, guess: Blocks, reach: int, extra: tuple[int, int] | None
 ) -> Blocks:
     """Displacement of each block: the best match within ``reach`` px of any guess."""
+    from analysis.follow.block_match import match
+
     size = min(BLOCK, box.width, box.height)
     first_y = _firsts(box.y, box.height, size)
     first_x = _firsts(box.x, box.width, size)
     y: NDArray[np.float64] = np.asarray(first_y + (size - 1) / 2, np.float64)
     x: NDArray[np.float64] = np.asarray(first_x + (size - 1) / 2, np.float64)
     grid_y, grid_x = (a.ravel() for a in np.meshgrid(y, x, indexing="ij"))
-    guesses = np.rint(guess.around(grid_y, grid_x)).astype(int)
+    guesses = np.rint(guess.around(grid_y, grid_x)).astype(np.int64)
     if extra is not None:
         guesses = np.concatenate([guesses, np.broadcast_to(np.array(extra), (len(guesses), 1, 2))], axis=1)
     margin = size + 2 * reach
     padded = np.pad(deformed, margin, mode="reflect" if min(deformed.shape) > margin else "edge")
     shift = np.empty((len(grid_y), 2))
-    for k, (top, left) in enumerate((a, b) for a in first_y for b in first_x):
-        template = reference[top : top + size, left : left + size]
-        shift[k] = _match(template, padded, (top + margin, left + margin), guesses[k], reach)
+    firsts = np.stack([a.ravel() for a in np.meshgrid(first_y, first_x, indexing="ij")], axis=1).astype(np.int64)
+    match(np.ascontiguousarray(reference), padded, margin, firsts, size, guesses, reach, shift)
     return Blocks(y, x, shift.reshape(len(y), len(x), 2))
 
 
 def _firsts(first: int, length: int, size: int) -> NDArray[np.intp]:
     count = max(1, (length - size) // BLOCK_STEP + 1)
     return np.unique(np.linspace(first, first + length - size, count).astype(np.intp))
-
-
-def _match(
-    template: Image, padded: Image, at: tuple[int, int], guesses: NDArray[Any], reach: int
-) -> tuple[float, float]:
-    """The best of the neighbourhoods of several guesses, as a displacement (x, y)."""
-    import cv2
-
-    best, found = -2.0, (float(guesses[0][0]), float(guesses[0][1]))
-    height, width = template.shape[0] + 2 * reach, template.shape[1] + 2 * reach
-    for dx, dy in dict.fromkeys(map(tuple, guesses.tolist())):
-        # No np.clip: of single numbers it takes longer than the match.
-        top = min(max(at[0] + dy - reach, 0), padded.shape[0] - height)
-        left = min(max(at[1] + dx - reach, 0), padded.shape[1] - width)
-        window = padded[top : top + height, left : left + width]
-        score = cv2.matchTemplate(window, template, cv2.TM_CCOEFF_NORMED)
-        _, value, _, place = cv2.minMaxLoc(score)
-        if np.isfinite(value) and value > best:
-            best, found = value, (float(left + place[0] - at[1]), float(top + place[1] - at[0]))
-    return found
