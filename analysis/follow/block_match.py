@@ -64,7 +64,7 @@ def _match_block(
 
 @helper
 def _is_repeated(guesses: Any, k: int) -> bool:
-    for i in range(k):
+    for i in range(k):  # noqa: SIM110 - compiled
         if guesses[i, 0] == guesses[k, 0] and guesses[i, 1] == guesses[k, 1]:
             return True
     return False

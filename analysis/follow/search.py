@@ -66,7 +66,7 @@ def search(
     candidates = np.rint(np.concatenate([out[:, None, [0, 3]], around], axis=1)).astype(np.int64)
     found = np.zeros((len(centre), 2), np.int64)
     climb(
-        reference - offset, deformed - offset, origins, size,
+        reference, deformed, offset, origins, size,
         np.ascontiguousarray(candidates), MAX_MOVES, found, np.zeros(len(centre)),
     )  # fmt: skip
     out[:, [0, 3]] = found
@@ -84,30 +84,31 @@ class Blocks:
     x: NDArray[np.float64]
     shift: NDArray[np.float64]
 
-    def planes(self) -> NDArray[np.float64]:
-        """A plane through each block's displacement and its neighbours', (M, N, 6), px.
+    def planes(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float64]:
+        """A plane through the displacements of some blocks (K,) and their neighbours', (K, 6), px.
 
         u, du_dx, du_dy, v, dv_dx, dv_dy at the block's centre, least squares over 5 x 5 blocks; those
         further than OUTLIER from the plane are left out the second time.
         """
-        rows, columns = self.shift.shape[:2]
         near = np.arange(-PLANE_REACH, PLANE_REACH + 1)
-        r = np.clip(np.arange(rows)[:, None] + near, 0, rows - 1)
-        c = np.clip(np.arange(columns)[:, None] + near, 0, columns - 1)
+        r, c = (
+            np.clip(which[:, None] + near, 0, count - 1)
+            for which, count in zip((rows, columns), self.shift.shape, strict=False)
+        )
         # Blocks beyond the border would be counted twice: weight zero.
-        weight = np.einsum("ai,bj->abij", *(np.diff(k, axis=1, prepend=-1) > 0 for k in (r, c))).astype(float)
-        dy = np.broadcast_to((self.y[r] - self.y[:, None])[:, None, :, None], weight.shape)
-        dx = np.broadcast_to((self.x[c] - self.x[:, None])[None, :, None, :], weight.shape)
-        basis = np.stack([np.ones_like(dx), dx, dy], axis=-1).reshape(rows, columns, -1, 3)
-        shift = self.shift[r[:, None, :, None], c[None, :, None, :]].reshape(rows, columns, -1, 2)
-        start = np.median(shift, axis=2, keepdims=True)
-        weight = weight.reshape(rows, columns, -1)
-        reach = 0.5 * np.hypot(np.ptp(self.x), np.ptp(self.y)) / max(rows, columns) * MAX_GRADIENT
+        weight = np.einsum("ki,kj->kij", *(np.diff(k, axis=1, prepend=-1) > 0 for k in (r, c))).astype(float)
+        dy = np.broadcast_to((self.y[r] - self.y[rows, None])[:, :, None], weight.shape)
+        dx = np.broadcast_to((self.x[c] - self.x[columns, None])[:, None, :], weight.shape)
+        basis = np.stack([np.ones_like(dx), dx, dy], axis=-1).reshape(len(rows), -1, 3)
+        shift = self.shift[r[:, :, None], c[:, None, :]].reshape(len(rows), -1, 2)
+        start = np.median(shift, axis=1, keepdims=True)
+        weight = weight.reshape(len(rows), -1)
+        reach = 0.5 * np.hypot(np.ptp(self.x), np.ptp(self.y)) / max(self.shift.shape[:2]) * MAX_GRADIENT
         keep = weight * (np.abs(shift - start).max(axis=-1) < np.maximum(OUTLIER, 4 * reach))
         fit = _planes(basis, shift, keep)
-        error = np.abs(np.einsum("abkp,abpc->abkc", basis, fit) - shift).max(axis=-1)
+        error = np.abs(np.einsum("kip,kpc->kic", basis, fit) - shift).max(axis=-1)
         fit = _planes(
-            basis, shift, weight * (error < np.maximum(OUTLIER, np.median(error, axis=2, keepdims=True)))
+            basis, shift, weight * (error < np.maximum(OUTLIER, np.median(error, axis=1, keepdims=True)))
         )
         return np.concatenate([fit[..., 0], fit[..., 1]], axis=-1)
 
@@ -119,7 +120,8 @@ class Blocks:
     def plane_at(self, y: NDArray[np.floating], x: NDArray[np.floating]) -> NDArray[np.float64]:
         """The plane of the nearest block, moved to each point, (points, 6)."""
         r, c = (np.abs(np.subtract.outer(at, own)).argmin(axis=1) for at, own in ((y, self.y), (x, self.x)))
-        plane = self.planes()[r, c]
+        blocks, own = np.unique(r * len(self.x) + c, return_inverse=True)
+        plane = self.planes(*np.divmod(blocks, len(self.x)))[own]
         dy, dx = y - self.y[r], x - self.x[c]
         for k in (0, 3):
             plane[:, k] += plane[:, k + 1] * dx + plane[:, k + 2] * dy
@@ -129,9 +131,9 @@ class Blocks:
 def _planes(
     basis: NDArray[np.float64], values: NDArray[np.float64], weight: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Weighted least squares of planes, (M, N, 3, 2); flat where too few blocks are left."""
-    normal = np.einsum("abkp,abk,abkq->abpq", basis, weight, basis)
-    right = np.einsum("abkp,abk,abkc->abpc", basis, weight, values)
+    """Weighted least squares of planes, (K, 3, 2); flat where too few blocks are left."""
+    weighted = (basis * weight[..., None]).swapaxes(1, 2)
+    normal, right = weighted @ basis, weighted @ values
     ridge = np.zeros((3, 3))
     ridge[1, 1] = ridge[2, 2] = BLOCK_STEP**2
     ridge[0, 0] = 1e-9
@@ -253,7 +255,9 @@ def _match_blocks(
     margin = size + 2 * reach
     padded = np.pad(deformed, margin, mode="reflect" if min(deformed.shape) > margin else "edge")
     shift = np.empty((len(grid_y), 2))
-    firsts = np.stack([a.ravel() for a in np.meshgrid(first_y, first_x, indexing="ij")], axis=1).astype(np.int64)
+    firsts = np.stack([a.ravel() for a in np.meshgrid(first_y, first_x, indexing="ij")], axis=1).astype(
+        np.int64
+    )
     match(np.ascontiguousarray(reference), padded, margin, firsts, size, guesses, reach, shift)
     return Blocks(y, x, shift.reshape(len(y), len(x), 2))
 

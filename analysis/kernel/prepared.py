@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise, starmap
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -206,8 +206,8 @@ def _fits(
 def _near_each_other(origins: NDArray[np.int64], size: int) -> Iterator[slice]:
     """ZOIs (A, 2), which come row by row, in parts whose first rows lie within ``ROWS_OF_ZOIS``."""
     down = np.maximum.accumulate(origins[:, 0])
-    ends = np.flatnonzero(np.diff((down - down[0]) // (ROWS_OF_ZOIS * size))) + 1
-    return starmap(slice, pairwise([0, *ends.tolist(), len(origins)]))
+    ends = np.flatnonzero(np.diff((down - down[:1]) // (ROWS_OF_ZOIS * size))) + 1
+    return (slice(*ends) for ends in pairwise([0, *ends.tolist(), len(origins)]) if len(origins))
 
 
 def _measurable(

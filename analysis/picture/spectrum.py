@@ -75,7 +75,9 @@ def filtered_pattern(
     mean = float(image.mean(dtype=np.float64))
     places = [_padded_places(n, "reflect" if min(image.shape) > _MARGIN else "edge") for n in image.shape]
     height, width = (len(place) for place in places)
-    room = np.empty((2, max(height * (width // 2 + 1), image.shape[0] * (image.shape[1] // 2 + 1))), np.complex64)
+    room = np.empty(
+        (2, max(height * (width // 2 + 1), image.shape[0] * (image.shape[1] // 2 + 1))), np.complex64
+    )
     radius, power = _radial_spectrum(image, np.float32(mean), room[0])
     floor = float(np.median(power[radius > NOISE_BAND]))
     variance = floor if noise is None else noise**2
