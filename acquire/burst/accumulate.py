@@ -12,18 +12,21 @@ from __future__ import annotations
 
 import logging
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
+from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from acquire.burst.memory import PictureMemory
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Burst, Frame, frozen
 
+Made = TypeVar("Made")
 LIMIT_PX = 0.05  # above it a burst is smeared
 TILE_PIXELS = 4096  # looked at in each tile at least, so that noise gives less than about 0.01 px
 MAX_TILES = 4
@@ -81,31 +84,22 @@ MAX_FRAMES = 65536  # a sum of so many 16-bit samples still fits into 32 bits
 @cache
 def compile_loops(kinds: tuple[str, ...] = ("uint8", "uint16")) -> None:
     """Have the loops ready for frames of these types (once a process), so that none is lost to a compiler later."""
-    from acquire.burst.accumulate_loops import GROUP, fold, scratch, tile_sums
+    from acquire.burst.accumulate_loops import GROUP, fold, mean_of_sum, scratch, tile_sums
 
     if not (
         fold.stats.cache_path and any(Path(fold.stats.cache_path).glob("accumulate_loops.tile_sums-*.nbi"))
     ):
         log.info("compiling the burst loops, once on this machine; this takes some seconds")
-    mean, clipped, total = np.empty(9, np.float32), np.empty(9, np.bool_), np.empty(9, np.uint32)
-    for kind in kinds:
-        image = frozen(np.zeros((3, 3), kind))
-        fold(
-            (image.reshape(-1),) * GROUP,
-            1,
-            image.reshape(-1),
-            *scratch(kind),
-            total,
-            mean,
-            clipped,
-            255,
-            True,
-            1,
-        )
+    mean, clipped = np.empty(9, np.float32), np.empty(9, np.bool_)
+    for kind, of_sum in product(kinds, (np.uint16, np.uint32)):
+        image, total = frozen(np.zeros((3, 3), kind)), np.empty(9, of_sum)
+        frames, rooms = (image.reshape(-1),) * GROUP, scratch(kind)
+        fold(frames, 1, frames[0], *rooms, total, mean, clipped, 255, True, 1)
+        mean_of_sum(total, 1, mean)
         tile_sums(image, image, 1, 1, 1)
 
 
-class BurstAccumulator:
+class Accumulator(ABC, Generic[Made]):
     """Takes frames one by one and gives a burst after every n consecutive, undamaged ones.
 
     A gap in the sequence or a damaged frame starts the burst anew. What was lost or damaged is
@@ -133,11 +127,11 @@ class BurstAccumulator:
         self._n, self._not_before = n, not_before
         self._memory = memory or PictureMemory()
         self._times: list[float] = []
-        self._sums: _Sums | None = None
+        self._sums: Sums | None = None
         self._lost = 0
         self._first = self._last = -1
 
-    def add(self, frame: Frame) -> Burst | None:
+    def add(self, frame: Frame) -> Made | None:
         """Take a frame; the burst when this one completes it.
 
         Raises
@@ -152,15 +146,19 @@ class BurstAccumulator:
             self._start_anew()
             self._lost += frame.damaged
             return None
-        if self._n == 1:
-            return self._single(frame)
-        if self._sums is None:
-            self._sums, self._first = _Sums(frame, self._memory), frame.index
+        if not self._times:
+            self._first = frame.index
+            self._sums = self._begun(frame) if self._n > 1 else None
         self._last = frame.index
         self._times.append(frame.t)
         done = len(self._times) == self._n
-        self._sums.add(frame, self._n if done else 0)
-        return self._finish(self._sums, frame) if done else None
+        if self._sums is not None:
+            self._sums.add(frame, self._n if done else 0)
+        if not done:
+            return None
+        made = self._single(frame) if self._sums is None else self._finished(self._sums, frame)
+        self._times, self._sums, self._lost = [], None, 0
+        return made
 
     def _gap_before(self, frame: Frame) -> bool:
         return bool(self._times) and (frame.lost_before > 0 or frame.index != self._last + 1)
@@ -168,51 +166,87 @@ class BurstAccumulator:
     def _start_anew(self) -> None:
         self._times, self._sums = [], None
 
-    def _single(self, frame: Frame) -> Burst:
+    @abstractmethod
+    def _begun(self, frame: Frame) -> Sums:
+        """The sums of a burst that begins with this frame."""
+
+    @abstractmethod
+    def _single(self, frame: Frame) -> Made:
         """A burst of one is the frame itself: nothing is averaged, nothing copied."""
-        clipped = self._memory.take(frame.image.shape, np.bool_)
-        np.greater_equal(frame.image, frame.saturation, out=clipped)
-        burst = Burst(
-            mean=frame.image, n=1, noise=math.nan, clipped=frozen(clipped),
-            bits=frame.bits, t=frame.t, duration=0.0, first_index=frame.index, last_index=frame.index,
-            lost=self._lost, clock=frame.clock,
-        )  # fmt: skip
-        self._times, self._lost = [], 0
-        return burst
 
-    def _finish(self, sums: _Sums, frame: Frame) -> Burst:
+    @abstractmethod
+    def _finished(self, sums: Sums, last: Frame) -> Made:
+        """The burst of all its frames."""
+
+    def _numbers(self, last: Frame, sums: Sums | None = None) -> dict[str, Any]:
+        """What ``Burst`` has beside its pictures."""
         start, times, n = self._times[0], self._times, self._n
-        noise = sums.noise(n)
-        burst = Burst(
-            mean=frozen(sums.mean),
-            n=n,
-            noise=noise,
-            clipped=frozen(sums.clipped),
-            bits=frame.bits,
-            t=start + math.fsum(t - start for t in times) / n,
-            duration=times[-1] - start,
-            first_index=self._first,
-            last_index=self._last,
-            lost=self._lost,
-            clock=frame.clock,
-            motion_px=sums.motion(frame, n, noise),
-        )
-        self._times, self._sums, self._lost = [], None, 0
-        return burst
+        noise = math.nan if sums is None else sums.noise(n)
+        return {
+            "n": n,
+            "noise": noise,
+            "bits": last.bits,
+            "t": start + math.fsum(t - start for t in times) / n,
+            "duration": times[-1] - start,
+            "first_index": self._first,
+            "last_index": self._last,
+            "lost": self._lost,
+            "clock": last.clock,
+            "motion_px": math.nan if sums is None else sums.motion(last, n, noise),
+        }
 
 
-class _Sums:
-    """The running sums of one burst. Frames are kept, not copied, until a group can be folded."""
+class BurstAccumulator(Accumulator[Burst]):
+    """From frames to bursts with their means."""
 
-    def __init__(self, like: Frame, memory: PictureMemory) -> None:
+    def _begun(self, frame: Frame) -> Sums:
+        return Sums(frame, self._memory)
+
+    def _single(self, frame: Frame) -> Burst:
+        clipped = clipped_in(frame.image, frame.saturation, self._memory)
+        return Burst(mean=frame.image, clipped=clipped, **self._numbers(frame))
+
+    def _finished(self, sums: Sums, last: Frame) -> Burst:
+        mean, clipped = frozen(sums.mean), frozen(sums.clipped)
+        return Burst(mean=mean, clipped=clipped, **self._numbers(last, sums))
+
+
+def clipped_in(image: NDArray[Any], saturation: int, memory: PictureMemory) -> NDArray[np.bool_]:
+    """Which pixels of an image are saturated, read-only."""
+    clipped = memory.take(image.shape, np.bool_)
+    np.greater_equal(image, saturation, out=clipped)
+    return frozen(clipped)
+
+
+class Sums:
+    """The running sums of one burst. Frames are kept, not copied, until a group can be folded.
+
+    Parameters
+    ----------
+    like : Frame
+        The first one.
+    memory : PictureMemory
+    kind : uint16 or uint32, optional
+        Of the sum, which is all that is made then; by default the mean is made.
+    """
+
+    def __init__(self, like: Frame, memory: PictureMemory, kind: DTypeLike | None = None) -> None:
         compile_loops((like.image.dtype.name,))
         self._like, self._memory = like, memory
-        self.mean = memory.take(like.image.shape, np.float32)
+        self._summed, self._kind_of_sum = kind is not None, np.uint32 if kind is None else kind
+        self.mean = (
+            np.empty((0, 0), np.float32) if self._summed else memory.take(like.image.shape, np.float32)
+        )
         self.clipped = memory.take(like.image.shape, np.bool_)
-        self._total = np.empty(0, np.uint32)
+        self._total: NDArray[Any] = np.empty(0, self._kind_of_sum)
         self._waiting: list[NDArray[Any]] = []
         self._previous: NDArray[Any] | None = None
         self._squares = 0
+
+    @property
+    def total(self) -> NDArray[Any]:
+        """The sum of all frames (H, W), GL."""
+        return self._total.reshape(self._like.image.shape)
 
     def add(self, frame: Frame, n: int) -> None:
         """Take a frame; ``n > 0``: it is the last of n."""
@@ -225,7 +259,7 @@ class _Sums:
             )
         self._waiting.append(np.ascontiguousarray(frame.image).reshape(-1))
         if n > 0 or len(self._waiting) == GROUP:
-            self._fold(n)
+            self._fold(0 if self._summed else n)
 
     @property
     def _kind(self) -> tuple[Any, ...]:
@@ -236,7 +270,7 @@ class _Sums:
 
         images, first = self._waiting, self._previous is None
         if not (first and n) and self._total.size == 0:
-            self._total = self._memory.take(self.mean.shape, np.uint32).reshape(-1)
+            self._total = self._memory.take(self._like.image.shape, self._kind_of_sum).reshape(-1)
         self._squares += int(
             fold(
                 tuple(images + images[-1:] * (GROUP - len(images))),
@@ -255,7 +289,7 @@ class _Sums:
 
     def noise(self, n: int) -> float:
         """Of one frame, GL: from successive differences, so that slow motion hardly counts."""
-        return math.sqrt(self._squares / (2 * (n - 1) * self.mean.size)) if n > 1 else math.nan
+        return math.sqrt(self._squares / (2 * (n - 1) * self._like.image.size)) if n > 1 else math.nan
 
     def motion(self, last: Frame, n: int, noise: float) -> float:
         """During the exposure of all n frames, px: from the first to the last, and one frame more."""

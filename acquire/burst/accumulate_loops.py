@@ -28,7 +28,7 @@ def fold(
     previous: NDArray[Any],
     sums: NDArray[Any],
     tops: NDArray[Any],
-    total: NDArray[np.uint32],
+    total: NDArray[Any],
     mean: NDArray[np.float32],
     clipped: NDArray[np.bool_],
     saturation: int,
@@ -45,10 +45,10 @@ def fold(
         The frame before them (not looked at when ``first``).
     sums, tops : (BLOCK,)
         Room to work in, from ``scratch``.
-    total : (P,) uint32, GL
+    total : (P,) uint32, or uint16 where that is enough, GL
         Sum so far; untouched when ``first`` and ``n > 0``.
     mean : (P,) float32, GL
-        Written when ``n > 0``: the sum divided by n, correctly rounded.
+        Written when ``n > 0``, else not looked at: the sum divided by n, correctly rounded.
     clipped : (P,) bool
         Set where a frame reaches ``saturation``.
 
@@ -149,9 +149,7 @@ def _mark(top: NDArray[Any], flags: NDArray[np.bool_], saturation: int, first: b
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _divide(
-    part: NDArray[Any], total: NDArray[np.uint32], mean: NDArray[np.float32], first: bool, n: int
-) -> None:
+def _divide(part: NDArray[Any], total: NDArray[Any], mean: NDArray[np.float32], first: bool, n: int) -> None:
     if first:  # so small a sum is exact in float32, and so its quotient correctly rounded
         for j in range(part.size):
             mean[j] = np.float32(part[j]) / np.float32(n)
@@ -161,13 +159,24 @@ def _divide(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _keep(part: NDArray[Any], total: NDArray[np.uint32], first: bool) -> None:
+def _keep(part: NDArray[Any], total: NDArray[Any], first: bool) -> None:
     if first:
         for j in range(part.size):
             total[j] = part[j]
     else:
         for j in range(part.size):
             total[j] += part[j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def mean_of_sum(total: NDArray[Any], n: int, mean: NDArray[np.float32]) -> None:
+    """Write the sum (P,) uint16 or uint32 divided by n, correctly rounded, as ``fold`` does."""
+    if total.itemsize == 2:  # exact in float32
+        for j in range(total.size):
+            mean[j] = np.float32(total[j]) / np.float32(n)
+    else:
+        for j in range(total.size):
+            mean[j] = np.float32(np.float64(total[j]) / np.float64(n))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -26,8 +26,6 @@ Item = TypeVar("Item")
 
 MONOMIALS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 """1, x, y, x^2, xy, y^2, with which a channel is multiplied."""
-ROWS_AT_ONCE = 16
-"""Of an image whose squares are summed: what lies between stays in the cache."""
 MAX_CACHED = 64
 """Gauges whose factors are remembered."""
 
@@ -154,9 +152,7 @@ class MeanNoise:
 def sum_of_squares(image: Floats) -> float:
     """The sum of the squares of an image (H, W), row by row in their order: the same bits wherever it is in memory."""
     rows = np.empty(len(image))
-    for first in range(0, len(image), ROWS_AT_ONCE):
-        some = image[first : first + ROWS_AT_ONCE]
-        rows[first : first + ROWS_AT_ONCE] = np.cumsum(some * some, axis=1)[:, -1]
+    squares_of_rows(image, rows)
     return float(np.cumsum(rows)[-1])
 
 
@@ -168,10 +164,22 @@ def unit_variance(name: str, covariance: NDArray[np.float32]) -> Floats:
 
 
 @helper
-def blurred(f: Any, i: int, pitch: int, along_x: Any, along_y: Any, across: Any) -> Any:
+def blurred(f: Any, i: Any, pitch: Any, along_x: Any, along_y: Any, across: Any) -> Any:
     """The second differences of an image at one pixel (``images.with_second_differences``), each with its factor."""
-    out = along_x * (f[i - 1] + f[i + 1] - 2 * f[i]) + along_y * (f[i - pitch] + f[i + pitch] - 2 * f[i])
-    return out + across * (f[i + pitch + 1] + f[i - pitch - 1] - f[i + pitch - 1] - f[i - pitch + 1]) / 4
+    one = np.uintp(1)
+    out = along_x * (f[i - one] + f[i + one] - 2 * f[i]) + along_y * (f[i - pitch] + f[i + pitch] - 2 * f[i])
+    corners = f[i + pitch + one] + f[i - pitch - one] - f[i + pitch - one] - f[i - pitch + one]
+    return out + across * corners / 4
+
+
+@helper
+def squares_of_rows(image: Any, out: Any) -> None:
+    """The sum of the squares of each row of an image (H, W), written to ``out`` (H,)."""
+    for y in range(len(image)):
+        row, total = image[y], 0.0
+        for x in range(len(row)):
+            total += row[x] * row[x]
+        out[y] = total
 
 
 @helper
@@ -179,13 +187,14 @@ def scatter(
     images: Any, samples: int, pitch: int, origins: Any, weights: Any, line: Any, along: Any, corner: Any, out: Any
 ) -> None:  # fmt: skip
     """Add what each ZOI takes of each pixel to ``out``, whose first pixel is ``corner`` (row, column)."""
-    size = len(line)
+    # Unsigned places: with others numba looks for negative ones, pixel by pixel, and no vectors are made.
+    size, image, down = len(line), np.uintp(samples), np.uintp(pitch)
     for z in range(len(origins)):
         a = weights[z]
         for y in range(size):
             eta = along[y]
             top, left = origins[z, 0] + y, origins[z, 1]
-            at = top * pitch + left
+            at = np.uintp(top * pitch + left)
             to = out[top - corner[0], left - corner[1] : left - corner[1] + size]
             x0 = a[0, 0] + eta * (a[0, 2] + eta * a[0, 5])
             x1 = a[0, 1] + eta * a[0, 4]
@@ -193,10 +202,12 @@ def scatter(
             y1 = a[1, 1] + eta * a[1, 4]
             f0 = a[2, 0] + eta * a[2, 2]
             d0 = a[3, 0] + eta * a[3, 2]
+            x2, y2, f1, d1 = a[0, 3], a[1, 3], a[2, 1], a[3, 1]
+            along_x, along_y, across, here = a[4, 0], a[5, 0], a[6, 0], line[y]
             for x in range(size):
-                xi = along[x]
-                value = blurred(images, 2 * samples + at + x, pitch, a[4, 0], a[5, 0], a[6, 0])
-                value += images[at + x] * (x0 + xi * (x1 + xi * a[0, 3]))
-                value += images[samples + at + x] * (y0 + xi * (y1 + xi * a[1, 3]))
-                value += images[2 * samples + at + x] * (f0 + xi * a[2, 1])
-                to[x] += line[y] * line[x] * (value + d0 + xi * a[3, 1])
+                xi, i = along[x], at + np.uintp(x)
+                value = blurred(images, image + image + i, down, along_x, along_y, across)
+                value += images[i] * (x0 + xi * (x1 + xi * x2))
+                value += images[image + i] * (y0 + xi * (y1 + xi * y2))
+                value += images[image + image + i] * (f0 + xi * f1)
+                to[x] += here * line[x] * (value + d0 + xi * d1)

@@ -14,20 +14,24 @@ MAX_MOVES = 12
 
 
 @helper
-def _dot(a: Any, b: Any) -> Any:
+def _dot(a: Any, b: Any, offset: Any) -> Any:
+    """Sums of the products of two rows less ``offset``, of the second, and of its squares."""
     p = f4(0)
     q = f4(0)
     r = f4(0)
     for n in range(a.size):
         k = np.uintp(n)
-        p += a[k] * b[k]
-        q += b[k]
-        r += b[k] * b[k]
+        value = b[k] - offset
+        p += (a[k] - offset) * value
+        q += value
+        r += value * value
     return p, q, r
 
 
 @helper
-def correlation(reference: Any, deformed: Any, top: int, left: int, dy: int, dx: int, size: int) -> Any:
+def correlation(
+    reference: Any, deformed: Any, offset: Any, top: int, left: int, dy: int, dx: int, size: int
+) -> Any:
     """Zero-mean normalised correlation of a ZOI with its shifted self; -2 outside the image."""
     height, width = deformed.shape
     if top + dy < 0 or left + dx < 0 or top + dy + size > height or left + dx + size > width:
@@ -40,8 +44,8 @@ def correlation(reference: Any, deformed: Any, top: int, left: int, dy: int, dx:
     for y in range(size):
         a = reference[top + y, left : left + size]
         b = deformed[top + dy + y, left + dx : left + dx + size]
-        p, q, r = _dot(a, b)
-        _, s, t = _dot(a, a)
+        p, q, r = _dot(a, b, offset)
+        _, s, t = _dot(a, a, offset)
         fg += p
         g += q
         gg += r
@@ -54,13 +58,16 @@ def correlation(reference: Any, deformed: Any, top: int, left: int, dy: int, dx:
 
 @parallel
 def climb(
-    reference: Any, deformed: Any, origins: Any, size: int, candidates: Any, moves: int, out: Any, score: Any
-) -> None:
+    reference: Any, deformed: Any, offset: Any, origins: Any, size: int, candidates: Any, moves: int, out: Any,
+    score: Any,
+) -> None:  # fmt: skip
     """Best whole-pixel displacement (x, y) of each ZOI.
 
     Parameters
     ----------
     reference, deformed : (H, W) float32
+    offset : float32
+        Taken off both, so that sums of squares keep their digits.
     origins : (A, 2) int64
     candidates : (A, K, 2) int64, (x, y)
     moves : int
@@ -77,7 +84,7 @@ def climb(
             cy = candidates[z, k, 1]
             if k > 0 and cx == candidates[z, k - 1, 0] and cy == candidates[z, k - 1, 1]:
                 continue
-            value = correlation(reference, deformed, top, left, cy, cx, size)
+            value = correlation(reference, deformed, offset, top, left, cy, cx, size)
             if value > best:
                 best, x, y = value, cx, cy
         for _ in range(moves):
@@ -86,7 +93,7 @@ def climb(
             for ny in range(-1, 2):
                 for nx in range(-1, 2):
                     if nx != 0 or ny != 0:
-                        value = correlation(reference, deformed, top, left, y + ny, x + nx, size)
+                        value = correlation(reference, deformed, offset, top, left, y + ny, x + nx, size)
                         if value > best:
                             best, sx, sy = value, nx, ny
             if sx == 0 and sy == 0:

@@ -66,7 +66,7 @@ def search(
     candidates = np.rint(np.concatenate([out[:, None, [0, 3]], around], axis=1)).astype(np.int64)
     found = np.zeros((len(centre), 2), np.int64)
     climb(
-        reference - offset, deformed - offset, origins, size,
+        reference, deformed, offset, origins, size,
         np.ascontiguousarray(candidates), MAX_MOVES, found, np.zeros(len(centre)),
     )  # fmt: skip
     out[:, [0, 3]] = found
@@ -84,30 +84,31 @@ class Blocks:
     x: NDArray[np.float64]
     shift: NDArray[np.float64]
 
-    def planes(self) -> NDArray[np.float64]:
-        """A plane through each block's displacement and its neighbours', (M, N, 6), px.
+    def planes(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float64]:
+        """A plane through the displacements of some blocks (K,) and their neighbours', (K, 6), px.
 
         u, du_dx, du_dy, v, dv_dx, dv_dy at the block's centre, least squares over 5 x 5 blocks; those
         further than OUTLIER from the plane are left out the second time.
         """
-        rows, columns = self.shift.shape[:2]
         near = np.arange(-PLANE_REACH, PLANE_REACH + 1)
-        r = np.clip(np.arange(rows)[:, None] + near, 0, rows - 1)
-        c = np.clip(np.arange(columns)[:, None] + near, 0, columns - 1)
+        r, c = (
+            np.clip(which[:, None] + near, 0, count - 1)
+            for which, count in zip((rows, columns), self.shift.shape, strict=False)
+        )
         # Blocks beyond the border would be counted twice: weight zero.
-        weight = np.einsum("ai,bj->abij", *(np.diff(k, axis=1, prepend=-1) > 0 for k in (r, c))).astype(float)
-        dy = np.broadcast_to((self.y[r] - self.y[:, None])[:, None, :, None], weight.shape)
-        dx = np.broadcast_to((self.x[c] - self.x[:, None])[None, :, None, :], weight.shape)
-        basis = np.stack([np.ones_like(dx), dx, dy], axis=-1).reshape(rows, columns, -1, 3)
-        shift = self.shift[r[:, None, :, None], c[None, :, None, :]].reshape(rows, columns, -1, 2)
-        start = np.median(shift, axis=2, keepdims=True)
-        weight = weight.reshape(rows, columns, -1)
-        reach = 0.5 * np.hypot(np.ptp(self.x), np.ptp(self.y)) / max(rows, columns) * MAX_GRADIENT
+        weight = np.einsum("ki,kj->kij", *(np.diff(k, axis=1, prepend=-1) > 0 for k in (r, c))).astype(float)
+        dy = np.broadcast_to((self.y[r] - self.y[rows, None])[:, :, None], weight.shape)
+        dx = np.broadcast_to((self.x[c] - self.x[columns, None])[:, None, :], weight.shape)
+        basis = np.stack([np.ones_like(dx), dx, dy], axis=-1).reshape(len(rows), -1, 3)
+        shift = self.shift[r[:, :, None], c[:, None, :]].reshape(len(rows), -1, 2)
+        start = np.median(shift, axis=1, keepdims=True)
+        weight = weight.reshape(len(rows), -1)
+        reach = 0.5 * np.hypot(np.ptp(self.x), np.ptp(self.y)) / max(self.shift.shape[:2]) * MAX_GRADIENT
         keep = weight * (np.abs(shift - start).max(axis=-1) < np.maximum(OUTLIER, 4 * reach))
         fit = _planes(basis, shift, keep)
-        error = np.abs(np.einsum("abkp,abpc->abkc", basis, fit) - shift).max(axis=-1)
+        error = np.abs(np.einsum("kip,kpc->kic", basis, fit) - shift).max(axis=-1)
         fit = _planes(
-            basis, shift, weight * (error < np.maximum(OUTLIER, np.median(error, axis=2, keepdims=True)))
+            basis, shift, weight * (error < np.maximum(OUTLIER, np.median(error, axis=1, keepdims=True)))
         )
         return np.concatenate([fit[..., 0], fit[..., 1]], axis=-1)
 
@@ -119,7 +120,8 @@ class Blocks:
     def plane_at(self, y: NDArray[np.floating], x: NDArray[np.floating]) -> NDArray[np.float64]:
         """The plane of the nearest block, moved to each point, (points, 6)."""
         r, c = (np.abs(np.subtract.outer(at, own)).argmin(axis=1) for at, own in ((y, self.y), (x, self.x)))
-        plane = self.planes()[r, c]
+        blocks, own = np.unique(r * len(self.x) + c, return_inverse=True)
+        plane = self.planes(*np.divmod(blocks, len(self.x)))[own]
         dy, dx = y - self.y[r], x - self.x[c]
         for k in (0, 3):
             plane[:, k] += plane[:, k + 1] * dx + plane[:, k + 2] * dy
@@ -129,9 +131,9 @@ class Blocks:
 def _planes(
     basis: NDArray[np.float64], values: NDArray[np.float64], weight: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Weighted least squares of planes, (M, N, 3, 2); flat where too few blocks are left."""
-    normal = np.einsum("abkp,abk,abkq->abpq", basis, weight, basis)
-    right = np.einsum("abkp,abk,abkc->abpc", basis, weight, values)
+    """Weighted least squares of planes, (K, 3, 2); flat where too few blocks are left."""
+    weighted = (basis * weight[..., None]).swapaxes(1, 2)
+    normal, right = weighted @ basis, weighted @ values
     ridge = np.zeros((3, 3))
     ridge[1, 1] = ridge[2, 2] = BLOCK_STEP**2
     ridge[0, 0] = 1e-9
@@ -239,44 +241,27 @@ def _match_blocks(
     reference: Image, deformed: Image, box: Roi, guess: Blocks, reach: int, extra: tuple[int, int] | None
 ) -> Blocks:
     """Displacement of each block: the best match within ``reach`` px of any guess."""
+    from analysis.follow.block_match import match
+
     size = min(BLOCK, box.width, box.height)
     first_y = _firsts(box.y, box.height, size)
     first_x = _firsts(box.x, box.width, size)
     y: NDArray[np.float64] = np.asarray(first_y + (size - 1) / 2, np.float64)
     x: NDArray[np.float64] = np.asarray(first_x + (size - 1) / 2, np.float64)
     grid_y, grid_x = (a.ravel() for a in np.meshgrid(y, x, indexing="ij"))
-    guesses = np.rint(guess.around(grid_y, grid_x)).astype(int)
+    guesses = np.rint(guess.around(grid_y, grid_x)).astype(np.int64)
     if extra is not None:
         guesses = np.concatenate([guesses, np.broadcast_to(np.array(extra), (len(guesses), 1, 2))], axis=1)
     margin = size + 2 * reach
     padded = np.pad(deformed, margin, mode="reflect" if min(deformed.shape) > margin else "edge")
     shift = np.empty((len(grid_y), 2))
-    for k, (top, left) in enumerate((a, b) for a in first_y for b in first_x):
-        template = reference[top : top + size, left : left + size]
-        shift[k] = _match(template, padded, (top + margin, left + margin), guesses[k], reach)
+    firsts = np.stack([a.ravel() for a in np.meshgrid(first_y, first_x, indexing="ij")], axis=1).astype(
+        np.int64
+    )
+    match(np.ascontiguousarray(reference), padded, margin, firsts, size, guesses, reach, shift)
     return Blocks(y, x, shift.reshape(len(y), len(x), 2))
 
 
 def _firsts(first: int, length: int, size: int) -> NDArray[np.intp]:
     count = max(1, (length - size) // BLOCK_STEP + 1)
     return np.unique(np.linspace(first, first + length - size, count).astype(np.intp))
-
-
-def _match(
-    template: Image, padded: Image, at: tuple[int, int], guesses: NDArray[Any], reach: int
-) -> tuple[float, float]:
-    """The best of the neighbourhoods of several guesses, as a displacement (x, y)."""
-    import cv2
-
-    best, found = -2.0, (float(guesses[0][0]), float(guesses[0][1]))
-    height, width = template.shape[0] + 2 * reach, template.shape[1] + 2 * reach
-    for dx, dy in dict.fromkeys(map(tuple, guesses.tolist())):
-        # No np.clip: of single numbers it takes longer than the match.
-        top = min(max(at[0] + dy - reach, 0), padded.shape[0] - height)
-        left = min(max(at[1] + dx - reach, 0), padded.shape[1] - width)
-        window = padded[top : top + height, left : left + width]
-        score = cv2.matchTemplate(window, template, cv2.TM_CCOEFF_NORMED)
-        _, value, _, place = cv2.minMaxLoc(score)
-        if np.isfinite(value) and value > best:
-            best, found = value, (float(left + place[0] - at[1]), float(top + place[1] - at[0]))
-    return found

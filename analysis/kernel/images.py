@@ -105,17 +105,23 @@ def rounding_variance(image: NDArray[Any]) -> float:
 
 
 def padded(*images: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Images of one size with zeros behind each row and below each image, (K, H + 1, pitch).
+    """Images of one size with zeros behind each row and below each image, (K, H + 1, pitch): see ``padded_room``."""
+    out = padded_room(len(images), images[0].shape)
+    height, width = images[0].shape
+    for to, image in zip(out, images, strict=True):
+        to[:height, :width] = image
+    return out
+
+
+def padded_room(count: int, shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Room for images (H, W), zero behind each row and below each image, (count, H + 1, pitch).
 
     At least two behind each row. A row takes an odd number of cache lines: with an even one, and worst with a power of
     two, the rows of a ZOI compete for the same places in the cache.
     """
-    height, width = images[0].shape
+    height, width = shape
     lines = (width + 1) // LINE + 1
-    out = np.zeros((len(images), height + 1, LINE * (lines + 1 - lines % 2)), np.float32)
-    for to, image in zip(out, images, strict=True):
-        to[:height, :width] = image
-    return out
+    return np.zeros((count, height + 1, LINE * (lines + 1 - lines % 2)), np.float32)
 
 
 def continue_rim(images: NDArray[np.float32], which: int, shape: tuple[int, ...]) -> None:
@@ -132,20 +138,23 @@ def continue_rim(images: NDArray[np.float32], which: int, shape: tuple[int, ...]
     flat[first - pitch - 1 : first + image.size - 1 : pitch] = np.append(image[0, 0], image[:, 0])
 
 
-def with_second_differences(images: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A copy of K ``padded`` images, and f_xx, f_yy and f_xy of the third behind them, (K + 3, H + 1, pitch).
+def with_second_differences(
+    images: NDArray[np.float32], first: int = 0, end: int | None = None
+) -> NDArray[np.float32]:
+    """A copy of rows ``first`` to ``end`` of K ``padded`` images, and f_xx, f_yy and f_xy of the third behind them.
 
-    These are differences of pixels, GL/px^2. At high frequencies they fall behind the derivatives, as the spectrum of
-    a real blur does behind its series.
+    (K + 3, end - first, pitch); by default of all H + 1 rows. These are differences of pixels, GL/px^2. At high
+    frequencies they fall behind the derivatives, as the spectrum of a real blur does behind its series.
     """
-    n, pitch, size, flat = len(images), images.shape[2], images[0].size, images.reshape(-1)
+    end = images.shape[1] if end is None else end
+    n, pitch, flat = len(images), images.shape[2], images.reshape(-1)
+    begin, stop = (2 * images[0].size + row * pitch for row in (first, end))
 
     def moved(by: int) -> NDArray[np.float32]:
-        return flat[2 * size + by : 3 * size + by]
+        return flat[begin + by : stop + by]
 
-    # In place: first-time memory is what costs at 12 MP.
-    out = np.empty((n + 3, *images.shape[1:]), np.float32)
-    out[:n] = images
+    out = np.empty((n + 3, end - first, pitch), np.float32)
+    out[:n] = images[:, first:end]
     along_x, along_y, across = out[n:].reshape(3, -1)
     np.multiply(moved(0), 2, out=across)
     for bend, by in ((along_x, 1), (along_y, pitch)):

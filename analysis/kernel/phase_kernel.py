@@ -183,7 +183,7 @@ class PhaseKernel:
         saturated = clipped_pixels(image, clipped, model)
         with self._room() as room:
             if start is None:
-                solution = Solution(reference, image, model, reference.searched(image), room)
+                solution = Solution(reference, image, model, reference.searched(image, room), room)
                 mend(solution)
                 retry_lost(solution, None, saturated)
                 return field_of(solution)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,7 +23,7 @@ from analysis.fit.validity import (
 from analysis.kernel.images import (
     NoiseModel,
     continue_rim,
-    padded,
+    padded_room,
     rounding_variance,
     with_second_differences,
 )
@@ -38,6 +40,8 @@ DOUBTFUL = 0.5
 
 AT_ONCE = 500
 """ZOIs whose pixels are copied at a time."""
+ROWS_OF_ZOIS = 4
+"""Sides of a ZOI, of which second differences are made at a time."""
 
 
 class PatternError(ValueError):
@@ -123,14 +127,14 @@ def prepare_reference(
     """
     mean = float(image.mean(dtype=np.float64))
     std = None if noise is None else float(np.sqrt(noise.variance(mean)))
-    pattern = filtered_pattern(image, std, settings.interpolant)
-    line = profile(settings.window, size)
-    images = padded(pattern.grad_x, pattern.grad_y, pattern.level, image - np.float32(mean))
+    images = padded_room(4, image.shape)
+    grad_x, grad_y, level, recorded = images[:, : image.shape[0], : image.shape[1]]
+    pattern = filtered_pattern(image, std, settings.interpolant, (grad_x, grad_y, level))
+    np.subtract(image, np.float32(mean), out=recorded)
     continue_rim(images, 2, image.shape)
-    pattern = _within(pattern, images, image.shape)
-    channels = with_second_differences(images)
-    by_level = _by_level(channels, pattern, mean, noise)
-    out, shapes = _fits(channels, by_level, origins, line, settings.order)
+    line = profile(settings.window, size)
+    level_from = np.float32(mean) if noise is not None and noise.slope > 0 else None
+    out, shapes = _fits(images, level_from, origins, line, settings.order)
     energy = out.energy
     share, over_noise = information(
         out.inverse[:-1], energy[:, :2].astype(np.float64), pattern.left_gradient, line
@@ -152,7 +156,7 @@ def prepare_reference(
         shapes=shapes,
         energy=energy[:, :2].astype(np.float64),
         covariance=out.covariance,
-        covariance_level=out.covariance_level if by_level.size else None,
+        covariance_level=None if level_from is None else out.covariance_level,
         freedom=np.maximum(out.freedom.astype(np.float64), 1e-3),
         weight=float(line.sum() ** 2),
         signal=np.maximum(energy[:, 2].astype(np.float64), 0),
@@ -164,20 +168,18 @@ def prepare_reference(
     )
 
 
-def _within(pattern: Pattern, images: NDArray[np.float32], shape: tuple[int, ...]) -> Pattern:
-    """The same pattern where it stands in ``images``, so that it is not kept twice."""
-    grad_x, grad_y, level = images[:3, : shape[0], : shape[1]]
-    return replace(pattern, grad_x=grad_x, grad_y=grad_y, level=level)
-
-
 def _fits(
     images: NDArray[np.float32],
-    by_level: NDArray[np.float32],
+    level_from: np.float32 | None,
     origins: NDArray[np.int64],
     line: NDArray[np.float64],
     order: int,
 ) -> tuple[NormalArgs, Shapes]:
-    """The linear fit of each ZOI, and the shapes that it cannot follow."""
+    """The linear fit of each ZOI, and the shapes that it cannot follow.
+
+    ``level_from`` is the mean grey level, for a noise that grows with the level; None: it does not. Second differences
+    are made of the rows of some ZOIs at a time: those of all would take more memory than all else, which was new.
+    """
     from analysis.compiled.vectors import whole
     from analysis.fit.sensitivity import columns, parameter_scale, prepare, square_rows
     from analysis.fit.shapes import N_SHAPES, shapes_of
@@ -187,12 +189,25 @@ def _fits(
     half = len(units) // 2
     affine = units[[0, 1, 2, half, half + 1, half + 2]]
     shapes = shapes_of(line, whole(size))
-    out = NormalArgs.empty(len(origins), len(table), 2 * N_SHAPES, by_level.size > 0)
-    prepare(
-        ReferenceImages(images.ravel(), by_level.ravel(), images[0].size, images.shape[2]), origins, size,
-        WindowRows(shapes.powers, square_rows(line, whole(size)), shapes.mix), table, affine, out,
-    )  # fmt: skip
+    window = WindowRows(shapes.powers, square_rows(line, whole(size)), shapes.mix)
+    out = NormalArgs.empty(len(origins), len(table), 2 * N_SHAPES, level_from is not None)
+    for which in _near_each_other(origins, size):
+        tops = origins[which, 0]
+        first = int(tops.min())
+        channels = with_second_differences(images, first, int(tops.max()) + size + 1)
+        by_level = np.empty(0, np.float32) if level_from is None else _by_level(channels, level_from)
+        prepare(
+            ReferenceImages(channels.ravel(), by_level.ravel(), channels[0].size, channels.shape[2]),
+            origins[which] - (first, 0), size, window, table, affine, NormalArgs(*(of[which] for of in out)),
+        )  # fmt: skip
     return out, shapes
+
+
+def _near_each_other(origins: NDArray[np.int64], size: int) -> Iterator[slice]:
+    """ZOIs (A, 2), which come row by row, in parts whose first rows lie within ``ROWS_OF_ZOIS``."""
+    down = np.maximum.accumulate(origins[:, 0])
+    ends = np.flatnonzero(np.diff((down - down[:1]) // (ROWS_OF_ZOIS * size))) + 1
+    return (slice(*ends) for ends in pairwise([0, *ends.tolist(), len(origins)]) if len(origins))
 
 
 def _measurable(
@@ -230,15 +245,9 @@ def _shown(
     return out
 
 
-def _by_level(
-    images: NDArray[np.float32], pattern: Pattern, mean: float, noise: NoiseModel | None
-) -> NDArray[np.float32]:
-    """Images times the grey level, the fourth the level itself, for a noise that grows with it; else empty."""
-    if noise is None or noise.slope <= 0:
-        return np.empty(0, np.float32)
-    level = np.maximum(pattern.level + np.float32(mean), 0)
-    height, width = level.shape
-    out = np.zeros_like(images)
-    out[:, :height, :width] = images[:, :height, :width] * level
-    out[3, :height, :width] = level
+def _by_level(images: NDArray[np.float32], mean: np.float32) -> NDArray[np.float32]:
+    """Images (7, N, pitch) times the grey level, the fourth the level itself, for a noise that grows with it."""
+    level = np.maximum(images[2] + mean, 0)
+    out = images * level
+    out[3] = level
     return out

@@ -77,14 +77,14 @@ class ReferencePicture:
         Variance that rounding to whole grey levels leaves.
     white : (2,) float64
         ``white_noise.white_cubic``.
-    response : (8, n, n // 2 + 1) float64
-        ``white_noise.responses``.
     cleaned : bool
         Whether it had wild pixels, which were replaced; later pictures are then cleaned, too.
     period : (A,) float64, px
         Smallest displacement at which a ZOI looks like itself (``repeating.periods``); infinite: none.
     kept : dict
         By ZOIs, spectra of what they recorded (``coloured``).
+    made_later : dict
+        By name, what only some pictures need.
     """
 
     grid: ZoiGrid
@@ -104,10 +104,10 @@ class ReferencePicture:
     sums: MeanNoise | None
     rounding: float
     white: Floats
-    response: Floats
     cleaned: bool
     period: Floats
     kept: dict[bytes, NDArray[np.complex64]] = field(default_factory=dict, repr=False)
+    made_later: dict[str, Floats] = field(default_factory=dict, repr=False)
 
     @classmethod
     def first(
@@ -150,6 +150,13 @@ class ReferencePicture:
         prepared = replace(prepared, status=np.where(gone, placement.status, prepared.status))
         made = _laid_out(whole, self.grid, settings, model, prepared, cleaned is not None, placement)
         return replace(made, period=self.period)
+
+    @property
+    def response(self) -> Floats:
+        """``white_noise.responses``, (8, n, n // 2 + 1)."""
+        if "response" not in self.made_later:
+            self.made_later["response"] = responses(self.prepared, self.grid.size, self.settings.order)
+        return self.made_later["response"]
 
     @property
     def modes(self) -> int:
@@ -210,12 +217,20 @@ class ReferencePicture:
         out[:, self.affine] = affine
         return out
 
-    def searched(self, image: NDArray[Any]) -> Floats:
-        """Where each ZOI is in a deformed image, from nothing: right to about a pixel, (A, modes)."""
+    def searched(self, image: NDArray[Any], room: NDArray[np.float32] | None = None) -> Floats:
+        """Where each ZOI is in a deformed image, from nothing: right to about a pixel, (A, modes).
+
+        ``room`` is memory for the image at least; by default its own.
+        """
         from analysis.follow.search import search
 
         offset = np.float32(self.prepared.pattern.mean)
-        origins, deformed = self.prepared.origins, image.astype(np.float32)
+        origins, deformed = self.prepared.origins, image
+        if image.dtype != np.float32:
+            deformed = (
+                np.empty(image.shape, np.float32) if room is None else room[: image.size].reshape(image.shape)
+            )
+            deformed[:] = image
         return self.all_modes(search(self.image, deformed, offset, self.region, origins, self.grid.size))
 
     def searched_near(self, image: NDArray[Any], which: NDArray[np.intp], reach: float) -> Floats:
@@ -276,7 +291,6 @@ def _laid_out(
         sums=None if sensors is not None else _sums(grid, settings, index, prepared, unit_covariance),
         rounding=rounding_variance(image),
         white=white_cubic(prepared, grid.size, settings.order, share_variance),
-        response=responses(prepared, grid.size, settings.order),
         cleaned=cleaned,
         period=np.full(len(index), np.inf),
     )

@@ -57,7 +57,9 @@ def _alike(reference: ReferencePicture, which: NDArray[np.intp], place: NDArray[
     level, score = np.ascontiguousarray(reference.prepared.pattern.level), np.empty(len(which))
     places = np.tile(place.astype(np.int64), (len(which), 1, 1))
     found = np.empty((len(which), 2), np.int64)
-    climb(level, level, reference.prepared.origins[which], reference.grid.size, places, 0, found, score)
+    climb(
+        level, level, np.float32(0), reference.prepared.origins[which], reference.grid.size, places, 0, found, score
+    )  # fmt: skip
     return which[score > ALIKE]
 
 
@@ -185,7 +187,7 @@ def _fit_near(solution: Solution, which: NDArray[np.intp], expected: Floats) -> 
     offset = np.float32(reference.prepared.pattern.mean)
     guess, found = expected[which], np.zeros((len(which), 2), np.int64)
     climb(
-        reference.image - offset, solution.image.astype(np.float32) - offset, reference.prepared.origins[which],
+        reference.image, solution.image.astype(np.float32), offset, reference.prepared.origins[which],
         reference.grid.size, np.rint(guess[:, None, at]).astype(np.int64), MAX_MOVES,
         found, np.zeros(len(which)),
     )  # fmt: skip

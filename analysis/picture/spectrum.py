@@ -6,10 +6,16 @@ frequencies of the whole reference, weighted by how far they stand above it (doc
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Image = NDArray[np.float32]
 
 CUT = 0.02
 """Frequencies with a smaller Wiener gain are left out altogether."""
@@ -19,6 +25,7 @@ NOISE_BAND = 0.52
 """Cycles per pixel above which (towards the corners of the spectrum) only noise is expected."""
 _BINS_PER_CYCLE = 200
 _MARGIN = 32
+_ROWS = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +55,12 @@ class Pattern:
     own_noise: NDArray[np.float64]
 
 
-def filtered_pattern(image: NDArray[np.float32], noise: float | None, degree: int) -> Pattern:
+def filtered_pattern(
+    image: Image, noise: float | None, degree: int, out: tuple[Image, Image, Image] | None = None
+) -> Pattern:
     """Separate the pattern from the noise by a Wiener filter and derive it.
+
+    Some rows at a time, and in place: at 12 MP most of the time went to memory that was new.
 
     Parameters
     ----------
@@ -58,67 +69,179 @@ def filtered_pattern(image: NDArray[np.float32], noise: float | None, degree: in
         Known standard deviation of the noise; None: taken from the corners of the spectrum.
     degree : int
         Of the spline whose derivative is taken.
+    out : three of (H, W) float32, optional
+        Where grad_x, grad_y and level are written; by default new memory.
+    """
+    mean = float(image.mean(dtype=np.float64))
+    places = [_padded_places(n, "reflect" if min(image.shape) > _MARGIN else "edge") for n in image.shape]
+    height, width = (len(place) for place in places)
+    room = np.empty(
+        (2, max(height * (width // 2 + 1), image.shape[0] * (image.shape[1] // 2 + 1))), np.complex64
+    )
+    radius, power = _radial_spectrum(image, np.float32(mean), room[0])
+    floor = float(np.median(power[radius > NOISE_BAND]))
+    variance = floor if noise is None else noise**2
+    spectrum, work = (part[: height * (width // 2 + 1)].reshape(height, -1) for part in room)
+    gain = radius, wiener_gain(radius, power, variance)
+    response = _filtered_spectrum(image, np.float32(mean), places, gain, spectrum)
+    along_y = _gradient_response(degree, height)[:, None]
+    along_x = _gradient_response(degree, width)[None, : width // 2 + 1]
+    left_gradient, own_noise = _of_noise(response, along_x, width, work)
+    grad_x, grad_y, level = out or (np.empty(image.shape, np.float32) for _ in range(3))
+    for to, along in ((grad_x, along_x), (grad_y, along_y)):
+        np.multiply(spectrum, along, out=work)
+        _back(work, width, to)
+    _back(spectrum, width, level)
+    return Pattern(level, grad_x, grad_y, mean, float(np.sqrt(variance)), left_gradient, own_noise)
+
+
+def _padded_places(length: int, mode: Literal["reflect", "edge"]) -> NDArray[np.intp]:
+    """Which pixels of an image stand along a side of the padded one.
+
+    The far side is padded once more so that the length is a fast one.
     """
     from scipy import fft
 
-    mean = float(image.mean(dtype=np.float64))
-    radius, power = radial_spectrum(image - np.float32(mean))
-    floor = float(np.median(power[radius > NOISE_BAND]))
-    variance = floor if noise is None else noise**2
-    height, width = image.shape
-    padded = np.pad(
-        image - np.float32(mean), _MARGIN, mode="reflect" if min(image.shape) > _MARGIN else "edge"
-    )
-    # The far side is padded once more so that the length is a fast one.
-    lengths = [fft.next_fast_len(n, real=True) for n in padded.shape]
-    padded = np.pad(padded, [(0, n - m) for n, m in zip(lengths, padded.shape, strict=True)], mode="edge")
-    ky = np.fft.fftfreq(lengths[0])[:, None]
-    kx = np.fft.rfftfreq(lengths[1])[None, :]
-    k = np.hypot(ky, kx)
-    gain = wiener_gain(radius, power, variance)
-    response = np.interp(k, radius, gain).astype(np.float32)
-    spectrum = fft.rfft2(padded, workers=2) * response
-    along_y = _gradient_response(degree, lengths[0])[:, None]
-    along_x = _gradient_response(degree, lengths[1])[None, : lengths[1] // 2 + 1]
-    inside = (slice(_MARGIN, _MARGIN + height), slice(_MARGIN, _MARGIN + width))
-
-    def back(s: NDArray[np.complex64]) -> NDArray[np.float32]:
-        return np.ascontiguousarray(fft.irfft2(s, s=tuple(lengths), workers=2)[inside], np.float32)
-
-    return Pattern(
-        level=back(spectrum),
-        grad_x=back(spectrum * along_x),
-        grad_y=back(spectrum * along_y),
-        mean=mean,
-        noise=float(np.sqrt(variance)),
-        left_gradient=float(np.mean(np.abs(response * along_x) ** 2)),
-        own_noise=_at_no_lag(response, kx, ky),
-    )
+    places = np.pad(np.arange(length), _MARGIN, mode=mode)
+    return np.pad(places, (0, fft.next_fast_len(len(places), real=True) - len(places)), mode="edge")
 
 
-def _at_no_lag(
-    response: NDArray[np.float32], kx: NDArray[np.floating], ky: NDArray[np.floating]
-) -> NDArray[np.float64]:
-    """The filters of f, f_xx and f_yy (differences of pixels) in space, at the pixel itself, (3,)."""
-    bends = (2 * np.cos(2 * np.pi * k) - 2 for k in (kx, ky))
-    return np.array([np.mean(response), *(np.mean(response * bend) for bend in bends)], np.float64)
+def _filtered_spectrum(
+    image: Image,
+    mean: np.float32,
+    places: list[NDArray[np.intp]],
+    gain: tuple[Floats, Floats],
+    spectrum: NDArray[np.complex64],
+) -> Image:
+    """The spectrum of an image less ``mean``, padded and filtered, is written to ``spectrum``; returns the filter.
 
-
-def radial_spectrum(image: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Radius (cycles/px) and mean power in rings; white noise of variance s^2 gives s^2 everywhere."""
+    ``gain`` are radii (cycles/px) and the gain there.
+    """
     from scipy import fft
 
-    taper = np.outer(*(np.hanning(n + 2)[1:-1] for n in image.shape)).astype(np.float32)
-    taper /= np.sqrt(np.mean(taper**2, dtype=np.float64))
-    offset = np.average(image, weights=taper**2)
-    power = np.abs(fft.rfft2((image - np.float32(offset)) * taper, workers=2)) ** 2 / image.size
-    radius = np.hypot(np.fft.fftfreq(image.shape[0])[:, None], np.fft.rfftfreq(image.shape[1])[None, :])
-    ring = np.minimum((radius * _bins(image.shape)).astype(np.intp), int(0.70 * _bins(image.shape)))
-    count = np.bincount(ring.ravel())
-    seen = count > 0
-    sums = np.bincount(ring.ravel(), weights=power.ravel())
-    mid = np.bincount(ring.ravel(), weights=radius.ravel())
-    return mid[seen] / count[seen], sums[seen] / count[seen]
+    height, width = (len(place) for place in places)
+    ky, kx = np.fft.fftfreq(height)[:, None], np.fft.rfftfreq(width)[None, :]
+    for rows in _some_rows(height):
+        spectrum[rows] = fft.rfft((image[places[0][rows]] - mean).take(places[1], axis=1), workers=2)
+    fft.fft(spectrum, axis=0, overwrite_x=True, workers=2)
+    response = np.empty(spectrum.shape, np.float32)
+    for rows in _some_rows(height // 2 + 1):
+        response[rows] = np.interp(np.hypot(ky[rows], kx), *gain)
+    response[height // 2 + 1 :] = response[1 : (height + 1) // 2][::-1]  # of the frequencies below zero
+    for rows in _some_rows(height):
+        spectrum[rows] *= response[rows]
+    return response
+
+
+def _of_noise(
+    response: Image, along_x: NDArray[np.complex64], width: int, room: NDArray[np.complex64]
+) -> tuple[float, Floats]:
+    """``Pattern.left_gradient`` and ``Pattern.own_noise`` of a filter, with ``room`` of its shape to work in."""
+    floats = room.view(np.float32).reshape(-1)[: response.size].reshape(response.shape)
+    for rows in _some_rows(len(response)):
+        floats[rows] = np.abs(response[rows] * along_x) ** 2
+    left = float(np.mean(floats))
+    doubles = room.view(np.float64)
+    kx, ky = np.fft.rfftfreq(width)[None, :], np.fft.fftfreq(len(response))[:, None]
+    own = [np.mean(response)]
+    for k in (kx, ky):
+        np.multiply(response, 2 * np.cos(2 * np.pi * k) - 2, out=doubles)
+        own.append(np.mean(doubles))
+    return left, np.array(own, np.float64)
+
+
+def _back(spectrum: NDArray[np.complex64], width: int, out: Image) -> None:
+    """The image of a spectrum of the padded one, of ``width`` columns, without its rim; ``spectrum`` is overwritten."""
+    from scipy import fft
+
+    fft.ifft(spectrum, axis=0, norm="forward", overwrite_x=True, workers=2)
+    scale = np.float32(1 / np.longdouble(len(spectrum) * width))
+    for rows in _some_rows(len(out)):
+        inside = slice(rows.start + _MARGIN, rows.stop + _MARGIN)
+        some = fft.irfft(spectrum[inside], n=width, norm="forward", workers=2)
+        np.multiply(some[:, _MARGIN : _MARGIN + out.shape[1]], scale, out=out[rows])
+
+
+def _some_rows(count: int) -> Iterator[slice]:
+    """Rows 0 to ``count`` in parts that stay in the cache."""
+    return (slice(first, min(first + _ROWS, count)) for first in range(0, count, _ROWS))
+
+
+def radial_spectrum(image: Image) -> tuple[Floats, Floats]:
+    """Radius (cycles/px) and mean power in rings; white noise of variance s^2 gives s^2 everywhere."""
+    room = np.empty(image.shape[0] * (image.shape[1] // 2 + 1), np.complex64)
+    return _radial_spectrum(image, np.float32(0), room)
+
+
+def _radial_spectrum(image: Image, mean: np.float32, room: NDArray[np.complex64]) -> tuple[Floats, Floats]:
+    """``radial_spectrum`` of an image less ``mean``, with ``room`` for the spectrum (flat)."""
+    from scipy import fft
+
+    (height, width), rings = image.shape, _rings(image.shape)
+    weighted = room.view(np.float32)[: image.size].reshape(image.shape)
+    for rows in _some_rows(height):
+        np.multiply(image[rows] - mean, rings.taper(rows) ** 2, out=weighted[rows])
+    offset = weighted.sum() / rings.weight
+    spectrum = room[: height * (width // 2 + 1)].reshape(height, -1)
+    for rows in _some_rows(height):
+        spectrum[rows] = fft.rfft(((image[rows] - mean) - offset) * rings.taper(rows), workers=2)
+    fft.fft(spectrum, axis=0, overwrite_x=True, workers=2)
+    sums = np.zeros(len(rings.count))
+    for rows in _some_rows(height):
+        power = np.abs(spectrum[rows]) ** 2 / image.size
+        np.add.at(sums, rings.ring[rows].ravel().astype(np.intp), power.ravel().astype(np.float64))
+    seen = rings.count > 0
+    return rings.radius[seen] / rings.count[seen], sums[seen] / rings.count[seen]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rings:
+    """What ``radial_spectrum`` needs of pictures of one size: the window, and rings of the spectrum.
+
+    Attributes
+    ----------
+    lines : (H,), (W,) float64
+        The window along each axis.
+    level : float
+        Root mean square of their product.
+    weight : float32
+        Sum of the squares of the window.
+    ring : (H, W // 2 + 1) uint8
+        The ring of each frequency.
+    count, radius : (rings,)
+        How many each has, and the sum of their radii, cycles/px.
+    """
+
+    lines: tuple[Floats, Floats]
+    level: np.float64
+    weight: np.float32
+    ring: NDArray[np.uint8]
+    count: NDArray[np.intp]
+    radius: Floats
+
+    def taper(self, rows: slice) -> Image:
+        """Some rows of the window, (N, W)."""
+        return np.asarray(_outer(self.lines, rows) / self.level, np.float32)
+
+
+def _outer(lines: tuple[Floats, Floats], rows: slice) -> Image:
+    return np.multiply(lines[0][rows, None], lines[1]).astype(np.float32)
+
+
+@lru_cache(maxsize=1)
+def _rings(shape: tuple[int, int]) -> _Rings:
+    """Of the pictures of a camera they are always the same; made before a test, in the dry run."""
+    lines = np.hanning(shape[0] + 2)[1:-1], np.hanning(shape[1] + 2)[1:-1]
+    squares = np.empty(shape, np.float32)
+    for rows in _some_rows(shape[0]):
+        squares[rows] = _outer(lines, rows) ** 2
+    level = np.sqrt(np.mean(squares, dtype=np.float64))
+    for rows in _some_rows(shape[0]):
+        squares[rows] = np.asarray(_outer(lines, rows) / level, np.float32) ** 2
+    radius = np.hypot(np.fft.fftfreq(shape[0])[:, None], np.fft.rfftfreq(shape[1])[None, :])
+    ring = np.minimum((radius * _bins(shape)).astype(np.intp), int(0.70 * _bins(shape)))
+    count, radii = np.bincount(ring.ravel()), np.bincount(ring.ravel(), weights=radius.ravel())
+    return _Rings(lines, level, squares.sum(), ring.astype(np.uint8), count, radii)
 
 
 def _bins(shape: tuple[int, ...]) -> float:

@@ -6,13 +6,14 @@ pass on, nothing is dropped silently.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-CATCH_UP_S = 2.0
+CATCH_UP_S = 5.0
 """A reader that has not caught up after this time continues with the newest item."""
 
 Item = TypeVar("Item")
@@ -50,8 +51,8 @@ class LatestQueue(_Queue[Item]):
     ----------
     waits : bool
     at_first : int
-        Size of the queue until the reader, which has to prepare first, has caught up; after as many
-        items, or after ``CATCH_UP_S``, it continues with the newest in any case.
+        Size of the queue until the reader, which has to prepare first, has caught up. It continues with the newest
+        where the queue does not get shorter while as many items are taken, and after ``CATCH_UP_S`` in any case.
     keeps : int
         Size of the queue for a reader that is late now and then. One that lets it fill is too slow: it gets the
         newest item each time, until it has to wait for one again.
@@ -69,8 +70,9 @@ class LatestQueue(_Queue[Item]):
     ) -> None:
         super().__init__()
         self._waits, self._brief, self._keeps = waits, brief, keeps
-        self._size = self._catch_up_items = at_first
+        self._size = self._at_first = self._patience = at_first
         self._reading, self._catching_up, self._catch_up_t = False, True, 0.0
+        self._fewest = math.inf
         self._skipped: list[Item] = []
 
     def begin(self) -> None:
@@ -101,12 +103,18 @@ class LatestQueue(_Queue[Item]):
             return item
 
     def _resize(self) -> None:
-        self._catch_up_items -= 1
         if not self._items:
             self._size, self._catching_up = self._keeps, False
-        elif self._catching_up and (self._catch_up_items < 0 or time.monotonic() > self._catch_up_t):
+        elif self._catching_up and not self._gets_shorter():
             self._catching_up = False
             self._skip_oldest(1)
+
+    def _gets_shorter(self) -> bool:
+        """Whether a reader that is behind comes nearer to the newest item."""
+        self._patience -= 1
+        if len(self._items) < self._fewest:
+            self._fewest, self._patience = len(self._items), self._at_first
+        return self._patience >= 0 and time.monotonic() <= self._catch_up_t
 
     def _skip_oldest(self, size: int) -> None:
         """Skip all but the newest ``size`` items; the queue holds no more from now on."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+from acquire.burst import PictureMemory, SummedBurst
 from acquire.frame import Burst
 from live.pipeline.measure import NewReference
 from live.pipeline.reference import ReferenceBurst
@@ -25,11 +26,20 @@ class BurstQueue:
         Takes the frames of bursts that are not measured.
     idle : callable
         Called with a few words whenever nothing has arrived for a while, and after each burst with "".
+    memory : PictureMemory, optional
+        That of the bursts as they are measured (``memory_for``); by default its own.
     """
 
-    def __init__(self, grabber: Grabber, frame_counts: FrameCounts, idle: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        grabber: Grabber,
+        frame_counts: FrameCounts,
+        idle: Callable[[str], None],
+        memory: PictureMemory | None = None,
+    ) -> None:
         self._grabber, self._frame_counts, self._idle = grabber, frame_counts, idle
-        self._held: Burst | None = None
+        self._memory = memory or PictureMemory()
+        self._held: SummedBurst | None = None
         self._reference_end = self._lost = 0
         self.paused = False
 
@@ -86,7 +96,7 @@ class BurstQueue:
             self._idle("")
         self.count_skipped()
 
-    def _reference_before(self, burst: Burst) -> Burst:
+    def _reference_before(self, burst: SummedBurst) -> Burst:
         """The new reference; ``burst`` is held where it came after it."""
         reference = self._grabber.references.get().burst
         if burst.first_index > reference.last_index:
@@ -107,12 +117,12 @@ class BurstQueue:
         for burst in self._grabber.bursts.take_skipped():
             self._skip(burst)
 
-    def _skip(self, burst: Burst) -> None:
+    def _skip(self, burst: SummedBurst) -> None:
         self._frame_counts.add(skipped=burst.n)
         if burst.first_index > self._reference_end:
             self._lost += burst.lost
 
-    def _with_all_lost(self, burst: Burst) -> Burst:
+    def _with_all_lost(self, summed: SummedBurst) -> Burst:
         """The burst with all frames lost since the last measured burst, those of skipped bursts included."""
-        lost, self._lost = burst.lost + self._lost, 0
-        return replace(burst, lost=lost)
+        lost, self._lost = summed.lost + self._lost, 0
+        return replace(summed.burst(self._memory), lost=lost)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquire.burst import BurstAccumulator, PictureMemory
+from acquire.burst import PictureMemory, SumAccumulator, SummedBurst, nothing_clipped, sum_kind
 from acquire.camera import Camera, missing_at_end
 from acquire.errors import PhasedicError
 from acquire.events import EventKind, RateLimiter
@@ -32,8 +32,8 @@ HELD_BYTES, HELD_S, A_MEGAPIXEL_S = 512_000_000, 1.0, 0.25
 """Limits of the bursts that wait for the first measurement: bytes, seconds; a large reference takes longer."""
 LATE_S = 0.25
 """Seconds of frames that may wait for a measurement later on: others use the processor now and then."""
-_AT_WORK, _OF_REFERENCE = 3, 3
-"""Bursts beside those that wait: averaged, measured, shown; and a reference with its two halves."""
+_AT_WORK, _MEASURED, _OF_REFERENCE = 2, 3, 3
+"""Bursts beside those that wait: summed, taken; measured, the one before, and shown; a reference with its halves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,19 +66,36 @@ def _held_at_first(camera: CameraInfo, plan: GrabPlan) -> int:
 
 
 def _held(camera: CameraInfo, plan: GrabPlan, seconds: float) -> int:
-    """Bursts of ``seconds`` that may wait: a mean and a mask each."""
-    a_pixel = 1 + (4 if plan.burst > 1 else 1 + (camera.bits > 8))
-    bound = HELD_BYTES // (a_pixel * camera.width * camera.height)
+    """Bursts of ``seconds`` that may wait: the sum of each, and the bits of clipped pixels."""
+    bound = int(HELD_BYTES / (_bytes_a_pixel(camera, plan) * camera.width * camera.height))
     return max(1, min(bound, math.ceil(seconds * (camera.fps or 0) / plan.burst)))
+
+
+def _bytes_a_pixel(camera: CameraInfo, plan: GrabPlan) -> float:
+    """What a burst that waits takes at most; one of a single frame is the frame."""
+    if plan.burst == 1:
+        return 1 + (camera.bits > 8)
+    return sum_kind(camera.bits, plan.burst).itemsize + 1 / 8
 
 
 def _memory_for(camera: CameraInfo, plan: GrabPlan) -> PictureMemory:
     """Memory of the bursts that may wait, so that the first ones take no longer to average than all others."""
     memory, shape = PictureMemory(), (camera.height, camera.width)
-    bursts = _AT_WORK + _held_at_first(camera, plan)
-    memory.prepare(_OF_REFERENCE + bursts, shape, np.bool_)
-    memory.prepare(_OF_REFERENCE + bursts * (plan.burst > 1), shape, np.float32)
-    memory.prepare(_OF_REFERENCE, shape, np.uint32)
+    if plan.burst > 1:
+        bursts = _AT_WORK + _held_at_first(camera, plan)
+        memory.prepare(bursts, shape, sum_kind(camera.bits, plan.burst))
+    for kind in (np.bool_, np.float32, np.uint32):
+        memory.prepare(_OF_REFERENCE, shape, kind)
+    return memory
+
+
+def memory_of_measured(camera: CameraInfo, plan: GrabPlan) -> PictureMemory:
+    """Memory of the bursts that are measured and shown, of the measuring thread; see ``_memory_for``."""
+    memory, shape = PictureMemory(), (camera.height, camera.width)
+    nothing_clipped(shape).any()
+    if camera.live:
+        memory.prepare(_MEASURED, shape, np.bool_)
+        memory.prepare(_MEASURED * (plan.burst > 1), shape, np.float32)
     return memory
 
 
@@ -91,13 +108,15 @@ class Grabber:
         Entered before ``start``.
     plan : GrabPlan
     run_state : RunState
-    on_frame, on_burst : callable
-        Called with every frame, and with every burst; they must not block.
+    on_frame : callable
+        Called with every frame; it must not block.
+    on_burst : callable, or None
+        The same with every burst; its mean is made only for this.
 
     Attributes
     ----------
     references : queue of ReferenceBurst
-    bursts : LatestQueue of Burst
+    bursts : LatestQueue of SummedBurst
         With a source that waits for its reader, nothing is skipped.
     error : Exception or None
         The error that ended the camera.
@@ -113,7 +132,7 @@ class Grabber:
         plan: GrabPlan,
         run_state: RunState,
         on_frame: Callable[[Frame], None] = lambda frame: None,
-        on_burst: Callable[[Burst], None] = lambda burst: None,
+        on_burst: Callable[[Burst], None] | None = None,
     ) -> None:
         self._camera, self._event_log, self._frame_counts = (
             camera,
@@ -123,17 +142,17 @@ class Grabber:
         self._plan, self._on_frame, self._on_burst = plan, on_frame, on_burst
         self._health = run_state.health
         self.references: queue.SimpleQueue[ReferenceBurst] = queue.SimpleQueue()
-        self.bursts: LatestQueue[Burst] = LatestQueue(
+        self.bursts: LatestQueue[SummedBurst] = LatestQueue(
             waits=not camera.info.live,
             at_first=_held_at_first(camera.info, plan),
             keeps=_held(camera.info, plan, LATE_S),
-            brief=Burst.without_pictures,
+            brief=SummedBurst.without_pictures,
         )
         self._memory = _memory_for(camera.info, plan) if camera.info.live else PictureMemory()
         self.error: Exception | None = None
         self.fps = 0.0
         self._taker: ReferenceTaker | None = ReferenceTaker(plan.reference_burst, self._memory)
-        self._accumulator = BurstAccumulator(plan.burst, memory=self._memory)
+        self._accumulator = SumAccumulator(plan.burst, memory=self._memory)
         self._unassigned, self.time_is_over = 0, False
         self._limiter, self._unreported = RateLimiter(), 0
         self.begun_t = self.arrived_t = math.nan
@@ -212,7 +231,8 @@ class Grabber:
             self._feed_reference(self._taker, frame)
         elif (burst := self._accumulator.add(frame)) is not None:
             self._used(burst.n)
-            self._on_burst(burst)
+            if self._on_burst is not None:
+                self._on_burst(burst.burst(self._memory))
             self.bursts.put(burst)
 
     def _report_loss(self, frame: Frame) -> None:
@@ -230,9 +250,10 @@ class Grabber:
         if reference is None:
             return
         self._used(reference.burst.n)
-        self._on_burst(reference.burst)
+        if self._on_burst is not None:
+            self._on_burst(reference.burst)
         self._frame_counts.add(reference=reference.burst.n)
-        self._taker, self._accumulator = None, BurstAccumulator(self._plan.burst, memory=self._memory)
+        self._taker, self._accumulator = None, SumAccumulator(self._plan.burst, memory=self._memory)
         self.references.put(reference)
 
     def _used(self, n: int) -> None:

@@ -25,7 +25,7 @@ from live.pipeline.screen import Screen
 from live.results.writer import write_results
 from live.run.burst_queue import TAKING, BurstQueue
 from live.run.control import ControlRefused
-from live.run.grabber import Grabber, GrabPlan
+from live.run.grabber import Grabber, GrabPlan, memory_of_measured
 from live.run.load_thread import LoadThread, tare_controls
 from live.run.measuring import MeasureThread
 from live.run.outcome import Outcome, StopSignal
@@ -71,10 +71,12 @@ class LiveRun:
         self._recording, self._screen, self._stop = recording, screen, stop
         self._rig = prepared.rig
         self._plan = GrabPlan.of(prepared.config, prepared.bursts)
-        self.grabber = Grabber(self._rig.camera, self._plan, run_state, self._take, self._take_burst)
+        on_burst = self._take_burst if recording is not None and recording.takes_bursts else None
+        self.grabber = Grabber(self._rig.camera, self._plan, run_state, self._take, on_burst)
         run_state.health.began_t, self._hinted = time.monotonic(), False
         self._has_recorded = self.recording
-        self._burst_queue = BurstQueue(self.grabber, run_state.frame_counts, self._idle)
+        memory = memory_of_measured(self._rig.camera.info, self._plan)
+        self._burst_queue = BurstQueue(self.grabber, run_state.frame_counts, self._idle, memory)
         self._load = LoadThread(self._rig.load, run_state, outputs, recording)
         self._tares = tare_controls(self._rig.load, run_state)
         latency = LatencyMonitor(lambda: recording.backlog if recording else 0.0)

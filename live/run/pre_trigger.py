@@ -99,6 +99,11 @@ class PreTriggerBuffer:
         self._lock = threading.RLock()
 
     @property
+    def takes_bursts(self) -> bool:
+        """Whether bursts replace frames."""
+        return self._settings.bursts
+
+    @property
     def failed(self) -> str | None:
         """Why nothing more is written; None while all is well."""
         return self._recorder.failed

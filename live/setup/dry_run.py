@@ -5,11 +5,13 @@ Code that is compiled or imported on first use is loaded here, and not while a s
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.burst import PictureMemory, SumAccumulator
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
 from live.pipeline.history import History
@@ -46,23 +48,32 @@ def dry_run(camera: CameraInfo, grid: ZoiGrid, settings: KernelSettings, bursts:
     with on_fit_machine():
         warm_up(kinds=picture_kinds(camera), phase=settings.estimator == "phase")
     images = [_image(camera, seed) for seed in (1, 2)]
-    reference, *_ = [_averaged(camera, images, n) for n in bursts]
+    reference = _averaged(camera, images, bursts[0])
+    burst = _measured(camera, images, bursts[1])
     kernel, noise_GL = prepare(reference.burst, grid, settings, None, what="measure")
     if reference.halves is not None:
         motion_between(kernel, *reference.halves)
-    bursts_again: list[Burst] = [reference.burst, reference.burst]
     history = History()
-    for measurement in measure(bursts_again, Tracker(kernel, noise_GL), LoadLog()):
+    for measurement in measure([burst, burst], Tracker(kernel, noise_GL), LoadLog()):
         history.add(measurement.time_step)
 
 
 def _averaged(camera: CameraInfo, images: list[NDArray[Any]], n: int) -> ReferenceBurst:
     """A reference of n frames, the images in turn."""
-    taker = ReferenceTaker(n)
-    for i in range(n):
-        taken = taker.add(Frame(images[i % 2], i, float(i), camera.clock, 0, camera.bits, float(i)))
+    *_, taken = map(ReferenceTaker(n).add, _frames(camera, images, n))
     assert taken is not None
     return taken
+
+
+def _measured(camera: CameraInfo, images: list[NDArray[Any]], n: int) -> Burst:
+    """The same as a burst to be measured."""
+    *_, taken = map(SumAccumulator(n).add, _frames(camera, images, n))
+    assert taken is not None
+    return taken.burst(PictureMemory())
+
+
+def _frames(camera: CameraInfo, images: list[NDArray[Any]], n: int) -> Iterator[Frame]:
+    return (Frame(images[i % 2], i, float(i), camera.clock, 0, camera.bits, float(i)) for i in range(n))
 
 
 def _image(camera: CameraInfo, seed: int) -> NDArray[Any]:

@@ -83,7 +83,22 @@ def test_a_reader_who_never_catches_up_goes_on_with_the_newest() -> None:
         box.put(i + 1)
         taken.append(box.get(0))
     assert taken[:2] == [0, 1]
-    assert taken[3:] == list(range(7, 40, 2))
+    assert taken[4:] == list(range(9, 40, 2))
+
+
+def test_a_reader_that_is_little_faster_catches_up_however_many_items_it_takes() -> None:
+    """Three items come while it takes four."""
+    box: LatestQueue[int] = LatestQueue(at_first=10)
+    for i in range(10):
+        box.put(i)
+    box.begin()
+    taken, number = [], 10
+    for k in range(30):
+        taken.append(box.get(0))
+        if k % 4:
+            box.put(number)
+            number += 1
+    assert taken == list(range(30)) and box.take_skipped() == []
 
 
 def test_a_slow_reader_is_not_kept_in_the_past(monkeypatch: pytest.MonkeyPatch) -> None:

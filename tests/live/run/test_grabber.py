@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 import pytest
 
+from acquire.burst import SumAccumulator, SummedBurst
 from acquire.errors import DeviceError
 from acquire.frame import Burst, Frame
 from acquire.load_cell.contract import NoLoadCell
@@ -50,7 +51,7 @@ def grabbed(camera: ListCamera, *, burst: int = 2, reference: int = 4, seconds: 
     plan = GrabPlan(burst, reference, math.inf if seconds is None else seconds)
     grabber = Grabber(camera, plan, run_state, seen.append)
     grabber.start()
-    bursts: list[Burst] = []
+    bursts: list[SummedBurst] = []
     while not grabber.bursts.finished:
         item = grabber.bursts.get(1.0)
         if item is not None:
@@ -133,7 +134,7 @@ def test_a_live_source_never_waits() -> None:
     grabber.join()
     skipped = grabber.bursts.take_skipped()
     assert sum(b.n for b in skipped) == 18
-    assert sum(b.mean.nbytes + b.clipped.nbytes for b in skipped) == 0  # many, while a reference is prepared
+    assert sum(b.nbytes for b in skipped) == 0  # many, while a reference is prepared
     last = grabber.bursts.get(0)
     assert last is not None
     assert last.last_index == 20
@@ -340,15 +341,15 @@ class TakenBursts:
     """A grabber that has taken bursts of two frames, so many lost before each, and has ended."""
 
     def __init__(self, *lost: int) -> None:
-        self.bursts: LatestQueue[Burst] = LatestQueue()
+        self.bursts: LatestQueue[SummedBurst] = LatestQueue()
         self.references: queue.SimpleQueue[ReferenceBurst] = queue.SimpleQueue()
         self.running, self.fps = False, 10.0
-        image, t = np.zeros((4, 6), np.float32), 0.0
+        taker = SumAccumulator(2)
         for k, before in enumerate(lost):
-            first = 10 + 2 * k
-            self.bursts.put(
-                Burst(image, 2, 1.0, image > 0, 8, t, 0.1, first, first + 1, before, "nominal"),
-            )
+            taker.add(frame(10 + 2 * k, lost=before))
+            burst = taker.add(frame(11 + 2 * k))
+            assert burst is not None
+            self.bursts.put(burst)
         self.bursts.close()
 
 
