@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
 from acquire.session import Session
+from acquire.session.layout import image_dtype
 from acquire.session.writer import FLUSH_S
 from tests.acquire.session.fixtures import CAMERA, LOAD, START, frame, sample, writer
 from tests.clock import Clock
@@ -272,3 +274,20 @@ def test_no_frame_beyond_the_end(path: Path) -> None:
     writer(path).close()
     with Session.open(path) as back, pytest.raises(DataError, match="no frame 0"):
         back.frame(0)
+
+
+def test_what_stands_in_the_file_is_what_its_description_says(path: Path) -> None:
+    """For other programs: events with the time of the test, stable as 1, 0 and -1."""
+    with writer(path) as session:
+        session.write_event(Event(START.monotonic + 2.5, EventKind.NOTE, "operator", "x"))
+        for stable in (None, False, True):
+            session.write_load(LoadSample(START.monotonic, 1.0, "N", stable))
+    with h5py.File(path) as file:
+        event = json.loads(file["entry/events"][0])
+        assert (event["time_s"], event["monotonic_s"]) == (2.5, START.monotonic + 2.5)
+        assert file["entry/load/stable"][:].tolist() == [-1, 0, 1]
+
+
+@pytest.mark.parametrize(("bits", "kind"), [(1, np.uint8), (8, np.uint8), (9, np.uint16), (16, np.uint16)])
+def test_samples_of_more_than_eight_bits_take_two_bytes(bits: int, kind: type) -> None:
+    assert image_dtype(bits) == kind
