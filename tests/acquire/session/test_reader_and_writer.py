@@ -11,13 +11,15 @@ import h5py
 import numpy as np
 import pytest
 
+from acquire.addresses import parse_address
 from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
 from acquire.session import Session
-from acquire.session.layout import image_dtype
+from acquire.session.devices import open_session_camera, open_session_load
+from acquire.session.layout import FORMAT_VERSION, image_dtype
 from acquire.session.writer import FLUSH_S
 from tests.acquire.session.fixtures import CAMERA, LOAD, START, frame, sample, writer
 from tests.clock import Clock
@@ -239,6 +241,30 @@ def test_a_newer_format_is_refused(path: Path) -> None:
         file.attrs["format_version"] = 99
     with pytest.raises(DataError, match=r"format version 99.*update"):
         Session.open(path)
+
+
+def test_the_next_format_is_refused(path: Path) -> None:
+    writer(path).close()
+    with h5py.File(path, "r+") as file:
+        file.attrs["format_version"] = FORMAT_VERSION + 1
+    with pytest.raises(DataError, match=f"reads up to {FORMAT_VERSION}; update phasedic"):
+        Session.open(path)
+
+
+def test_a_recording_is_no_live_camera_and_its_load_takes_no_tare(path: Path) -> None:
+    with writer(path) as session:
+        session.write_frame(frame(0))
+        session.write_load(sample(0))
+    told: list[Event] = []
+    address = parse_address(f"session:{path}")
+    with open_session_camera(address, told.append) as camera:
+        assert CAMERA.live and not camera.info.live
+        assert (camera.info.address, [one.index for one in camera]) == (address.text, [5])
+    with open_session_load(address, told.append) as load:
+        load.tare(force=True)
+        load.undo_tare()
+        assert [one.force for one in load] == [0.0]
+    assert [event.data["tared"] for event in told] == [False, False]
 
 
 def test_a_truncated_file_is_refused(path: Path) -> None:
