@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
-from analysis.evaluate import distance, strips_of
+from analysis.evaluate import ExtensionGauge, distance, facing, strips_of
 from analysis.evaluate.area.affine import Places, noise_of_windows
 from analysis.field import PAIR_INDEX, WINDOWS, Measure, StrainField, Window
 from live.config.gauges import gauges_for
@@ -111,12 +111,14 @@ def _window(strain: Strain) -> Window:
 
 
 def length_between(strain: Strain, axis: Literal["x", "y"], described: Mapping[str, Any] | None) -> float:
-    """L0 along ``axis``, px: between strips, or between the ends of the gauge ``described``; NaN without ends."""
-    ends = strips_of(strain.grid, axis)
+    """L0 of the extension, px: between strips along ``axis``, where they face each other, or between the ends of the
+    gauge ``described``; NaN without ends."""
+    ends, along = strips_of(strain.grid, axis), str(axis)
     if described is not None:
         try:
             table = from_dict({"gauges": {"axial": dict(described)}}, {}, str(strain.path)).gauges
-            ends = gauges_for(table, axis, strain.grid)[0].zois(strain.grid)
+            gauge = gauges_for(table, axis, strain.grid)[0]
         except ConfigError:  # a file of another version
             return math.nan
-    return distance(strain.grid, ends)
+        ends, along = gauge.zois(strain.grid), gauge.along if isinstance(gauge, ExtensionGauge) else ""
+    return distance(strain.grid, (along and facing(ends, along)) or ends)

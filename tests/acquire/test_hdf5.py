@@ -19,7 +19,7 @@ from acquire.errors import DataError
 from acquire.hdf5 import COMPRESSED, DiskSync, PictureReader, PictureStack, compile_loops, create_file
 from acquire.hdf5 import disk as pace_module
 from acquire.hdf5.damage import METADATA_BYTES
-from acquire.hdf5.disk import forecast, free_bytes, network_share
+from acquire.hdf5.disk import FlushTimer, forecast, free_bytes, network_share
 from tests.acquire.session.fixtures import frame, writer
 from tests.live.ui.waiting import until
 
@@ -141,6 +141,29 @@ def test_network_shares_are_known(tmp_path: Path, path: str, kind: str | None) -
     mounts = tmp_path / "mounts"
     mounts.write_text(MOUNTS)
     assert network_share(path, mounts) == kind
+
+
+def test_the_innermost_mount_counts_in_whatever_order_they_stand(tmp_path: Path) -> None:
+    mounts = tmp_path / "mounts"
+    mounts.write_text("".join(reversed(MOUNTS.splitlines(keepends=True))))
+    assert network_share("/mnt/lab/runs/session.h5", mounts) == "nfs4"
+    assert network_share("/mnt/lab/local/x", mounts) is None
+
+
+def test_a_flush_is_due_once_something_has_waited_and_not_before() -> None:
+    now = [100.0]
+    timer = FlushTimer(0.25, lambda: now[0])
+    assert timer.left_s() == math.inf, "nothing waits"
+    timer.wrote()
+    assert timer.left_s() == 0.0, "the first at once"
+    timer.began()
+    timer.done()
+    now[0] += 0.1
+    assert timer.left_s() == math.inf
+    timer.wrote()
+    assert timer.left_s() == pytest.approx(0.15)
+    now[0] += 0.2
+    assert timer.left_s() == 0.0
 
 
 def test_where_nobody_tells_the_mounts_nothing_is_known(tmp_path: Path) -> None:

@@ -10,12 +10,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from acquire.addresses import parse_address
 from acquire.camera.opening import open_camera
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Event
 from acquire.opencv import images
-from acquire.opencv.image_metadata import count_pages
-from acquire.opencv.images import MAX_REPORTED, natural_key, read_image
+from acquire.opencv.gray import to_gray
+from acquire.opencv.image_metadata import count_pages, read_stamps
+from acquire.opencv.images import MAX_REPORTED, natural_key, picture_times, read_image
 
 
 def picture(value: int = 0, shape: tuple[int, ...] = (12, 16), dtype: type = np.uint8) -> NDArray[Any]:
@@ -81,6 +83,15 @@ def test_equal_channels_are_grey(tmp_path: Path) -> None:
     image = picture()
     write(tmp_path / "a.png", np.dstack([image] * 3))
     assert np.array_equal(read_image(tmp_path / "a.png"), image)
+
+
+@pytest.mark.parametrize("other", [0, 1, 2])
+def test_two_equal_channels_of_three_are_no_grey(other: int) -> None:
+    channels = [picture(1)] * 3
+    channels[other] = picture(2)
+    with pytest.raises(ConfigError, match="gray=luma"):
+        to_gray(np.dstack(channels), None, "a.png")
+    assert np.array_equal(to_gray(np.dstack(channels), "bgr"[other], "a.png"), channels[other])
 
 
 def test_colour_has_to_be_chosen(tmp_path: Path) -> None:
@@ -219,6 +230,24 @@ def test_times_that_do_not_fit(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "times.csv").write_text(text)
     with pytest.raises(DataError, match=message):
         open_camera(f"files:{tmp_path}/*.png?stamps={tmp_path}/times.csv")
+
+
+def test_two_pictures_may_have_one_time(tmp_path: Path) -> None:
+    (tmp_path / "times.csv").write_text("1\n1\n2\n")
+    assert read_stamps(tmp_path / "times.csv", [Path(name) for name in "abc"]) == [1.0, 1.0, 2.0]
+
+
+def test_pictures_by_name_have_the_times_of_their_frames(tmp_path: Path) -> None:
+    for name in ("s2", "s10", "s1"):
+        write(tmp_path / f"{name}.png", picture())
+    address = parse_address(f"files:{tmp_path}/*.png?fps=4")
+    times = picture_times(address)
+    assert times == {"s1.png": 0.0, "s2.png": 0.25, "s10.png": 0.5}
+    with open_camera(address.text) as camera:
+        assert [frame.t for frame in camera] == list(times.values())
+    (tmp_path / "times.csv").write_text("3\n5\n9\n")
+    stamped = parse_address(f"files:{tmp_path}/*.png?stamps={tmp_path}/times.csv")
+    assert picture_times(stamped) == {"s1.png": 3.0, "s2.png": 5.0, "s10.png": 9.0}
 
 
 def test_stop_ends_the_iteration(tmp_path: Path) -> None:

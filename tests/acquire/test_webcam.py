@@ -140,6 +140,44 @@ def test_what_is_not_honoured_is_refused_with_what_there_is() -> None:
     assert capture.released
 
 
+@pytest.mark.parametrize(("got", "taken"), [(1263, True), (1266, True), (1200, False), (1300, False)])
+def test_a_setting_is_in_force_within_a_hundredth(got: int, taken: bool) -> None:
+    capture, settings = FakeCapture(shots(1), FRAME_WIDTH=got), OpenCVSettings(width=1275)
+    if taken:
+        assert camera_of(capture, settings=settings).info.controls["width"] == got
+    else:
+        with pytest.raises(ConfigError, match=f"width=1275, the driver gives {got}"):
+            camera_of(capture, settings=settings)
+
+
+def test_a_camera_is_described_by_its_picture() -> None:
+    info = camera_of(FakeCapture(shots(1))).info
+    assert (info.width, info.height, info.bits, info.fps, info.clock) == (6, 4, 8, 30.0, "host")
+
+
+class StampedCapture(FakeCapture):
+    """Has a stamp for each read, s."""
+
+    def __init__(self, stamps: Sequence[float]) -> None:
+        super().__init__(shots(*range(len(stamps))))
+        self._stamps = list(stamps)
+
+    def get(self, prop: int) -> float:
+        if prop == cv2.CAP_PROP_POS_MSEC:
+            return 1000 * self._stamps[min(self.read_count, len(self._stamps)) - 1]
+        return super().get(prop)
+
+
+def test_stamps_of_the_driver_tell_how_many_were_lost() -> None:
+    capture = StampedCapture([100.0, 100.1, 100.1 + 1 / 30, 100.1 + 4 / 30, 100.1 + 5 / 30])
+    camera = OpenCVCamera("opencv:0", lambda: capture, OpenCVSettings(), ignore_event, now=lambda: 100.0)
+    frames = take(camera, 3)
+    assert {frame.clock for frame in frames} == {"device"}
+    assert [frame.lost_before for frame in frames] == [0, 0, 2]
+    assert [frame.index for frame in frames] == [0, 1, 4]
+    assert [frame.t for frame in frames] == pytest.approx([100.1, 100.1 + 1 / 30, 100.1 + 4 / 30])
+
+
 def test_a_camera_that_does_not_open_or_gives_nothing() -> None:
     with pytest.raises(DeviceError, match="no camera opens"):
         camera_of(FakeCapture([], opens=False))

@@ -57,18 +57,26 @@ def read_strips(chosen: Sequence[Mask], field: StrainField, along: str) -> Gauge
 
     Strips that hardly face each other, as those of a specimen that leans, are read whole.
     """
-    side = 1 if along == "x" else 0
-    sides = [end.any(axis=side) for end in chosen]
-    if np.sum(sides[0] & sides[1]) < MIN_SHARE * min(one.sum() for one in sides):
+    if facing(chosen, along) is None:
         return read_ends(chosen, field)
     for number, end in enumerate(chosen, 1):
         if missing := _missing(end, field):
             return GaugeValue(math.nan, math.nan, f"end {number}: {missing}")
+    side = 1 if along == "x" else 0
     first, second = ((end & field.ok).any(axis=side, keepdims=True) for end in chosen)
     both = first & second & field.ok
     if not both.any():
         return GaugeValue(math.nan, math.nan, "the ZOIs with a value at its two ends do not face each other")
     return read_ends([end & both for end in chosen], field)
+
+
+def facing(strips: Sequence[Mask], along: str) -> list[Mask] | None:
+    """Each of two strips where the other has ZOIs too; None where they hardly face each other."""
+    sides = [end.any(axis=1 if along == "x" else 0, keepdims=True) for end in strips]
+    both = sides[0] & sides[1]
+    return (
+        None if both.sum() < MIN_SHARE * min(one.sum() for one in sides) else [end & both for end in strips]
+    )
 
 
 def _missing(chosen: Mask, field: StrainField) -> str:

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
+from acquire.protocols.base import find_protocol
+from acquire.protocols.buffers import LineBuffer, number
 from acquire.protocols.lines import PRESETS, load_preset, parser_from
 from acquire.protocols.modbus import ModbusParser, crc16, frame
 from acquire.protocols.modbus_profile import load_profile, profile_from
@@ -65,6 +67,47 @@ def test_commands_of_a_preset(own: str) -> None:
 @pytest.mark.parametrize("name", ["rinstrum", "sartorius", "ohaus", "loadstar", "dillon"])
 def test_presets_of_ours_are_sound(name: str) -> None:
     parser_from(load_preset(name))
+
+
+SETTINGS_OF_DEVICES = {
+    "aed-standard": (1, 2400, 7, "E", "listen", True, True),
+    "ascii": (1, 9600, 8, "N", "listen", False, True),
+    "hbm-aed": (1, 9600, 8, "E", "stream", True, False),
+    "mark10": (-1, 9600, 8, "N", "stream", False, True),
+    "modbus": (1, 9600, 8, "N", "poll", False, False),
+    "mt-sics": (1, 9600, 8, "N", "stream", True, True),
+    "sauter": (1, 9600, 8, "N", "poll", False, False),
+}
+"""Sign of tension, line, who begins, whether an overload has a mark and the line a unit."""
+
+
+@pytest.mark.parametrize("name", SETTINGS_OF_DEVICES)
+def test_a_protocol_without_settings_is_that_of_its_device(name: str) -> None:
+    p = find_protocol(name)
+    found = (p.sign, p.baud, p.bytesize, p.parity, p.mode, p.flags_overload, p.unit_on_line)
+    assert found == SETTINGS_OF_DEVICES[name]
+
+
+def test_the_rates_of_streams_have_their_commands() -> None:
+    assert dict(find_protocol("hbm-aed").rates) == {
+        100.0: b"ICR0;MSV?0;", 50.0: b"ICR1;MSV?0;", 25.0: b"ICR2;MSV?0;", 12.0: b"ICR3;MSV?0;",
+        6.0: b"ICR4;MSV?0;", 3.0: b"ICR5;MSV?0;", 2.0: b"ICR6;MSV?0;", 1.0: b"ICR7;MSV?0;",
+    }  # fmt: skip
+    assert find_protocol("mark10").rates == {float(n): b"AOUT%d\r" % n for n in (2, 5, 10, 25, 50, 125, 250)}
+
+
+def test_bytes_never_fed_count_for_the_place_of_a_line() -> None:
+    buffer = LineBuffer()
+    assert [line.start for line in buffer.feed(b"..\nabc\nde")] == [3]
+    buffer.restart(lost=100)
+    assert [(line.data, line.start) for line in buffer.feed(b"f\nxyz\n")] == [(b"xyz", 7 + 2 + 100 + 2)]
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("1.234,5", 1234.5), ("-1.234.567,5", -1234567.5), ("12.345.678,", 12345678.0)]
+)
+def test_points_between_thousands_of_a_decimal_comma(text: str, value: float) -> None:
+    assert number(text, decimal_comma=True) == value
 
 
 @pytest.mark.parametrize(

@@ -390,6 +390,21 @@ def test_a_pyserial_url_keeps_its_own_settings() -> None:
     assert settings.line.baud == 115200 and settings.unit == "N"
 
 
+def test_the_line_is_that_of_the_address_or_of_the_protocol() -> None:
+    plain = read_settings(parse_address("/dev/fake?protocol=aed-standard")).line
+    assert (plain.baud, plain.bytesize, plain.parity, plain.stopbits) == (2400, 7, "E", 1.0)
+    given = "protocol=aed-standard&baud=4800&bytesize=8&parity=O&stopbits=1.5"
+    line = read_settings(parse_address(f"/dev/fake?{given}")).line
+    assert (line.baud, line.bytesize, line.parity, line.stopbits) == (4800, 8, "O", 1.5)
+
+
+@pytest.mark.parametrize(
+    ("address", "sign"), [("", -1), ("&sign=1", 1), ("&gain=2", 1), ("&gain=2&sign=-1", -1)]
+)
+def test_the_sign_of_a_protocol_is_not_that_of_a_gain_of_ones_own(address: str, sign: int) -> None:
+    assert read_settings(parse_address(f"/dev/fake?protocol=mark10{address}")).sign == sign
+
+
 @pytest.mark.parametrize(("rate", "start"), [("7", b"AOUT10\r"), ("25", b"AOUT25\r"), ("999", b"AOUT250\r")])
 def test_the_stream_is_at_least_as_fast_as_asked(rate: str, start: bytes) -> None:
     settings = read_settings(parse_address(f"/dev/fake?protocol=mark10&rate={rate}"))

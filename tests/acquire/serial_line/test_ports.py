@@ -184,6 +184,25 @@ def test_silence_too_little_and_nonsense_are_nothing(heard: bytes) -> None:
     assert guess("/dev/ttyUSB0", 9600, heard) is None
 
 
+@pytest.mark.parametrize(("whole", "known"), [(5, True), (4, False)])
+def test_five_lines_make_a_protocol(whole: int, known: bool) -> None:
+    """The first of them may have lost its beginning, and does not count."""
+    assert (guess("/dev/ttyUSB0", 9600, b"12.5 N\r\n" * (whole + 1)) is not None) is known
+
+
+@pytest.mark.parametrize(("good", "known"), [(8, True), (7, False)])
+def test_four_of_five_lines_must_be_readings(good: int, known: bool) -> None:
+    heard = b"12.5 N\r\n" * (good + 1) + b"no reading here\r\n" * (10 - good)
+    found = guess("/dev/ttyUSB0", 9600, heard)
+    assert (found is not None) is known
+    assert found is None or found.score == 0.8
+
+
+def test_of_two_protocols_that_which_understands_more_is_proposed() -> None:
+    found = guess("/dev/ttyUSB0", 9600, b"+0012345\r\n" * 10 + b"12.5\r\n")
+    assert found is not None and (found.protocol, found.score) == ("ascii", 1.0)
+
+
 def lines(values: list[float], notation: str, form: str) -> bytes:
     """Values as a device writes them: the decimal mark and what stands between thousands in ``notation``."""
     marks = str.maketrans({".": notation[0], ",": notation[1:]})

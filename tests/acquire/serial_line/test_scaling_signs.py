@@ -75,3 +75,15 @@ def test_the_last_digit_is_the_smallest_that_the_display_has_shown() -> None:
     for value in (12.3, 12.25, 12.0):
         scaling.sample(Reading(value, None, b"", 0), 0.0)
     assert scaling.zero.step_N == pytest.approx(10.0)
+
+
+def test_where_zero_moved_the_next_force_is_no_step() -> None:
+    """Whatever it is: an undone tare brings the load of before back."""
+    scaling = Scaling(read_settings(parse_address("/dev/fake?unit=N&max_step=10")), lambda level, text: None)
+
+    def steps(value: float) -> bool:
+        return LoadFlag.STEP in scaling.sample(Reading(value, None, b"", 0), 0.0).flags
+
+    assert [steps(50.0), steps(59.0), steps(70.0)] == [False, False, True]
+    scaling.tared()
+    assert [steps(300.0), steps(311.0)] == [False, True]

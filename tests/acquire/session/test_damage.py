@@ -6,6 +6,7 @@ The limit on the size of files stands in for the full disk: writing fails in the
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import subprocess
 import sys
@@ -15,11 +16,16 @@ import h5py
 import numpy as np
 import pytest
 
+from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.hdf5 import damage as child
+from acquire.hdf5 import to_json
 from acquire.record_mode import RecordMode
 from acquire.session import Session, recover
-from tests.acquire.session.fixtures import CAMERA, frame, sample, writer
+from acquire.session.layout import describe_camera
+from acquire.session.part import SessionPart
+from acquire.session.stored import camera_from
+from tests.acquire.session.fixtures import CAMERA, START, frame, sample, writer
 from tests.acquire.session.fuzz import fuzz, whole_session
 from tests.acquire.session.kill_recorder import kill_once
 
@@ -258,3 +264,34 @@ def test_frames_without_a_time_are_lost_before_the_next_one(tmp_path: Path) -> N
     with Session.open(found.path) as back:
         assert back.indices.tolist() == [5, 8, 9, 10]
         assert [one.lost_before for one in back.frames()] == [0, 2 + 4 + 2, 0, 0]
+
+
+def test_frames_without_a_time_at_the_beginning_are_lost_before_the_first(tmp_path: Path) -> None:
+    path = tmp_path / "session.h5"
+    with writer(path) as session:
+        for number in range(4):
+            session.write_frame(frame(number, lost_before=(1, 2, 0, 0)[number]))
+    with h5py.File(path, "r+") as file:
+        file["entry/frames/monotonic_s"][:2] = math.nan
+    with Session.open(recover(path).path) as back:
+        assert [(one.index, one.lost_before) for one in back.frames()] == [(7, 1 + 1 + 2 + 1), (8, 0)]
+
+
+def test_a_copy_of_one_file_of_a_set_says_which_it_is_and_reads_the_clocks_once(tmp_path: Path) -> None:
+    path, later = tmp_path / "session.h5", ClockPair(START.monotonic + 60, START.utc)
+    with writer(path, set_id="a set", part=3) as session:
+        session.write_frame(frame(0))
+        session.write_clock(later)
+    with SessionPart(recover(path).path) as copy:
+        assert (copy.set_id, copy.part) == ("a set", 3)
+        assert copy.clock_pairs() == [START, later]
+
+
+@pytest.mark.parametrize(("width", "height", "sense"), [(16384, 16384, True), (16385, 16384, False)])
+def test_a_picture_has_2_to_28_pixels_at_most(width: int, height: int, sense: bool) -> None:
+    text = to_json(describe_camera(dataclasses.replace(CAMERA, width=width, height=height))).encode()
+    if sense:
+        assert camera_from(text, "a file").width == width
+    else:
+        with pytest.raises(DataError, match=f"pictures of {width} x {height} px are beyond sense"):
+            camera_from(text, "a file")

@@ -116,6 +116,15 @@ def rotated(folder: Path, frames: int = 10, limit: int = 3 * 16 * 12 * 2) -> Pat
     return path
 
 
+def test_bytes_are_counted_through_all_files(tmp_path: Path) -> None:
+    picture = 16 * 12 * 2
+    with RotatingWriter(tmp_path / "session.h5", info(), 2 * picture) as session:
+        for k in range(5):
+            session.write_frame(frame(k))
+            assert session.bytes_written == (k + 1) * picture
+        assert session.path.name == "session.002.h5"
+
+
 @pytest.mark.parametrize("opened", ["session.h5", "session.001.h5", "session.003.h5"])
 def test_a_rotated_set_opens_as_one(tmp_path: Path, opened: str) -> None:
     rotated(tmp_path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from pathlib import Path
 
@@ -10,12 +11,15 @@ import h5py
 import numpy as np
 import pytest
 
+from acquire.addresses import parse_address
 from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
 from acquire.session import Session
+from acquire.session.devices import open_session_camera, open_session_load
+from acquire.session.layout import FORMAT_VERSION, image_dtype
 from acquire.session.writer import FLUSH_S
 from tests.acquire.session.fixtures import CAMERA, LOAD, START, frame, sample, writer
 from tests.clock import Clock
@@ -239,6 +243,30 @@ def test_a_newer_format_is_refused(path: Path) -> None:
         Session.open(path)
 
 
+def test_the_next_format_is_refused(path: Path) -> None:
+    writer(path).close()
+    with h5py.File(path, "r+") as file:
+        file.attrs["format_version"] = FORMAT_VERSION + 1
+    with pytest.raises(DataError, match=f"reads up to {FORMAT_VERSION}; update phasedic"):
+        Session.open(path)
+
+
+def test_a_recording_is_no_live_camera_and_its_load_takes_no_tare(path: Path) -> None:
+    with writer(path) as session:
+        session.write_frame(frame(0))
+        session.write_load(sample(0))
+    told: list[Event] = []
+    address = parse_address(f"session:{path}")
+    with open_session_camera(address, told.append) as camera:
+        assert CAMERA.live and not camera.info.live
+        assert (camera.info.address, [one.index for one in camera]) == (address.text, [5])
+    with open_session_load(address, told.append) as load:
+        load.tare(force=True)
+        load.undo_tare()
+        assert [one.force for one in load] == [0.0]
+    assert [event.data["tared"] for event in told] == [False, False]
+
+
 def test_a_truncated_file_is_refused(path: Path) -> None:
     with writer(path) as session:
         for number in range(20):
@@ -272,3 +300,20 @@ def test_no_frame_beyond_the_end(path: Path) -> None:
     writer(path).close()
     with Session.open(path) as back, pytest.raises(DataError, match="no frame 0"):
         back.frame(0)
+
+
+def test_what_stands_in_the_file_is_what_its_description_says(path: Path) -> None:
+    """For other programs: events with the time of the test, stable as 1, 0 and -1."""
+    with writer(path) as session:
+        session.write_event(Event(START.monotonic + 2.5, EventKind.NOTE, "operator", "x"))
+        for stable in (None, False, True):
+            session.write_load(LoadSample(START.monotonic, 1.0, "N", stable))
+    with h5py.File(path) as file:
+        event = json.loads(file["entry/events"][0])
+        assert (event["time_s"], event["monotonic_s"]) == (2.5, START.monotonic + 2.5)
+        assert file["entry/load/stable"][:].tolist() == [-1, 0, 1]
+
+
+@pytest.mark.parametrize(("bits", "kind"), [(1, np.uint8), (8, np.uint8), (9, np.uint16), (16, np.uint16)])
+def test_samples_of_more_than_eight_bits_take_two_bytes(bits: int, kind: type) -> None:
+    assert image_dtype(bits) == kind

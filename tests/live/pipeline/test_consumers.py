@@ -16,7 +16,7 @@ from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from examples.second_consumer import main
 from live.pipeline.consumer import Consumer, Policy
-from live.pipeline.consumer_thread import MAX_EVENTS, Outputs
+from live.pipeline.consumer_thread import MAX_EVENTS, ConsumerThread, Outputs
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
 from live.pipeline.measurement import Measurement
@@ -237,6 +237,43 @@ def test_each_kind_reaches_those_who_define_it() -> None:
     assert len(listener.seen["event"]) == MAX_EVENTS
     line = out.reports[0].line()
     assert line == "listener: 2 measurements; 1 frames, 2 dropped; 1 load samples; 1000 events, 5 dropped"
+
+
+class MatchedConsumer(Consumer):
+    """Notes the forces; nothing else is passed on to it."""
+
+    name, blocks = "matched", False
+
+    def __init__(self) -> None:
+        self.forces: list[float] = []
+
+    def matched(self, measurement: Measurement) -> None:
+        self.forces.append(measurement.force)
+
+
+def test_measurements_that_wait_for_their_force_come_at_the_end() -> None:
+    taker, loads = MatchedConsumer(), make_loads(0.15, lambda t: 100.0 * t)
+    out, _ = outputs(taker, loads=loads)
+    give(out, [0, 1, 2, 3])
+    assert taker.forces == pytest.approx([0.0, 10.0])
+    for k in range(16, 40):
+        loads.append(LoadSample(START + k / 100, float(k)))
+    out.end()
+    assert taker.forces == pytest.approx([0.0, 10.0, 20.0, 30.0])
+
+
+def test_one_that_has_failed_takes_nothing_more() -> None:
+    taker = RecordingConsumer(blocks=False, fails_at=1)
+    thread = ConsumerThread(taker, lambda name, why, critical: None)
+    thread.start()
+    assert thread.wants("measurement") and not thread.wants("frame")
+    for number in range(3):
+        thread.give("measurement", make_measurement(number))
+    assert taker.rows == [0] and not thread.wants("measurement")
+    report = thread.end()
+    assert (report.taken, report.dropped, report.failed) == (
+        {"measurement": 1}, {}, "strain.h5: the disk is full",
+    )  # fmt: skip
 
 
 def test_it_sees_every_measurement_and_stands_in_the_report(

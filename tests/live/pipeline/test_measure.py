@@ -340,6 +340,19 @@ def test_a_gauge_that_comes_and_goes() -> None:
     assert history.gauge("late") is None, "the first instant has none of that name"
 
 
+def test_a_gauge_keeps_its_share_and_why_it_was_lost() -> None:
+    history, held = (
+        History(),
+        [GaugeValue(1e-3, 1e-6, "", 0.75), GaugeValue(math.nan, math.nan, "lost", 0.25)],
+    )
+    for one in held:
+        history.add(replace(some(0), gauges={"left": one}))
+    found = [step.gauges["left"] for step in history.time_steps]
+    assert repr(found) == repr(held)
+    sigma = history.time_steps.gauge_sigma("left")
+    assert sigma is not None and repr(sigma.tolist()) == "[1e-06, nan]"
+
+
 def test_the_columns_grow_while_they_are_read() -> None:
     history = History()
     history.add(some(0))
@@ -376,6 +389,40 @@ def test_the_means_of_an_old_file_are_not_called_strains_of_the_region() -> None
     for old, words in ((True, "mean eyy"), (False, "eyy of the region")):
         held = values if old else values | {"extension_y": np.full(3, np.nan)}
         assert curve_of(held.get, (), "y", np.arange(3.0), np.zeros(3)).source == words
+
+
+@pytest.mark.parametrize(("axis", "across"), [("x", "y"), ("y", "x")])
+def test_the_curve_of_the_region_is_of_the_columns_along_and_across_the_load(axis: str, across: str) -> None:
+    names = ("extension_{}", "e{0}{0}", "uneven_e{0}{0}", "sigma_lens_e{0}{0}")
+    held = {
+        name.format(one): np.arange(3.0) + k + 10 * (one == "x")
+        for k, name in enumerate(names)
+        for one in "xy"
+    }
+    held |= {"misfit": np.full(3, 5.0), "blur": np.full(3, 6.0)}
+    found = curve_of(held.get, (), axis, np.arange(3.0), np.arange(3.0) * 1e6)
+    along = {
+        "strain": f"extension_{axis}", "elastic": f"e{axis * 2}", "uneven": f"uneven_e{axis * 2}",
+        "lens": f"sigma_lens_e{axis * 2}", "transverse": f"e{across * 2}", "narrowing": f"extension_{across}",
+        "misfit": "misfit", "blur": "blur",
+    }  # fmt: skip
+    for attribute, column in along.items():
+        np.testing.assert_array_equal(getattr(found, attribute), held[column], err_msg=attribute)
+
+
+def test_a_tare_in_mid_test_has_the_sign_of_what_it_took_off() -> None:
+    """40 N were made zero between the two instants: forces fall, and are put back."""
+    history, loads = History("y"), LoadLog()
+    for k, force in enumerate((100.0, 140.0, 0.0, 20.0)):
+        if k == 2:
+            tare = {"step_N": 140.0}
+            loads.take_event(Event(START + 1.5, EventKind.TARE, "a cell", "", "info", tare))
+        loads.append(LoadSample(START + k, force))
+    for t in (0.5, 3.0):
+        history.add(replace(make_measurement(0).time_step, t=START + t))
+    assert history.tared_in_mid_test(loads) == 140.0
+    assert history.forces(loads)[-1] == 160.0
+    assert History("y").tared_in_mid_test(loads) == 0.0
 
 
 class NoiseOfKernel:

@@ -43,6 +43,28 @@ def test_times(tmp_path: Path, text: str, times: tuple[float, ...], forces: tupl
     assert read.forces == pytest.approx(forces, nan_ok=True)
 
 
+def test_semicolons_separate_before_tabs_and_commas(tmp_path: Path) -> None:
+    """Without a heading, the decimal commas stand in the first line too."""
+    read = read_forces(table(tmp_path, "0;0,1\n0,5;-2,25\n"))
+    assert (read.times, read.forces) == ((0.0, 0.5), (0.1, -2.25))
+    read = read_forces(table(tmp_path, "Time\tLoad, total\tForce [N]\n0\t1\t2\n1\t1\t3\n"))
+    assert (read.times, read.forces) == ((0.0, 1.0), (2.0, 3.0))
+
+
+def test_only_between_times_there_are_gaps(tmp_path: Path) -> None:
+    """Pictures by name may be minutes apart; of a table with times a gap is three of its steps."""
+    named = read_forces(table(tmp_path, "a0,100\na1,200\n"))
+    samples = named.samples({"a0.png": 0.0, "a1.png": 60.0}, 0.0)
+    assert named.log(samples, 0.5).forces_one_zero([30.0]).tolist() == [150.0]
+    timed = read_forces(table(tmp_path, "time_s,force_N\n0,0\n1,10\n2,20\n6,60\n9,90\n"))
+    log = timed.log(timed.samples(None, 100.0), 0.5)
+    found = log.forces_one_zero([100.5, 104.0, 107.5]).tolist()
+    assert found == pytest.approx([5.0, 40.0, 75.0])
+    sparse = read_forces(table(tmp_path, "time_s,force_N\n0,0\n1,10\n2,20\n6,60\n"))
+    log = sparse.log(sparse.samples(None, 100.0), 0.5)
+    assert log.forces_one_zero([101.5, 104.0]).tolist() == pytest.approx([15.0, math.nan], nan_ok=True)
+
+
 @pytest.mark.parametrize("text", ["file,force_kN\na1.png,1\nshots/a0.png,-0.5\n", "a1,1000\na0.png,-500\n"])
 def test_names_in_any_order_with_and_without_folder_and_ending(tmp_path: Path, text: str) -> None:
     samples = read_forces(table(tmp_path, text)).samples({"a0.png": 0.0, "a1.png": 1.0, "a2.png": 2.0}, 0.0)

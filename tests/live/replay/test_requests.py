@@ -11,12 +11,14 @@ import cv2
 import numpy as np
 import pytest
 
-from acquire.errors import DataError
+from acquire.errors import ConfigError, DataError
 from acquire.frame import CameraInfo
+from acquire.record_mode import RecordMode
 from acquire.session import Session
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
+from live.replay.burst_index import open_store
 from live.replay.pictures import reference_from
 from live.replay.replay import replay
 from live.replay.source import ReplayRequest
@@ -225,3 +227,32 @@ def test_a_reference_has_no_more_than_the_bits_of_the_pictures(tmp_path: Path, t
         return
     with pytest.raises(DataError, match="16-bit samples up to 1024, the pictures have 10 bits"):
         reference_from(str(path), camera)
+
+
+class BurstSession:
+    """Bursts of 8 frames, as a session has them."""
+
+    mode = RecordMode.parse("bursts")
+
+    def burst_column(self, name: str) -> np.ndarray:
+        first = 8 * np.arange(5)
+        columns = {
+            "first_index": first,
+            "last_index": first + 7,
+            "monotonic_s": first / 10,
+            "n": 0 * first + 8,
+        }
+        return np.asarray(columns[name])
+
+
+@pytest.mark.parametrize("n", [7, 9])
+def test_recorded_bursts_have_the_length_they_have(n: int) -> None:
+    stored = open_store(BurstSession(), Path("session.h5"))  # type: ignore[arg-type]
+    for length in (None, 8):
+        index = stored.index_after(7, length)
+        assert (index.starts.tolist(), index.stops.tolist()) == ([1, 2, 3, 4], [2, 3, 4, 5])
+        assert index.t.tolist() == [0.8, 1.6, 2.4, 3.2] and index.rows(range(1, 3)) == (2, 4)
+    with pytest.raises(ConfigError, match="holds bursts of 8 frames; give --burst 8"):
+        stored.index_after(7, n)
+    with pytest.raises(ConfigError, match="--reference-burst cannot be changed"):
+        stored.first_burst(8)

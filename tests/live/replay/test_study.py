@@ -181,3 +181,18 @@ def test_the_largest_strain_and_its_uncertainty_are_those_of_the_other_half_of_t
     assert result.sigma == pytest.approx(result.noise * math.sqrt(1 / 3 + 1 / 2))
     assert result.seen == pytest.approx(5e-3, abs=4 * result.sigma)
     assert result.gradient == pytest.approx(4e-3 / 16, rel=0.1)
+
+
+def test_the_share_of_zois_with_a_value_is_that_of_the_active_ones() -> None:
+    active = np.ones((7, 9), bool)
+    active[0], active[1, :3] = False, False
+    grid = ZoiGrid.cover(Roi(0, 0, 160, 128), 32, 16).subset(active=active)
+    status = np.where(active, 0, 1)
+    status[3, 2:8] = 5  # in one picture alone
+
+    def field(status: np.ndarray) -> StrainField:
+        return StrainField.from_values(grid, {"dv_dy": 1e-3}, 1e-4, status=status)
+
+    loaded = [field(np.where(active, 0, 1)), field(status)]
+    result = _found(StudySetting(32, 16, 1, "gaussian"), "y", [field(np.where(active, 0, 1))] * 2, loaded)
+    assert result.valid == (51 - 6) / 51

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import astuple, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,12 +12,22 @@ import pytest
 from acquire.events import Event, EventKind
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
+from analysis.evaluate import Figure
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
 from live.pipeline.run_state import FrameCounts, RunState
 from live.results.budget import CameraView, budget_cells, budget_rows
-from live.results.figures import alignment_line, budget_of, elastic_lines, evaluate, figure_lines, lag_line
+from live.results.figures import (
+    alignment_line,
+    budget_of,
+    elastic_lines,
+    evaluate,
+    figure_lines,
+    lag_line,
+    sharpness_line,
+    tensile_options,
+)
 from live.results.summary import latency_lines, noise_line, summary_lines
 from tests.analysis.curves import Truth, composite, noisy, ramberg_osgood
 from tests.live.made_up import START, make_measurement
@@ -219,3 +230,43 @@ def test_noise_and_latency_of_a_run_are_the_usual_ones_in_the_units_of_the_line(
     replayed = History()
     replayed.add(replace(one, latency_s=math.nan))
     assert latency_lines(replayed) == []
+
+
+def test_the_options_of_an_evaluation_are_in_si_units() -> None:
+    """Errors in % and um/m, a preload in MPa; without a section neither its error nor a preload counts."""
+    given: dict[str, Any] = {
+        "zero": "preload", "preload_MPa": 2.5, "force_error_percent": 0.5, "section_error_percent": 2.0,
+        "strain_error_um_m": 30.0,
+    }  # fmt: skip
+    options = tensile_options(replace(FLAT, **given))
+    assert (options.zero, options.preload) == ("preload", 2.5e6)
+    assert astuple(options.limits) == pytest.approx((0.005, 0.02, 30e-6))
+    options = tensile_options(SpecimenConfig(**given))
+    assert options.zero == "raw" and options.limits.section is None
+    assert tensile_options(replace(FLAT, zero="toe")).zero == "toe"
+    assert astuple(tensile_options(FLAT).limits) == (None, None, None)
+
+
+def test_the_sharpness_has_the_largest_change_and_the_last() -> None:
+    blur, sigma = [0.1, -0.4, math.nan, 0.25], [0.02, 0.03, 0.01, 0.04]
+    assert sharpness_line(blur, sigma) == [
+        "sharpness since the reference: sharper by 0.40 ± 0.03 px at most, less sharp by 0.25 ± 0.04 px in the last"
+        " picture"
+    ]
+    assert sharpness_line([math.nan], [0.1]) == []
+
+
+@pytest.mark.parametrize(
+    ("lag", "corrected", "how"),
+    [(0.0321, 0.0, "not applied; --lag 0.032 does"), (-0.0321, 0.0, "not applied; --lag -0.032 does"),
+     (0.004, 0.0, "too small to matter"), (0.0321, 0.05, "50 ms corrected")],
+)  # fmt: skip
+def test_the_lag_that_is_advised_is_the_one_found(
+    monkeypatch: pytest.MonkeyPatch, lag: float, corrected: float, how: str
+) -> None:
+    history, loads = History("y"), LoadLog(lag_s=corrected)
+    history.add(make_measurement(0).time_step)
+    loads.append(LoadSample(START, 5.0))
+    monkeypatch.setattr("live.results.figures.find_lag", lambda *_: Figure(lag, lag - 0.001, lag + 0.001))
+    (line,) = lag_line(history, loads, FLAT)
+    assert line == f"lag of the load behind the frames: {1e3 * lag:.1f} ± 1.0 ms (95%; {how})"

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from pathlib import Path
+from typing import Any
 
 import cv2
 import h5py
@@ -15,9 +17,13 @@ from acquire.errors import DataError
 from acquire.record_mode import RecordMode
 from live.cli import main
 from live.commands.more_gauges import add_gauges
+from live.results import Results, ResultsInfo, Strain
+from live.results.row import StrainRow
 from live.results.run_folder import open_run
+from live.results.stored_fields import length_between
+from live.results.strain_h5 import StrainWriter
 from tests.live.made_run import CONFIG, E_PA, GAUGES, PULLED, make_run, session_writer
-from tests.live.made_up import START, make_measurement
+from tests.live.made_up import CAMERA, START, make_grid, make_measurement
 
 
 def test_results_and_recording_are_tied_together(tmp_path: Path) -> None:
@@ -189,3 +195,70 @@ def test_a_window_that_is_no_window_is_taken_as_the_usual_one(tmp_path: Path) ->
     config = {**CONFIG, "measure": {"window": "round"}}
     with open_run(make_run(tmp_path, PULLED[:3], config=config)) as run:
         assert run.field(0).window == "gaussian"
+
+
+def results_of(folder: Path, zeros: tuple[float, ...], **config: dict[str, Any]) -> Path:
+    """Instants with 100 N more each, of which ``zeros`` had been taken off by tares."""
+    info = ResultsInfo(START, "2030-01-02T03:04:05+00:00", config, {}, {}, CAMERA)
+    with Results(folder, make_grid(), info) as results:
+        for k, zero in enumerate(zeros):
+            m = make_measurement(k, 1e-3 * k, force=100.0 * k - zero)
+            results.add(dataclasses.replace(m, time_step=dataclasses.replace(m.time_step, zero=zero)))
+    return folder
+
+
+def test_stresses_have_the_zero_of_the_first_instant(tmp_path: Path) -> None:
+    """60 N were taken off in mid-test, beside 5 N before it."""
+    with open_run(results_of(tmp_path, (5.0, 5.0, 65.0, 65.0), specimen={"area_mm2": 20.0})) as run:
+        assert run.force.tolist() == [-5.0, 95.0, 135.0, 235.0]
+        assert run.force_one_zero.tolist() == [-5.0, 95.0, 195.0, 295.0]
+        assert run.stress is not None
+        np.testing.assert_allclose(run.stress, np.array([-5.0, 95.0, 195.0, 295.0]) / 20e-6)
+        np.testing.assert_array_equal(run.curve.stress, run.stress)
+
+
+@pytest.mark.parametrize(
+    ("gauge", "px"),
+    [
+        (None, 64.0),  # one ZOI of the first row is missing: the strips are taken where they face each other
+        ({"kind": "extension", "box": [0.0, 7.5, 128.0, 80.0]}, 64.0),
+        ({"kind": "line", "start": [31.5, 31.5], "end": [63.5, 79.5], "radius_px": 1.0}, math.hypot(32, 48)),
+    ],
+    ids=["strips", "extension", "line"],
+)
+def test_the_gauge_length_is_that_between_the_ends_in_mm(
+    tmp_path: Path, gauge: dict[str, Any] | None, px: float
+) -> None:
+    gauges = {} if gauge is None else {"axial": gauge}
+    with open_run(results_of(tmp_path / "a", (0.0,), scale={"mm_per_px": 0.05})) as run:
+        assert not run.strain.grid.active[0, 0]
+        assert length_between(run.strain, "y", gauge) == pytest.approx(px)
+        assert gauge is not None or run.gauge_length_mm == pytest.approx(0.05 * px)
+    with open_run(results_of(tmp_path / "b", (0.0,), gauges=gauges)) as run:
+        assert run.gauge_length_mm is None, "the scale is not known"
+
+
+class Pattern:
+    """In place of ``Sums``: the normal matrices of all ZOIs are one number."""
+
+    def __init__(self, value: float) -> None:
+        self._value = value
+
+    def information(self, at: np.ndarray) -> np.ndarray:
+        return np.full((6, 6, len(at)), self._value)
+
+
+def test_every_row_has_the_reference_it_was_measured_against(tmp_path: Path) -> None:
+    first, second = Pattern(1.5), Pattern(2.5)
+    info = ResultsInfo(START, "2030-01-02T03:04:05+00:00", {}, {}, {}, CAMERA)
+    file = StrainWriter(tmp_path / "strain.h5", make_grid(), info)
+    for k, pattern in enumerate((first, first, second, second)):
+        row = StrainRow.of(make_measurement(k), info)
+        file.write(dataclasses.replace(row, pattern=pattern))  # type: ignore[arg-type]
+    file.close()
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        assert [strain.reference(row) for row in range(4)] == [0, 0, 1, 1]
+        active = strain.grid.active
+        for number, value in ((0, 1.5), (1, 2.5)):
+            normal = strain.normal(number)
+            assert (normal[:, active] == value).all() and (normal[:, ~active] == 0).all()

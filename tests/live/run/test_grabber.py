@@ -93,6 +93,28 @@ def test_the_end_of_the_time_ends_the_run() -> None:
     assert not grabber.time_is_over
 
 
+def test_the_time_of_a_test_counts_from_its_first_frame() -> None:
+    grabber, _, frame_counts, _, _ = grabbed(ListCamera(frame(i) for i in range(50, 200)), seconds=2.0)
+    assert frame_counts.grabbed == 21 and grabber.time_is_over
+
+
+def test_losses_that_were_not_told_are_in_the_next_report() -> None:
+    """At most one report in two seconds; 10 frames a second."""
+    lost = {5: 1, 9: 2, 30: 3}
+    frames = [frame(i, lost=lost.get(i, 0)) for i in range(35)]
+    _, _, frame_counts, event_log, _ = grabbed(ListCamera(frames))
+    assert frame_counts.lost == 6
+    told = [event.data for event in event_log.events("warning")]
+    assert told == [{"count": 1, "before": 5}, {"count": 5, "before": 30}]
+
+
+def test_the_rate_follows_the_frames_by_a_tenth() -> None:
+    grabber, *_ = grabbed(ListCamera(frame(i) for i in (0, 1, 2, 3)))
+    assert grabber.fps == pytest.approx(10.0)
+    grabber, *_ = grabbed(ListCamera(frame(i) for i in (0, 1, 2, 7)))
+    assert grabber.fps == pytest.approx(10.0 - 0.1 * 8.0)
+
+
 def test_a_camera_that_dies_is_told_and_kept() -> None:
     camera = ListCamera([frame(0), frame(1)], error=DeviceError("list: is gone; plug it in again"))
     grabber, _, frame_counts, event_log, _ = grabbed(camera, reference=1)

@@ -71,6 +71,12 @@ def test_a_note_is_typed_to_its_end_and_no_key_in_it_is_an_order() -> None:
     assert typed.type(":", "tare  undo", "\r")[1:] == [(EventKind.TARE, UNDO)]
 
 
+def test_a_note_without_words_is_none() -> None:
+    typed = Typed()
+    assert typed.type("n", "\r", "n", "  ", "\n", ":", "\n") == []
+    assert "no" not in typed.stream.getvalue().replace("note", "")
+
+
 def test_one_q_alone_ends_no_test() -> None:
     typed = Typed()
     assert typed.type("q") == [] and "q again" in typed.stream.getvalue()

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from acquire.errors import DeviceError
 from acquire.load_cell.contract import NoLoadCell
 from acquire.load_sample import LoadSample
 from live.pipeline.consumer_thread import Outputs
@@ -60,3 +61,56 @@ def test_samples_that_are_missing_at_the_end(
     assert any("the load is missing" in event.text for event in run_state.event_log.events("warning")) is (
         missing > 0
     )
+
+
+def load_thread(cell: NoLoadCell, run_state: RunState) -> LoadThread:
+    outputs = Outputs([], run_state.loads, run_state.event_log, run_state.history)
+    return LoadThread(cell, run_state, outputs, None)
+
+
+class SlowCell(SilentCell):
+    """Sends 2 a second."""
+
+    def __iter__(self) -> Iterator[LoadSample]:
+        for sample in super().__iter__():
+            self._now[0] += 0.4
+            yield sample
+
+
+@pytest.mark.parametrize(("silent_s", "missing"), [(4.9, 0), (5.1, 10)])
+def test_a_slow_cell_may_be_silent_for_ten_of_its_periods(
+    monkeypatch: pytest.MonkeyPatch, silent_s: float, missing: int
+) -> None:
+    now, run_state = [100.0], RunState.new(0.5)
+    monkeypatch.setattr("live.run.load_thread.time.monotonic", lambda: now[0])
+    cell = SlowCell(now, 21)
+    thread = load_thread(cell, run_state)
+    thread.start()
+    assert cell.silent.wait(LONG_S)
+    now[0] += silent_s
+    thread.stop()
+    thread.join()
+    assert run_state.frame_counts.load_lost == missing
+
+
+class BrokenCell(NoLoadCell):
+    """Sends one sample, and then fails."""
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__()
+        self._error = error
+
+    def __iter__(self) -> Iterator[LoadSample]:
+        yield LoadSample(1.0, 5.0)
+        raise self._error
+
+
+@pytest.mark.parametrize(("error", "code"), [(DeviceError("unplugged"), 3), (ZeroDivisionError("oh"), 1)])
+def test_a_load_that_fails_leaves_its_exit_code_and_an_event(error: Exception, code: int) -> None:
+    run_state = RunState.new(0.5)
+    thread = load_thread(BrokenCell(error), run_state)
+    thread.start()
+    thread.join()
+    assert (thread.failure, run_state.frame_counts.load_samples) == (code, 1)
+    (event,) = run_state.event_log.events("error")
+    assert event.text == f"the load is lost, images go on: {error}"

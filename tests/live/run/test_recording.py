@@ -21,6 +21,7 @@ from live.run.control import START, STOP, ControlRefused
 from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
 from live.run.recorder import Recorder, _announce_disk
 from tests.live.fakes import frame
+from tests.live.made_up import make_measurement
 from tests.live.ui.waiting import LONG_S
 
 
@@ -115,6 +116,61 @@ def test_a_defect_is_told_as_one() -> None:
     frame_counts, event_log = recorded(FakeWriter(fails_at=0, error=TypeError("oops")), 2)
     assert frame_counts.unrecorded == 2
     assert "a defect of the recorder: TypeError('oops')" in event_log.events("error")[0].text
+
+
+class FakeBurstWriter(FakeWriter):
+    """Takes bursts too, and is a file on a disk."""
+
+    path, bytes_written = Path("session.h5"), 10**6
+
+    def write_burst(self, item: Any) -> int:
+        self.others.append(item)
+        return 0
+
+
+def recorder_of(mode: str, *, full: bool = False) -> tuple[Recorder, FakeBurstWriter, FrameCounts, EventLog]:
+    writer, frame_counts, event_log = FakeBurstWriter(), FrameCounts(), EventLog()
+    one = Recorder(writer, frame_counts, event_log, 10**6, mode=RecordMode.parse(mode))  # type: ignore[arg-type]
+    if full:
+        one._buffer.put = lambda item, size, **_: False  # type: ignore[method-assign]
+    return one, writer, frame_counts, event_log
+
+
+@pytest.mark.parametrize(("full", "counts"), [(False, (8, 0, 0)), (True, (0, 8, 0))])
+def test_frames_of_a_burst_are_recorded_or_missing_with_it(full: bool, counts: tuple[int, ...]) -> None:
+    one, writer, found, _ = recorder_of("bursts", full=full)
+    for k in range(8):
+        one.frame(frame(k))
+    assert (found.recorded, found.unrecorded, found.thinned) == (0, 0, 8)
+    one.burst(make_measurement(0).burst)
+    one.close({})
+    assert (found.recorded, found.unrecorded, found.thinned) == counts
+    assert len(writer.others) == (not full) and writer.frames == []
+
+
+def test_where_frames_are_recorded_bursts_are_not() -> None:
+    one, writer, found, _ = recorder_of("all")
+    one.frame(frame(0))
+    one.burst(make_measurement(0).burst)
+    one.close({})
+    assert (writer.frames, writer.others) == ([0], [])
+    assert (found.recorded, found.thinned) == (1, 0)
+
+
+def test_a_disk_that_fills_is_told_once_until_it_has_room_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    rates, seconds = [], iter([30.0, 20.0, 1e6, 10.0])
+
+    def forecast(path: Path, rate: float) -> float:
+        rates.append(rate)
+        return next(seconds)
+
+    monkeypatch.setattr("live.run.recorder.forecast", forecast)
+    one, _, _, event_log = recorder_of("all")
+    for _ in range(4):
+        one._check_disk(2.0)
+    one.close({})
+    assert rates == [5e5] * 4, "bytes a second so far"
+    assert [event.data["seconds"] for event in event_log.events("warning")] == [30.0, 10.0]
 
 
 class FakeRecorder:

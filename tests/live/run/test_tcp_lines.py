@@ -76,6 +76,19 @@ def test_without_the_token_nothing_is_heard_or_told() -> None:
         right.close()
 
 
+def test_lines_to_all_are_for_those_with_the_token() -> None:
+    with server(token=WORD, greeting="welcome") as one:
+        first, later = Caller(one.port), Caller(one.port)
+        assert first.ask(WORD) == "ok" and first.lines.readline() == "welcome\n"
+        one.send("strain 1")
+        assert first.lines.readline() == "strain 1\n"
+        assert later.ask(f"token {WORD}") == "ok" and later.lines.readline() == "welcome\n"
+        one.send("strain 2")
+        assert [caller.lines.readline() for caller in (first, later)] == ["strain 2\n"] * 2
+        first.close()
+        later.close()
+
+
 def test_a_browser_can_order_nothing() -> None:
     received: list[str] = []
     with server(answer=lambda line: received.append(line) or "ok") as one:  # type: ignore[func-returns-value]

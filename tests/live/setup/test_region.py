@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +15,16 @@ import pytest
 from acquire.errors import ConfigError, DeviceError
 from analysis import Roi, ZoiGrid
 from analysis.evaluate import extension_of
+from analysis.quality.specimen import Specimen
 from live.cli import main
 from live.config.gauges import gauges_for
 from live.config.loading import load_config
 from live.results import Strain
 from live.setup.devices import open_rig
 from live.setup.placement import auto_gauges, with_auto_gauges
-from live.setup.region import FirstLook, first_look, located_on, region_of
-from tests.live.made_up import make_field
+from live.setup.region import FirstLook, Region, first_look, located_on, region_of
+from live.setup.rig_proposal import _axis, _size
+from tests.live.made_up import CAMERA, make_field
 
 SIM = "sim:hole?seconds=2&fps=20&width=320&height=320&hole=40&lockstep=yes"
 QUICK = ["--zoi", "32", "--step", "16", "--no-view", "--no-rrd"]
@@ -259,3 +262,45 @@ def test_the_noise_of_a_first_look_is_that_of_the_mean_of_its_frames() -> None:
     config = load_config(None, {"camera.address": "sim:uniform?bits=8&noise=2&fps=100&hold=10&seconds=20"})
     found = first_look(config, lambda text: None)
     assert found.camera.live and found.noise == pytest.approx(0.02 * 255 / 2, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("width", "zoi"), [(640, 64), (256, 64), (255, 48), (191, 32), (127, 24), (95, 16), (40, 16)]
+)
+def test_the_largest_zoi_is_proposed_of_which_four_lie_across(width: int, zoi: int) -> None:
+    config = load_config(None, {})
+    look = FirstLook(np.zeros((480, 640), np.uint8), None, CAMERA)
+    for axis, box in (("y", (0, 0, width, 480)), ("x", (0, 0, 640, min(width, 480)))):
+        along = replace(config, specimen=replace(config.specimen, axis=axis))
+        expected = zoi if axis == "y" or width < 480 else 64
+        assert _size(Region(box, None, ""), along, look) == expected
+
+
+@pytest.mark.parametrize(
+    ("size", "axis"), [((640, 480), "y"), ((450, 300), "y"), ((451, 300), "x"), ((200, 480), "y")]
+)
+def test_a_slender_specimen_is_pulled_along_its_length(size: tuple[int, int], axis: str) -> None:
+    assert _axis(Region((0, 0, *size), None, ""), True) == axis
+    assert _axis(Region((0, 0, *size), None, ""), False) == "y"
+
+
+@pytest.mark.parametrize(
+    ("rows", "hole", "fills"), [(200, 0, True), (200, 9, False), (195, 0, False), (100, 0, False)]
+)
+def test_a_specimen_that_fills_the_picture_has_no_mask(
+    monkeypatch: pytest.MonkeyPatch, rows: int, hole: int, fills: bool
+) -> None:
+    """From 98 % of it on, unless it has a hole of half a ZOI."""
+    mask = np.zeros((200, 300), bool)
+    mask[:rows] = True
+    y, x = np.mgrid[:200, :300]
+    mask[np.hypot(y - 100, x - 150) <= hole] = hole == 0
+    found = Specimen(mask, Roi(0, 0, 300, rows), 2.0)
+    monkeypatch.setattr("analysis.quality.specimen.find_specimen", lambda picture, noise: found)
+    region = region_of(load_config(None, {"measure.zoi": 32}), np.zeros((200, 300), np.uint8))
+    assert region.found
+    assert (region.box is None, region.mask is None) == (fills, fills)
+    assert region.words.startswith(
+        "the specimen fills" if fills else f"the specimen was found: {mask.mean():.0%}"
+    )
+    assert region.box in (None, (4, 4, 292, min(192, rows - 4)))

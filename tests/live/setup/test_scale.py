@@ -15,7 +15,7 @@ from live.cli import main
 from live.config.loading import load_config
 from live.results.run_folder import open_run
 from live.setup.region import Region, region_of
-from live.setup.scale import Board, false_strain, from_board, from_points, from_width
+from live.setup.scale import Board, Corners, false_strain, from_board, from_points, from_width
 from tests.live.made_run import CONFIG, make_run
 
 CHECKER = Board(9, 6, 5.0)
@@ -181,3 +181,17 @@ def test_the_report_shows_it(scaled: Path, tmp_path: Path) -> None:
 def test_what_is_no_scale_is_none(tmp_path: Path, stored: object) -> None:
     with open_run(make_run(tmp_path, [0.0], config={**CONFIG, "scale": {"mm_per_px": stored}})) as run:
         assert run.mm_per_px is None
+
+
+def test_the_scale_of_a_board_is_the_mean_of_its_two_directions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tilt shortens one of them; half of the difference is uncertain."""
+    rows, columns = np.mgrid[:6, :9]
+    mm = np.stack([columns.ravel(), rows.ravel()], axis=1) * 5.0
+    monkeypatch.setattr("live.setup.scale.find_corners", lambda *_: Corners(mm, mm * [10.0, 8.0] + 7.0))
+    scale = from_board(np.zeros((9, 9)), CHECKER)
+    assert scale.mm_per_px == pytest.approx(1 / math.sqrt(80))
+    assert scale.relative == pytest.approx(0.2 / math.sqrt(12))
+    assert "by 20.0% between its directions" in scale.remarks[0]
+    assert from_board(np.zeros((9, 9)), CHECKER, sigma_mm=4.0).relative == pytest.approx(
+        math.hypot(0.2 / math.sqrt(12), 4.0 / 40.0)
+    )

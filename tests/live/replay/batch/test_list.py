@@ -6,11 +6,15 @@ import platform
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from acquire.errors import ConfigError, DataError, PhasedicError
+from live.replay.batch.keys import key_of, key_of_chunk
+from live.replay.batch.task import Task
 from live.replay.batch.test_list import find_tests
 from live.replay.batch.workdir import staging_dirs, sweep
 
@@ -61,6 +65,12 @@ def test_a_list(place: Path) -> None:
     assert fourth.name == "b"
 
 
+def test_a_list_with_semicolons_may_have_commas_in_its_cells(place: Path) -> None:
+    (place / "list.csv").write_text("source;name;metadata.note\na;S,1;cut, then pulled\n", encoding="utf-8")
+    (one,) = find_tests([str(place / "list.csv")])
+    assert (one.name, dict(one.overrides)) == ("S,1", {"metadata.note": "cut, then pulled"})
+
+
 @pytest.mark.parametrize(
     ("list_", "kind", "says"),
     [
@@ -87,6 +97,52 @@ def test_what_is_no_test(place: Path) -> None:
     (place / "bad.toml").write_text("[[test]\n", encoding="utf-8")
     with pytest.raises(DataError, match=r"bad\.toml: the list cannot be read"):
         find_tests([str(place / "bad.toml")])
+
+
+def recording(folder: Path, **files: bytes) -> Task:
+    """A task with files of these contents; the recording is longer than both ends that are looked at."""
+    folder.mkdir()
+    (folder / "session.h5").write_bytes(files.pop("session", bytes(5 << 19)))
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+    given = {name: str(folder / name) for name in ("config", "reference", "forces") if name in files}
+    mask = {"measure.mask": str(folder / "mask")} if "mask" in files else {}
+    return Task("one", str(folder / "out"), str(folder / "session.h5"), **given, overrides=mask)  # type: ignore[arg-type]
+
+
+OF_A_TEST = {"config": b"zoi", "reference": b"picture", "forces": b"0,1", "mask": b"white"}
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"forces": b"0,2"},
+        {"config": b"step"},
+        {"reference": b"another"},
+        {"mask": b"black"},
+        {"session": bytes((5 << 19) - 1) + b"x"},
+        {"session": b"x" + bytes((5 << 19) - 1)},
+        {"session": bytes((5 << 19) + 1)},
+    ],
+    ids=lambda one: next(iter(one)),
+)
+def test_a_key_is_of_all_that_the_results_depend_on(tmp_path: Path, other: dict[str, bytes]) -> None:
+    key = key_of(recording(tmp_path / "a", **OF_A_TEST))
+    assert key == key_of(recording(tmp_path / "b", **OF_A_TEST)), "wherever the files lie"
+    assert key != key_of(recording(tmp_path / "c", **OF_A_TEST | other))
+
+
+def test_a_key_is_of_the_part_and_the_settings_too(tmp_path: Path) -> None:
+    task = recording(tmp_path / "a")
+    changes: list[dict[str, Any]] = [
+        {"start_s": 1.0}, {"end_s": 1.0}, {"as_measured": True}, {"overrides": {"measure.zoi": 32}},
+        {"chunk_s": 60.0},
+    ]  # fmt: skip
+    keys = {key_of(task), *(key_of(replace(task, **change)) for change in changes)}
+    assert len(keys) == 1 + len(changes)
+    assert key_of(replace(task, name="two", out="elsewhere")) == key_of(task)
+    one, other = (key_of_chunk(replace(task, key="k", numbers=(0, 9), run_in=n)) for n in (0, 1))
+    assert one != other != key_of_chunk(replace(task, key="k", numbers=(0, 8), run_in=1))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="zombies are told by /proc")

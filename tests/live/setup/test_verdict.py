@@ -1,0 +1,123 @@
+"""The words of a check for given figures, and the colours of its drawing."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.quality.steadiness import Steadiness
+from live.setup.check.check_list import automatic_controls, table_lines
+from live.setup.check.noise_floor import StrainNoise, ZoiFloor
+from live.setup.check.verdict import CheckLine, _flicker, _sharpness, _vibration, reaching
+from live.setup.region import Region
+from live.setup.specimen_drawing import FAIR, GOOD, POOR, Overlay, _Drawing
+from tests.live.made_up import make_grid
+
+
+def sides(left: float, right: float, top: float, bottom: float) -> CheckLine:
+    """A sharpness of four quarters that are the sums of their sides."""
+    values = np.add.outer(np.repeat([top, bottom], 4), np.repeat([left, right], 5))
+    figures: Any = SimpleNamespace(zois=SimpleNamespace(sharpness=values), sharpness=0.25)
+    return _sharpness(figures)
+
+
+@pytest.mark.parametrize(
+    ("given", "words", "good"),
+    [
+        ((0.1, 0.3, 0.1, 0.1), "0.250 1/px, left 0.200, right 0.400", False),
+        ((0.3, 0.1, 0.1, 0.1), "0.250 1/px, right 0.200, left 0.400", False),
+        ((0.1, 0.1, 0.1, 0.3), "0.250 1/px, top 0.200, bottom 0.400", False),
+        ((0.10, 0.14, 0.1, 0.1), "0.250 1/px, left 0.200, right 0.240", True),
+        ((0.1, 0.187, 0.1, 0.1), "0.250 1/px, left 0.200, right 0.287", False),
+        ((0.1, 0.185, 0.1, 0.1), "0.250 1/px, left 0.200, right 0.285", True),
+    ],
+)
+def test_the_softest_and_the_sharpest_side_are_named(
+    given: tuple[float, ...], words: str, good: bool
+) -> None:
+    line = sides(*given)
+    assert (line.value, line.good) == (words, good)
+    assert line.advice.startswith(f"softer at the {words.split()[2]}:")
+
+
+def flicker(rms: float, drift: float, frequency: float | None, rate: float) -> CheckLine:
+    figures: Any = SimpleNamespace(
+        still=SimpleNamespace(light=Steadiness(drift, rms, 0.0, frequency, 2.0, rate))
+    )
+    return _flicker(figures)
+
+
+def test_flicker_has_its_mains_and_the_exposure_of_whole_periods_of_the_light() -> None:
+    line = flicker(0.02, 0.0, 10.0, 30.0)
+    assert "lamps on 50 Hz mains (100 Hz, seen at 10.0 Hz)" in line.value and not line.good
+    assert line.advice == "a lamp on direct current, or an exposure of a multiple of 10.0 ms"
+    line = flicker(0.02, 0.0, 5.0, 25.0)
+    assert "mainly" not in line.value and "60 Hz mains (120 Hz, seen at 5.0 Hz)" in line.value
+    assert "multiple of 8.3 ms" in line.advice
+    assert "at 25 fps that of 50 Hz mains stands still" in line.value
+    assert flicker(0.0099, -0.01, None, 31.0).good and not flicker(0.0, -0.0101, None, 31.0).good
+
+
+def test_a_vibration_has_its_upper_limit_where_it_is_noise() -> None:
+    def words(rms: float, noise: float, frequency: float | None = None) -> str:
+        return _vibration(Steadiness(0.0, rms, noise, frequency, 2.0, 120.0), 1e6, "µm/m", 0)
+
+    assert words(5e-6, 5e-6) == "less than 5 µm/m"
+    assert words(13e-6, 5e-6) == "12 µm/m rms"
+    assert words(13e-6, 5e-6, 50.0) == "12 µm/m rms, mainly at 50.0 Hz, as from 50 Hz mains"
+    assert words(13e-6, 5e-6, 20.0) == "12 µm/m rms, mainly at 20.0 Hz"
+
+
+def test_automatic_controls_are_told_by_name_and_value() -> None:
+    controls: dict[str, Any] = {
+        "auto_exposure": "Manual Mode", "exposure_auto": "Aperture Priority Mode", "auto_2": "Shutter Priority",
+        "gain_automatic": 1, "white_balance_automatic": 0, "focus_automatic_continuous": True, "gain": 1,
+        "exposure_dynamic_framerate": 1, "power_line": "Auto", "automatic_3": "disabled", "automatic_4": "Off",
+    }  # fmt: skip
+    assert automatic_controls(controls) == (
+        "exposure_auto", "gain_automatic", "focus_automatic_continuous", "exposure_dynamic_framerate",
+    )  # fmt: skip
+
+
+FLOORS = tuple(
+    ZoiFloor(
+        zoi, order, 2.0 * zoi, 0.5 * zoi, 9, tuple(StrainNoise(n, k / n, k / n * 1.1) for n in (1, 4)), 32
+    )
+    for zoi, order, k in ((32, 1, 4e-4), (32, 2, 8e-4), (64, 1, 1e-4))
+)
+
+
+def test_the_table_of_noise_has_lengths_in_mm_where_the_scale_is_known() -> None:
+    figures: Any = SimpleNamespace(floors=FLOORS, zoi=32, order=2, px_per_mm=None)
+    rows = [line.split() for line in table_lines(figures)[2:]]
+    assert rows[0] == ["32", "1", "64", "16", "440", "(400)", "110", "(100)"]
+    assert rows[1][:4] == ["*", "32", "2", "64"] and rows[2][:4] == ["64", "1", "128", "32"]
+    figures.px_per_mm = 20.0
+    assert table_lines(figures)[2].split()[:4] == ["32", "1", "3.20", "0.80"]
+
+
+def test_what_reaches_a_noise_is_the_shortest_burst_of_each_size() -> None:
+    found = [(floor.zoi, floor.order, burst) for floor, burst in reaching(FLOORS, 1.2e-4)]
+    assert found == [(32, 1, 4), (64, 1, 1)]
+    assert reaching(FLOORS, 1e-6) == []
+
+
+def test_zois_are_drawn_in_the_colour_of_their_noise() -> None:
+    """Good up to the target, fair up to twice of it, poor beyond; a cross without pattern."""
+    grid = make_grid()
+    sigma = np.full(grid.shape, 0.5e-3)
+    sigma[1, :6] = 1e-3, 1.01e-3, 2e-3, 2.01e-3, math.nan, 0.1e-3
+    overlay = Overlay(Region(None, None, ""), grid, sigma=sigma, target=1e-3)
+    drawing = _Drawing.of(np.tile(np.arange(128, dtype=np.uint8), (96, 1)))
+    drawing.quality(overlay, sigma)
+
+    def colour(row: int, column: int) -> tuple[int, ...]:
+        x, y = drawing.at(grid.x[column], grid.y[row])
+        return tuple(drawing.canvas[y, x].tolist())
+
+    assert [colour(1, k) for k in range(6)] == [GOOD, FAIR, FAIR, POOR, POOR, GOOD]
+    assert colour(0, 0) not in (GOOD, FAIR, POOR), "it is switched off"
