@@ -248,6 +248,6 @@ def _shown(
 def _by_level(images: NDArray[np.float32], mean: np.float32) -> NDArray[np.float32]:
     """Images (7, N, pitch) times the grey level, the fourth the level itself, for a noise that grows with it."""
     level = np.maximum(images[2] + mean, 0)
-    out = images * level
+    out = np.asarray(images * level, np.float32)
     out[3] = level
     return out
