@@ -127,7 +127,7 @@ class Accumulator(ABC, Generic[Made]):
         self._n, self._not_before = n, not_before
         self._memory = memory or PictureMemory()
         self._times: list[float] = []
-        self._sums: Sums | None = None
+        self._sums: FrameSums | None = None
         self._lost = 0
         self._first = self._last = -1
 
@@ -167,7 +167,7 @@ class Accumulator(ABC, Generic[Made]):
         self._times, self._sums = [], None
 
     @abstractmethod
-    def _begun(self, frame: Frame) -> Sums:
+    def _begun(self, frame: Frame) -> FrameSums:
         """The sums of a burst that begins with this frame."""
 
     @abstractmethod
@@ -175,10 +175,10 @@ class Accumulator(ABC, Generic[Made]):
         """A burst of one is the frame itself: nothing is averaged, nothing copied."""
 
     @abstractmethod
-    def _finished(self, sums: Sums, last: Frame) -> Made:
+    def _finished(self, sums: FrameSums, last: Frame) -> Made:
         """The burst of all its frames."""
 
-    def _numbers(self, last: Frame, sums: Sums | None = None) -> dict[str, Any]:
+    def _numbers(self, last: Frame, sums: FrameSums | None = None) -> dict[str, Any]:
         """What ``Burst`` has beside its pictures."""
         start, times, n = self._times[0], self._times, self._n
         noise = math.nan if sums is None else sums.noise(n)
@@ -199,14 +199,14 @@ class Accumulator(ABC, Generic[Made]):
 class BurstAccumulator(Accumulator[Burst]):
     """From frames to bursts with their means."""
 
-    def _begun(self, frame: Frame) -> Sums:
-        return Sums(frame, self._memory)
+    def _begun(self, frame: Frame) -> FrameSums:
+        return FrameSums(frame, self._memory)
 
     def _single(self, frame: Frame) -> Burst:
         clipped = clipped_in(frame.image, frame.saturation, self._memory)
         return Burst(mean=frame.image, clipped=clipped, **self._numbers(frame))
 
-    def _finished(self, sums: Sums, last: Frame) -> Burst:
+    def _finished(self, sums: FrameSums, last: Frame) -> Burst:
         mean, clipped = frozen(sums.mean), frozen(sums.clipped)
         return Burst(mean=mean, clipped=clipped, **self._numbers(last, sums))
 
@@ -218,7 +218,7 @@ def clipped_in(image: NDArray[Any], saturation: int, memory: PictureMemory) -> N
     return frozen(clipped)
 
 
-class Sums:
+class FrameSums:
     """The running sums of one burst. Frames are kept, not copied, until a group can be folded.
 
     Parameters

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.burst.accumulate import Accumulator, Sums, clipped_in
+from acquire.burst.accumulate import Accumulator, FrameSums, clipped_in
 from acquire.burst.memory import PictureMemory
 from acquire.frame import Burst, Frame, frozen
 
@@ -103,14 +103,14 @@ def sum_kind(bits: int, n: int) -> np.dtype[Any]:
 class SumAccumulator(Accumulator[SummedBurst]):
     """From frames to bursts that wait for their mean."""
 
-    def _begun(self, frame: Frame) -> Sums:
-        return Sums(frame, self._memory, sum_kind(frame.bits, self._n))
+    def _begun(self, frame: Frame) -> FrameSums:
+        return FrameSums(frame, self._memory, sum_kind(frame.bits, self._n))
 
     def _single(self, frame: Frame) -> SummedBurst:
         white = frame.saturation if frame.image.max() >= frame.saturation else None
         return SummedBurst(frame.image, None, white, _numbers(self._numbers(frame)))
 
-    def _finished(self, sums: Sums, last: Frame) -> SummedBurst:
+    def _finished(self, sums: FrameSums, last: Frame) -> SummedBurst:
         flags = np.packbits(sums.clipped) if sums.clipped.any() else None
         return SummedBurst(frozen(sums.total), flags, None, _numbers(self._numbers(last, sums)))
 

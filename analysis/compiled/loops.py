@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable
 from functools import lru_cache
 from pathlib import Path
 from threading import Lock
-from typing import Any
+from typing import Any, TypeVar
 
 # Threads that wait by spinning keep the other threads of a live test, and other programs, from their cores: with
 # another program at work a frame took twice as long as with threads that soon fall asleep. Read when GNU OpenMP is
@@ -24,16 +24,25 @@ os.environ.setdefault("GOMP_SPINCOUNT", "5000")
 
 import numba
 from numba.np.ufunc import parallel as numba_threads
+from numpy.typing import NDArray
 
 from analysis.compiled.layer import give_start_lock, threading_layer
 
 give_start_lock(numba_threads)
 log = logging.getLogger("analysis")
+Array = TypeVar("Array", bound=NDArray[Any])
 
 _PACKAGE = Path(__file__).parents[1]
 _COMPILED = re.compile(r"^(?:from|import) (?:numba|analysis\.compiled\.(?:loops|vectors))\b", re.MULTILINE)
 # Sums may be reordered for the vector unit, but NaN and infinity keep their meaning.
 FAST = {"contract", "reassoc", "nsz", "arcp", "afn"}
+
+
+def read_only(array: Array) -> Array:
+    """The same array as one that is not written to: numba takes what may be for another type."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
 
 
 def inlined(function: Callable[..., Any]) -> Any:

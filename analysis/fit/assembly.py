@@ -9,7 +9,7 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, inlined, parallel
+from analysis.compiled.loops import helper, inlined, parallel, read_only
 
 RUN = 1024
 """ZOIs whose covariances are scaled at a time."""
@@ -114,8 +114,7 @@ def clipped_share(
     line : (n,) float64
         The window along one side.
     """
-    marked = np.ascontiguousarray(clipped).view(np.uint8)
-    marked.flags.writeable = False  # numba takes what may be written for another type
+    marked = read_only(np.ascontiguousarray(clipped).view(np.uint8))
     out = np.empty(len(first))
     clipped_shares(marked, first, (line / line.sum()).astype(np.float32), out)
     return out

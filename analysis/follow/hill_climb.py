@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 from numba import prange
+from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, parallel
+from analysis.compiled.loops import helper, parallel, read_only
 
 f4 = np.float32
+Image = NDArray[np.float32]
+Places = NDArray[np.int64]
 MAX_MOVES = 12
 
 
@@ -54,6 +57,16 @@ def correlation(
     n = size * size
     spread = (ff - f * f / n) * (gg - g * g / n)
     return (fg - f * g / n) / np.sqrt(spread) if spread > 0 else -1.0
+
+
+def climbed(
+    reference: Image, deformed: Image, offset: f4, origins: Places, size: int, candidates: Places, moves: int
+) -> tuple[Places, NDArray[np.float64]]:
+    """Displacements (x, y) (A, 2) and scores (A,) of ``climb``; the images are read, whoever may write to them."""
+    images, near = (read_only(reference), read_only(deformed)), np.ascontiguousarray(candidates)
+    found, score = np.zeros((len(origins), 2), np.int64), np.zeros(len(origins))
+    climb(*images, offset, origins, size, near, moves, found, score)
+    return found, score
 
 
 @parallel

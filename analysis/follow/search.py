@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Roi
-from analysis.follow.hill_climb import MAX_MOVES, climb
+from analysis.follow.hill_climb import MAX_MOVES, climbed
 
 Image = NDArray[np.float32]
 MIN_SIDE = 48
@@ -64,12 +64,7 @@ def search(
     out = blocks.plane_at(centre[:, 0], centre[:, 1])
     around = blocks.around(centre[:, 0], centre[:, 1])
     candidates = np.rint(np.concatenate([out[:, None, [0, 3]], around], axis=1)).astype(np.int64)
-    found = np.zeros((len(centre), 2), np.int64)
-    climb(
-        reference, deformed, offset, origins, size,
-        np.ascontiguousarray(candidates), MAX_MOVES, found, np.zeros(len(centre)),
-    )  # fmt: skip
-    out[:, [0, 3]] = found
+    out[:, [0, 3]] = climbed(reference, deformed, offset, origins, size, candidates, MAX_MOVES)[0]
     return out
 
 
@@ -241,6 +236,7 @@ def _match_blocks(
     reference: Image, deformed: Image, box: Roi, guess: Blocks, reach: int, extra: tuple[int, int] | None
 ) -> Blocks:
     """Displacement of each block: the best match within ``reach`` px of any guess."""
+    from analysis.compiled.loops import read_only
     from analysis.follow.block_match import match
 
     size = min(BLOCK, box.width, box.height)
@@ -255,10 +251,8 @@ def _match_blocks(
     margin = size + 2 * reach
     padded = np.pad(deformed, margin, mode="reflect" if min(deformed.shape) > margin else "edge")
     shift = np.empty((len(grid_y), 2))
-    firsts = np.stack([a.ravel() for a in np.meshgrid(first_y, first_x, indexing="ij")], axis=1).astype(
-        np.int64
-    )
-    match(np.ascontiguousarray(reference), padded, margin, firsts, size, guesses, reach, shift)
+    firsts = np.stack(np.meshgrid(first_y, first_x, indexing="ij"), axis=-1).reshape(-1, 2).astype(np.int64)
+    match(read_only(np.ascontiguousarray(reference)), padded, margin, firsts, size, guesses, reach, shift)
     return Blocks(y, x, shift.reshape(len(y), len(x), 2))
 
 

@@ -52,14 +52,11 @@ def periods(reference: ReferencePicture) -> Floats:
 
 def _alike(reference: ReferencePicture, which: NDArray[np.intp], place: NDArray[np.intp]) -> NDArray[np.intp]:
     """Those of some ZOIs that look like ``place`` (x, y) px away."""
-    from analysis.follow.hill_climb import climb
+    from analysis.follow.hill_climb import climbed
 
-    level, score = np.ascontiguousarray(reference.prepared.pattern.level), np.empty(len(which))
+    ready, level = reference.prepared, np.ascontiguousarray(reference.prepared.pattern.level)
     places = np.tile(place.astype(np.int64), (len(which), 1, 1))
-    found = np.empty((len(which), 2), np.int64)
-    climb(
-        level, level, np.float32(0), reference.prepared.origins[which], reference.grid.size, places, 0, found, score
-    )  # fmt: skip
+    score = climbed(level, level, np.float32(0), ready.origins[which], reference.grid.size, places, 0)[1]
     return which[score > ALIKE]
 
 
@@ -181,15 +178,12 @@ def _is_expected(solution: Solution, expected: Floats) -> bool:
 
 def _fit_near(solution: Solution, which: NDArray[np.intp], expected: Floats) -> None:
     """Fit some ZOIs at the best whole pixel uphill from where they are expected."""
-    from analysis.follow.hill_climb import MAX_MOVES, climb
+    from analysis.follow.hill_climb import MAX_MOVES, climbed
 
     reference, at = solution.reference, _displacements(solution)
     offset = np.float32(reference.prepared.pattern.mean)
-    guess, found = expected[which], np.zeros((len(which), 2), np.int64)
-    climb(
-        reference.image, solution.image.astype(np.float32), offset, reference.prepared.origins[which],
-        reference.grid.size, np.rint(guess[:, None, at]).astype(np.int64), MAX_MOVES,
-        found, np.zeros(len(which)),
-    )  # fmt: skip
-    guess[:, at] = found
+    guess, image = expected[which], solution.image.astype(np.float32)
+    near = np.rint(guess[:, None, at]).astype(np.int64)
+    origins, size = reference.prepared.origins[which], reference.grid.size
+    guess[:, at] = climbed(reference.image, image, offset, origins, size, near, MAX_MOVES)[0]
     _brought(solution, which, guess)

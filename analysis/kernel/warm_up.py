@@ -25,7 +25,7 @@ log = logging.getLogger("analysis")
 
 COMPILE_SECONDS = 80
 """About how long one process takes for everything; for the announcement."""
-FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 55, 5, 7
+FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 57, 5, 7
 """That are compiled in all, more for each kind of pictures, and for the estimator by phases."""
 ITERATION, REST, PHASE, ALL = "iteration", "rest", "phase", "all"
 COMPILE_PARTS = (ITERATION, REST)
@@ -44,10 +44,10 @@ def not_compiled(kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) ->
 
 def _loops(phase: bool) -> list[Any]:
     from analysis.fit import assembly, iteration, pooling, sensitivity, sums, verdict
-    from analysis.follow import hill_climb, prediction
+    from analysis.follow import block_match, hill_climb, prediction
 
     loops = [
-        sensitivity.prepare, iteration.track, hill_climb.climb, prediction.advance, verdict.judge,
+        sensitivity.prepare, iteration.track, block_match.match, hill_climb.climb, prediction.advance, verdict.judge,
         assembly.expect, assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.medians,
         assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
     ]  # fmt: skip

@@ -240,8 +240,8 @@ def _rings(shape: tuple[int, int]) -> _Rings:
         squares[rows] = np.asarray(_outer(lines, rows) / level, np.float32) ** 2
     radius = np.hypot(np.fft.fftfreq(shape[0])[:, None], np.fft.rfftfreq(shape[1])[None, :])
     ring = np.minimum((radius * _bins(shape)).astype(np.intp), int(0.70 * _bins(shape)))
-    count: NDArray[np.intp] = np.bincount(ring.ravel())
-    radii: Floats = np.bincount(ring.ravel(), weights=radius.ravel())
+    count = np.bincount(ring.ravel())
+    radii = np.bincount(ring.ravel(), weights=radius.ravel()).astype(np.float64)
     return _Rings(lines, level, squares.sum(), ring.astype(np.uint8), count, radii)
 
 

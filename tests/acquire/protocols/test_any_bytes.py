@@ -218,7 +218,8 @@ def test_no_notation_is_read_as_another_number(
     ours = notation.point == ("," if "decimal=comma" in settings else ".")
     if not math.isnan(reading.value) and not may_mislead(text, notation, settings):
         assert reading.value == pytest.approx(float(rounded), abs=1e-9)
-    if ours and notation.thousands == "" and "column" not in settings and "8388," not in line:
+    saturated = abs(rounded) in (8388607, 8388608) or "8388," in line  # a converter of 24 bits at its end
+    if ours and notation.thousands == "" and "column" not in settings and not saturated:
         assert not math.isnan(reading.value)
 
 

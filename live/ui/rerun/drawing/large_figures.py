@@ -48,7 +48,7 @@ def _cells(s: Snapshot) -> tuple[tuple[str, str, Colour], ...]:
     return (
         ("STATE", "PAUSED" if "PAUSED" in s.state else state, _STATES.get(state, GREEN)),
         (f"STRAIN {sigma}um/m", _number(s.axial * 1e6, "+,.0f"), WHITE),
-        ("FORCE N" if abs(s.force_N) < 1e4 else "FORCE kN", _force(s.force_N), WHITE),
+        ("FORCE kN" if abs(s.force_N) >= 1e4 else "FORCE N", _force(s.force_N), WHITE),
         ("STRESS MPa", _number(s.stress_Pa * 1e-6, ".1f"), WHITE),
     )
 

@@ -6,6 +6,7 @@ import contextlib
 import math
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -321,3 +322,21 @@ def test_an_arrow_has_its_head_at_its_tip() -> None:
     ((start, tip, left, again, right),) = with_heads(np.array([[10.0, 20.0]]), np.array([[0.0, 40.0]]))
     assert (*start, *tip, *again) == (10, 20, 10, 60, 10, 60)
     assert sorted([*left, *right]) == pytest.approx([4, 16, 48, 48])
+
+
+@pytest.mark.parametrize(
+    ("u", "factor"), [(1.0, 20.0), (0.02, 1000.0), (13.0, 1.0), (0.25, 100.0), (0.13, 100.0)]
+)
+def test_arrows_are_magnified_by_the_round_factor_below_what_fits(u: float, factor: float) -> None:
+    """1.6 times the 16 px from one ZOI to the next fit, up to 1000 times."""
+    field = StrainField.from_values(make_grid(), {"u": u})
+    origins, vectors, magnified = ArrowScale().arrows(field)
+    assert magnified == factor and len(origins) == field.n_valid
+    np.testing.assert_allclose(vectors, np.tile([u * factor, 0.0], (len(vectors), 1)))
+
+
+def test_a_row_of_means_has_each_strain_with_its_own_sigma() -> None:
+    m = make_measurement(2)
+    numbers = {"exx": 1.0, "sigma_exx": 2.0, "eyy": 3.0, "sigma_eyy": 4.0, "exy": 5.0, "sigma_exy": 6.0}
+    step = replace(m.time_step, **numbers)
+    assert row_of(replace(m, time_step=step)) == (m.time_step.t, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0)

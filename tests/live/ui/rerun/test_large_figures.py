@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from live.pipeline.snapshot import Snapshot
-from live.ui.rerun.drawing.large_figures import HEIGHT, WIDTH, paint
+from live.ui.rerun.drawing.large_figures import HEIGHT, WIDTH, _cells, paint
 from live.ui.rerun.messages import figures_message, figures_of
 from live.ui.rerun.wire import Kind, Message, WireError
 
@@ -49,3 +49,17 @@ def test_an_alarm_is_red_and_digits_are_large() -> None:
 )
 def test_any_figures_are_painted(more: dict[str, Any]) -> None:
     assert paint(replace(NOW, **more)).any()
+
+
+@pytest.mark.parametrize(
+    ("force", "head", "shown"),
+    [(9999.9, "FORCE N", "9999.9"), (-10000.0, "FORCE kN", "-10.000"), (12345.6, "FORCE kN", "12.346"),
+     (math.nan, "FORCE N", "-")],
+)  # fmt: skip
+def test_forces_are_in_kilonewtons_from_ten_on(force: float, head: str, shown: str) -> None:
+    state, strain, found, stress = _cells(
+        Snapshot(0.0, "REC, armed", axial=-1.2345e-2, sigma_axial=4e-6, force_N=force, stress_Pa=30.86e6)
+    )
+    assert found[:2] == (head, shown)
+    assert state[:2] == ("STATE", "REC") and strain[:2] == ("STRAIN +- 4 um/m", "-12 345")
+    assert stress[:2] == ("STRESS MPa", "30.9")

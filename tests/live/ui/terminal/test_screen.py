@@ -41,6 +41,14 @@ def test_the_status_line_is_renewed_in_place_and_not_too_often() -> None:
     assert stream.getvalue() == "one long line\rtwo          \r   \rstays\n"
 
 
+def test_a_log_gets_a_line_every_five_seconds() -> None:
+    now, stream = [0.0], io.StringIO()
+    screen = TerminalScreen(stream, now=lambda: now[0])
+    for now[0] in (100.0, 101.0, 104.9, 105.0, 109.0):
+        screen.status(f"at {now[0]:g}")
+    assert stream.getvalue() == "at 100\nat 105\n"
+
+
 def test_the_progress_of_a_replay_is_one_line() -> None:
     stream = io.StringIO()
     now = iter(range(0, 100, 10))

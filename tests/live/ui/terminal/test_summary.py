@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -87,3 +88,18 @@ def test_nothing_measured_is_the_only_line() -> None:
     assert brief_lines(RunState.new(0.5), SECTION) == [
         "nothing was measured: 0 frames gave no burst after the reference; take shorter bursts"
     ]
+
+
+@pytest.mark.parametrize(("degrees", "shown"), [(4.0, False), (6.0, True), (-6.0, True)])
+def test_a_load_that_is_more_than_five_degrees_off_its_axis_is_told(degrees: float, shown: bool) -> None:
+    """Tension along y, turned: tensor components of the strains 2e-3 and -6e-4."""
+    turn, run_state = math.radians(degrees), RunState.new(0.5, specimen=SpecimenConfig(axis="y"))
+    cos, sin = math.cos(turn), math.sin(turn)
+    exx, eyy = 2e-3 * sin**2 - 6e-4 * cos**2, 2e-3 * cos**2 - 6e-4 * sin**2
+    for k in range(10):
+        share, m = k / 9, make_measurement(k)
+        strains = {"exx": share * exx, "eyy": share * eyy, "exy": share * 2.6e-3 * sin * cos}
+        run_state.history.add(replace(m.time_step, **strains, sigma_exx=1e-6, sigma_eyy=1e-6, sigma_exy=1e-6))
+    lines = [line for line in brief_lines(run_state, SpecimenConfig(axis="y")) if "largest strain" in line]
+    assert len(lines) == shown
+    assert not shown or f"largest strain {-degrees:g} degrees off y (clockwise)" in lines[0]

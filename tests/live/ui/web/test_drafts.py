@@ -305,3 +305,10 @@ def test_what_is_no_stroke_changes_nothing(stroke: dict[str, object]) -> None:
     with pytest.raises(ConfigError):
         found.draw([{"tool": "rectangle", "points": [[20, 20], [29, 29]]}, stroke])
     assert found.box == (0, 0, 10, 10)
+
+
+@pytest.mark.parametrize("address", ["", 7, None, "sim:\nmore", "/dev/ttyUSB0\x1b[2J", "x" * 501])
+@pytest.mark.parametrize(("change", "key"), [("address", "value"), ("load", "value"), ("identify", "port")])
+def test_an_address_is_a_text_in_one_line(change: str, key: str, address: object) -> None:
+    with pytest.raises(ConfigError, match="an address is a text of 1 to 500 letters in one line"):
+        CHANGES[change](None, {key: address})  # type: ignore[arg-type]

@@ -28,7 +28,7 @@ from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.curve_history import MAX_POINTS, CurveHistory
 from live.ui.web.map_view import MapView, plate_shapes
 from live.ui.web.page_consumer import PageConsumer, elongation_length
-from live.ui.web.painting import shrunk, traffic_light
+from live.ui.web.painting import RED, mark_saturated, shrunk, traffic_light
 from tests.live.made_up import make_frame, make_measurement
 from tests.live.ui.waiting import until
 from tests.live.ui.web.sentences import (
@@ -366,3 +366,11 @@ def test_a_large_picture_is_reduced_and_its_grey_levels_fill_those_of_the_screen
     picture, scale = shrunk(image, 10)
     assert (picture.shape, scale) == ((300, 960, 3), 0.5)
     assert (picture[:, :470] == 255).all() and (picture[:, 490:] == 127).all()
+
+
+def test_a_single_saturated_pixel_is_red_in_a_reduced_picture() -> None:
+    image = np.zeros((40, 60), np.uint16)
+    image[39, 59], image[10, 31], image[20, 8] = 4095, 4080, 4079
+    picture, scale = shrunk(image, 12, 30)
+    mark_saturated(picture, scale, image, 4080)
+    assert np.argwhere((picture == RED).all(axis=2)).tolist() == [[5, 15], [19, 29]]

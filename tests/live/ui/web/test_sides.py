@@ -14,7 +14,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.run_state import RunState
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.page_consumer import PageConsumer
-from live.ui.web.run_result import sides_result
+from live.ui.web.run_result import MAX_TROUBLES, run_result, sides_result
 from live.ui.web.sides import FIGURES_S, SidesPanel
 from tests.live.made_run import E_PA, PULLED, THICKNESS_MM, WIDTH_MM, force_of
 from tests.live.made_up import START, make_measurement
@@ -120,3 +120,14 @@ def test_the_result_has_the_figures_of_both_and_the_warnings_of_each() -> None:
     assert held == ["scatter; no limits of error are stated"]
     assert result["folder"] == "test"
     assert any(text.startswith("back: ") and "a fault" in text for text in result["troubles"])
+
+
+def test_the_result_has_the_newest_warnings() -> None:
+    state = RunState.new(1.0, specimen=SPECIMEN)
+    state.history.add(make_measurement(0).time_step)
+    for k in range(25):
+        state.event_log.emit(EventKind.DEVICE, "a camera", f"warning {k}", "warning")
+        state.event_log.emit(EventKind.NOTE, "operator", f"note {k}", "info")
+    found = run_result(state, SPECIMEN, Path("run"), "")["troubles"]
+    assert len(found) == MAX_TROUBLES == 20
+    assert found[0].endswith("warning 5") and found[-1].endswith("warning 24")
