@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -310,5 +311,8 @@ def test_what_is_no_stroke_changes_nothing(stroke: dict[str, object]) -> None:
 @pytest.mark.parametrize("address", ["", 7, None, "sim:\nmore", "/dev/ttyUSB0\x1b[2J", "x" * 501])
 @pytest.mark.parametrize(("change", "key"), [("address", "value"), ("load", "value"), ("identify", "port")])
 def test_an_address_is_a_text_in_one_line(change: str, key: str, address: object) -> None:
+    taking = SimpleNamespace(
+        preview=SimpleNamespace(reopen=str), open_load=str, devices=SimpleNamespace(identify=str)
+    )
     with pytest.raises(ConfigError, match="an address is a text of 1 to 500 letters in one line"):
-        CHANGES[change](None, {key: address})  # type: ignore[arg-type]
+        CHANGES[change](taking, {key: address})  # type: ignore[arg-type]
