@@ -7,13 +7,17 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError
 from live.config.loading import Config, from_dict, load_config, settings_in
 from live.config.rig_file import new_rig, write_rig
+from live.config.sections import SpecimenConfig
+from live.config.values import COVARIANCE, LENS_PARAMETERS
 from live.setup.grid import grid_for
 
 
@@ -273,3 +277,44 @@ def test_a_new_rig_overwrites_nothing(rig: Path, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="cannot be written"):
         new_rig(tmp_path / "no" / "folder.toml", TEXT)
     assert new_rig(tmp_path / "other.toml", TEXT).measure.zoi == 48
+
+
+@pytest.mark.parametrize("box", [[-1, 0, 10, 10], [0, -1, 10, 10], [0, 0, 0, 10], [0, 0, 10, 0]])
+def test_a_box_lies_in_the_picture(box: list[int]) -> None:
+    with pytest.raises(ConfigError, match="x and y from 0, width and height from 1"):
+        load_config(None, {"measure.roi": box})
+
+
+def test_no_correlation_of_a_lens_exceeds_one() -> None:
+    variances = np.diag(np.full(LENS_PARAMETERS, 4.0))
+    for covariance, good in ((3.9, True), (4.1, False), (-4.1, False)):
+        rows = variances.copy()
+        rows[0, 1] = rows[1, 0] = covariance
+        if good:
+            assert COVARIANCE.accept(rows.tolist())[1][0] == covariance
+        else:
+            with pytest.raises(NotAllowed, match="no correlation beyond 1"):
+                COVARIANCE.accept(rows.tolist())
+
+
+def test_the_area_of_a_section() -> None:
+    assert SpecimenConfig(diameter_mm=10.0).area_m2 == pytest.approx(78.5398e-6)
+    assert SpecimenConfig(width_mm=20.0, thickness_mm=2.0).area_m2 == pytest.approx(40e-6)
+    assert SpecimenConfig(width_mm=20.0, thickness_mm=2.0, diameter_mm=10.0).area_m2 == pytest.approx(40e-6)
+    assert SpecimenConfig(area_mm2=7.0, width_mm=20.0, thickness_mm=2.0).area_m2 == pytest.approx(7e-6)
+    assert SpecimenConfig(width_mm=20.0).area_m2 is None
+
+
+def test_an_alarm_has_one_limit(tmp_path: Path) -> None:
+    for limits, good in (
+        ("above = 1", True),
+        ("below = 1", True),
+        ("above = 2\nbelow = 1", False),
+        ("", False),
+    ):
+        path = written(tmp_path, f"[load]\naddress = 'sim:'\n[[alarm]]\nchannel = 'force_N'\n{limits}\n")
+        if good:
+            assert len(load_config(path, {}).alarm) == 1
+        else:
+            with pytest.raises(ConfigError, match="give one of above and below"):
+                load_config(path, {})

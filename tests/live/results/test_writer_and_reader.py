@@ -21,6 +21,7 @@ import pytest
 from acquire.errors import DataError
 from acquire.hdf5 import damage as child
 from analysis import Roi, ZoiGrid
+from analysis.evaluate import GaugeValue
 from analysis.field import PAIR_INDEX
 from live.pipeline.measurement import Measurement
 from live.results import Results, ResultsInfo, Strain
@@ -471,3 +472,17 @@ def test_the_uncertainty_of_the_shear_comes_back_with_that_of_its_two_gradients(
         field = read_field(strain, 0)
     assert field.covariance[PAIR_INDEX[2, 4]][field.ok] == pytest.approx(0.6e-10, rel=0.01)
     assert field.sigma_exy[field.ok] == pytest.approx(math.sqrt(2e-10 + 1.2e-10) / 2, rel=1e-3)
+
+
+def test_each_column_has_its_own_value() -> None:
+    measurement = make_measurement(3, 1e-3)
+    gauge = GaugeValue(1e-3, 2e-5, share=0.75)
+    step = dataclasses.replace(
+        measurement.time_step, u=1.5, v=-2.5, latency_s=0.03, measure_s=0.01, gauges={"middle": gauge}
+    )
+    values = StrainRow.of(dataclasses.replace(measurement, time_step=step), INFO).values
+    assert (values["u_px"], values["v_px"]) == (1.5, -2.5)
+    assert (values["latency_s"], values["kernel_s"]) == (0.03, 0.01)
+    columns = ("gauge_middle", "sigma_gauge_middle", "share_gauge_middle")
+    assert [values[name] for name in columns] == [1e-3, 2e-5, 0.75]
+    assert (values["frame"], values["last_frame"], values["n_frames"], values["lost"]) == (24, 31, 8, 1)

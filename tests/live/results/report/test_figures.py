@@ -13,7 +13,9 @@ import pytest
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
+from live.results.report.comparison import _quoted as quoted
 from live.results.report.comparison import summary
+from live.results.report.curves import force_unit
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, time_steps
 from live.results.report.practice import PracticeValues, reporting_table
 from live.results.report.record import times
@@ -123,3 +125,15 @@ def test_exported_gauges_are_in_the_units_and_axes_asked_for(gauged: Path) -> No
     np.testing.assert_allclose(
         turned["sigma_gauge_shear_percent"], 100 * plain["sigma_gauge_shear"], rtol=1e-6
     )
+
+
+def test_forces_are_in_kilonewton_from_two_thousand_on() -> None:
+    assert force_unit(np.array([0.0, -1999.0])).name == "N"
+    assert force_unit(np.array([np.nan, -2000.0])) == force_unit(np.array([5000.0]))
+    assert (force_unit(np.array([2000.0])).name, force_unit(np.array([2000.0])).factor) == ("kN", 1e-3)
+    assert force_unit(np.array([np.nan])).name == "N"
+
+
+@pytest.mark.parametrize("title", ["=1+2", "+1", "-1", "@cell", "\t=1", " =1"])
+def test_no_title_of_a_comparison_is_a_formula(title: str) -> None:
+    assert quoted(title).strip('"')[0] not in "=+-@\t "

@@ -17,7 +17,7 @@ from acquire.events import Event, EventKind
 from analysis.field import StrainField
 from analysis.field.grid import Roi, ZoiGrid
 from live.pipeline.snapshot import Snapshot
-from live.ui.rerun.drawing.curve import force_axis, strain_axis, stress_axis
+from live.ui.rerun.drawing.curve import CurveDrawing, force_axis, strain_axis, stress_axis
 from live.ui.rerun.drawing.layout import blueprint
 from live.ui.rerun.drawing.scene import ViewScene
 from live.ui.rerun.drawing.shapes import (
@@ -340,3 +340,13 @@ def test_a_row_of_means_has_each_strain_with_its_own_sigma() -> None:
     numbers = {"exx": 1.0, "sigma_exx": 2.0, "eyy": 3.0, "sigma_eyy": 4.0, "exy": 5.0, "sigma_exy": 6.0}
     step = replace(m.time_step, **numbers)
     assert row_of(replace(m, time_step=step)) == (m.time_step.t, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+
+
+def test_the_curve_rises_with_the_force() -> None:
+    """The rectangle is drawn from the top down."""
+    drawn: dict[str, Any] = {}
+    CurveDrawing(drawn.__setitem__, drawn.__setitem__, make_setup()).draw(
+        np.array([[0.0, 0.0], [1e-3, 2000.0]])
+    )
+    first, last = np.asarray(drawn["curve/line"].strips.as_arrow_array().to_pylist()[0])
+    assert first[1] == pytest.approx(1) and last[1] < 0.3 and last[0] > first[0]
