@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-CATCH_UP_S = 5.0
+CATCH_UP_S = 3.0
 """A reader that has not caught up after this time continues with the newest item."""
 
 Item = TypeVar("Item")
