@@ -87,7 +87,8 @@ def pooled(
     groups = _alike(count)
     middle, usual = medians(contrast[groups]), medians(ratio[groups])
     number, shares = count * min(1.0, every * known.independent), np.array(cubic) / known.white[:, None]
-    bent = max(1.0, float(_shrunk(medians(bends[None]) / (WHITE_BENT * known.bends), number)[0]))
+    usual_bend = medians(np.ascontiguousarray(bends)[None]) / (WHITE_BENT * known.bends)
+    bent = max(1.0, float(_shrunk(usual_bend, number)[0]))
     if given and usual.min() > AGREES[0] and usual.max() < AGREES[1]:
         colour = _shrunk(medians(shares), number)
         stated = PooledError.none(len(known.signal))._replace(
