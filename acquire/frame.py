@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -105,12 +105,6 @@ class Burst:
     lost: int
     clock: Clock
     motion_px: float = math.nan
-
-    def without_pictures(self) -> Burst:
-        """Its numbers alone, which take no memory."""
-        return replace(
-            self, mean=frozen(self.mean[:0, :0].copy()), clipped=frozen(self.clipped[:0, :0].copy())
-        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,11 +61,3 @@ def test_what_was_prepared_is_enough() -> None:
     ready = {id(array) for array in memory._arrays}
     bursts_of(memory, 2, held=3, total=30)
     assert {id(array) for array in memory._arrays} == ready
-
-
-def test_numbers_of_a_burst_without_its_pictures() -> None:
-    [(burst, _)] = bursts_of(PictureMemory(), 2, held=1, total=3)
-    brief = burst.without_pictures()
-    assert (brief.n, brief.first_index, brief.last_index, brief.t) == (2, 4, 5, burst.t)
-    assert brief.mean.nbytes == brief.clipped.nbytes == 0
-    assert brief.mean.base is None or brief.mean.base is not burst.mean
