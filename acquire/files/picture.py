@@ -8,6 +8,7 @@ standard error leads into a file, and what others wrote meanwhile is passed on.
 
 from __future__ import annotations
 
+import atexit
 import logging
 import os
 import re
@@ -157,7 +158,9 @@ def _owns_stderr() -> bool:
 
 @cache
 def _capture_file() -> IO[bytes]:
-    return tempfile.TemporaryFile("w+b", buffering=0)
+    capture: IO[bytes] = tempfile.TemporaryFile("w+b", buffering=0)  # noqa: SIM115 - as long as the program
+    atexit.register(capture.close)
+    return capture
 
 
 def _take_reports(capture: IO[bytes]) -> list[str]:

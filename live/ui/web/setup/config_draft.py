@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -62,6 +63,8 @@ class ConfigDraft:
         permanent = {key: value for key, value in overrides.items() if key not in self._transient}
         self.changes: dict[str, Any] = {key: v for key, v in permanent.items() if in_file.get(key) != v}
         self._config = given
+        # The page and the check change it, each in a thread of its own.
+        self._lock = threading.RLock()
 
     @property
     def config(self) -> Config:
@@ -70,6 +73,10 @@ class ConfigDraft:
 
     def change_all(self, changes: Mapping[str, Any]) -> None:
         """Change keys, all or none; raises ConfigError for an invalid value, and changes nothing then."""
+        with self._lock:
+            self._change_all(changes)
+
+    def _change_all(self, changes: Mapping[str, Any]) -> None:
         tree: dict[str, Any] = json.loads(json.dumps(self._config.as_dict()))
         for dotted, value in changes.items():
             section, _, key = dotted.partition(".")
@@ -90,12 +97,13 @@ class ConfigDraft:
         ConfigError
             A file cannot be written; then nothing is changed.
         """
-        if mask is not None:
-            self.change_all({"measure.mask": str(self._write_mask(mask))})
-        write_rig(self.path, self.changes)
-        zero = {"load.zero_N": self._config.load.zero_N}
-        self._config = load_config(self.path, self._transient | zero)
-        self.changes = {}
+        with self._lock:
+            if mask is not None:
+                self._change_all({"measure.mask": str(self._write_mask(mask))})
+            write_rig(self.path, self.changes)
+            zero = {"load.zero_N": self._config.load.zero_N}
+            self._config = load_config(self.path, self._transient | zero)
+            self.changes = {}
 
     def _write_mask(self, mask: NDArray[np.bool_]) -> Path:
         """Write a new file each time: a rig file kept as .bak refers to the old one."""

@@ -16,7 +16,6 @@ from acquire.frame import CameraInfo, Frame
 from acquire.printable import brief, printable
 from acquire.system import lower_priority
 from live.config.sections import DEFAULT_REFERENCE_BURST
-from live.config.values import AUTO
 from live.pipeline.latency import OUTPUT
 from live.setup.check.check_list import CheckFigures, examine
 from live.setup.check.quick_check import QuickChecker
@@ -135,8 +134,6 @@ class SpecimenCheck:
         self._compile(info)
         if self._region.drawn is None:
             self._region.begin(info, recent_stack(frames))
-            if self._draft.config.measure.gauges == AUTO:
-                self._region.place_gauges()
         collected = self._preview.collected()
         if collected is not None:
             self._check(collected, info)

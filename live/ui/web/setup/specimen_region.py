@@ -17,7 +17,7 @@ from acquire.files.picture import write_picture
 from acquire.frame import CameraInfo
 from live.config.gauges import GaugeTable, gauges_for
 from live.config.loading import Config
-from live.config.values import GIVEN
+from live.config.values import AUTO, GIVEN
 from live.setup.grid import grid_for
 from live.setup.pictures import read_mask
 from live.setup.placement import auto_gauges
@@ -110,16 +110,24 @@ class SpecimenRegion:
     # -- found in the picture ---------------------------------------------------------------------
 
     def begin(self, info: CameraInfo, stack: NDArray[np.float32]) -> None:
-        """Begin with the region of the rig file, or with the specimen that is found; raises as ``find``."""
+        """Begin with the region of the rig file, or with the specimen that is found, and its automatic gauges.
+
+        A page sees the region when its gauges are placed: an edit of the page comes after them. Raises as ``find``.
+        """
         m = self._draft.config.measure
         if not isinstance(m.roi, tuple) and m.mask is None:
-            self.drawn = self._found(info, stack)
+            drawn = self._found(info, stack)
         else:
             region = region_of(self._draft.config, np.zeros((info.height, info.width), np.float32))
             given = read_mask(m.mask, info.width, info.height)
             inside = region.inside(info.width, info.height, m.zoi)
-            self.drawn = DrawnRegion(inside if given is None else inside & given, region.words)
-        self.changed()
+            drawn = DrawnRegion(inside if given is None else inside & given, region.words)
+        try:
+            if m.gauges == AUTO:
+                self._place_gauges_on(drawn)
+        finally:
+            self.drawn = drawn
+            self.changed()
 
     def find(self, info: CameraInfo, stack: NDArray[np.float32]) -> None:
         """Find the specimen in the last frames, (N, H, W); raises DataError where there is none."""
@@ -135,7 +143,10 @@ class SpecimenRegion:
 
     def place_gauges(self) -> None:
         """Place gauges on the drawn region; raises DataError or ConfigError where they do not fit."""
-        (drawn, roi), config = self._boxed(), self._draft.config
+        self._place_gauges_on(self.drawn)
+
+    def _place_gauges_on(self, region: DrawnRegion | None) -> None:
+        (drawn, roi), config = _boxed(region), self._draft.config
         height, width = drawn.mask.shape
         box = replace(config, measure=replace(config.measure, roi=roi, mask=None))
         placed = auto_gauges(grid_for(box, width, height, drawn.mask), config.specimen.first_axis)
@@ -153,7 +164,7 @@ class SpecimenRegion:
         DataError, ConfigError
             No region is drawn, or no ZOI or gauge fits into it.
         """
-        (drawn, roi), config = self._boxed(), self._draft.config
+        (drawn, roi), config = _boxed(self.drawn), self._draft.config
         path = None
         if not drawn.is_box:
             path = folder / f"mask-{time.monotonic_ns()}.png"
@@ -188,9 +199,9 @@ class SpecimenRegion:
         shade[~mask] = SHADE
         return as_png(shade)
 
-    def _boxed(self) -> tuple[DrawnRegion, tuple[int, int, int, int]]:
-        """The drawn region and its box."""
-        drawn = self.drawn
-        if drawn is None or drawn.box is None:
-            raise DataError("no region is drawn yet: draw one, or find the specimen")
-        return drawn, drawn.box
+
+def _boxed(drawn: DrawnRegion | None) -> tuple[DrawnRegion, tuple[int, int, int, int]]:
+    """A region and its box; raises DataError without one."""
+    if drawn is None or drawn.box is None:
+        raise DataError("no region is drawn yet: draw one, or find the specimen")
+    return drawn, drawn.box

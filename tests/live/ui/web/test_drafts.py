@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock
@@ -13,7 +13,7 @@ import pytest
 
 from acquire.addresses import with_setting
 from acquire.errors import ConfigError, DataError
-from acquire.frame import Frame, frozen
+from acquire.frame import CameraInfo, Frame, frozen
 from live.config.loading import load_config
 from live.setup.devices import at_rest
 from live.setup.pictures import read_mask
@@ -24,6 +24,7 @@ from live.ui.web.setup.config_draft import ConfigDraft, next_name
 from live.ui.web.setup.draft_changes import CHANGES
 from live.ui.web.setup.drawn_region import DrawnRegion
 from live.ui.web.setup.setup_session import SetupSession
+from live.ui.web.setup.specimen_region import SpecimenRegion
 from tests.live.setup.test_scale import CHARUCO, CHECKER, seen
 from tests.live.ui.waiting import until
 
@@ -313,3 +314,35 @@ def test_what_is_no_stroke_changes_nothing(stroke: dict[str, object]) -> None:
 def test_an_address_is_a_text_in_one_line(change: str, key: str, address: object) -> None:
     with pytest.raises(ConfigError, match="an address is a text of 1 to 500 letters in one line"):
         CHANGES[change](Mock(), {key: address})
+
+
+def test_the_region_is_seen_when_its_automatic_gauges_are_placed(tmp_path: Path) -> None:
+    """Else an edit of the page between the two is lost."""
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[measure]\nzoi = 32\nstep = 16\nroi = [20, 20, 180, 150]\ngauges = "auto"\n')
+    draft = ConfigDraft(load_config(rig, {}), rig, {})
+    seen_at_changes: list[DrawnRegion | None] = []
+
+    def spied(changes: Mapping[str, Any]) -> None:
+        seen_at_changes.append(region.drawn)
+        ConfigDraft.change_all(draft, changes)
+
+    draft.change_all = spied  # type: ignore[method-assign]
+    region = SpecimenRegion(draft, None, lambda: None)
+    region.begin(CameraInfo("sim:", "sim", 256, 192, 8, True, "host"), np.zeros((1, 192, 256), np.float32))
+    assert seen_at_changes == [None] and list(draft.config.gauges) == ["extension", "width", "area"]
+    assert draft.config.gauges["area"]["box"] == (27.0, 27.0, 161.0, 129.0)
+    assert region.drawn is not None and region.drawn.box == (20, 20, 180, 150)
+    region.undo()
+    assert not draft.config.gauges
+
+
+def test_a_region_too_small_for_gauges_is_shown(tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[measure]\nzoi = 32\nstep = 16\nroi = [20, 20, 180, 40]\ngauges = "auto"\n')
+    region = SpecimenRegion(ConfigDraft(load_config(rig, {}), rig, {}), None, lambda: None)
+    with pytest.raises(ConfigError, match="1 rows of ZOIs"):
+        region.begin(
+            CameraInfo("sim:", "sim", 256, 192, 8, True, "host"), np.zeros((1, 192, 256), np.float32)
+        )
+    assert region.drawn is not None and region.drawn.box == (20, 20, 180, 40)

@@ -38,6 +38,8 @@ def set_point(page: Page) -> None:
 
 
 def last_posted(page: Page, what: str) -> dict[str, object]:
+    """The last request of a kind, as soon as there is one."""
+    page.until(lambda: any(one.get("do") == what for one in page.posted), f"a request {what}")
     return [one for one in page.posted if one.get("do") == what][-1]
 
 
