@@ -89,6 +89,10 @@ SESSIONS: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "a reference without data": (event(1, data=None), "'data' is None"),
     "a reference that was not recorded": (event(1, data={"first": 50, "last": 53, "n": 4}), "only 0 of 4"),
     "sequence numbers that run backwards": (replaced(f"{FRAMES}/index", lambda v: v[::-1]), "do not increase"),
+    "a sequence number that stands still": (
+        replaced(f"{FRAMES}/index", lambda v: np.where(np.arange(v.size) == 7, v[6], v)),
+        "numbers of frames do not increase at row 7",
+    ),
     "an infinite time": (put(f"{FRAMES}/monotonic_s", 4, np.inf), "monotonic_s is inf in row 4"),
     "a crop that is text": (lambda f: f["entry"].attrs.__setitem__("crop", "all"), "@crop is"),
     "a version that is text": (lambda f: f.attrs.__setitem__("format_version", "one"), "@format_version is"),

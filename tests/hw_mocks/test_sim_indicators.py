@@ -227,6 +227,19 @@ def test_modbus_status_by_map() -> None:
     assert status(PT113, IndicatorReading(0, stable=False)) == 0b110
 
 
+def test_modbus_holds_its_peak_until_it_is_reset() -> None:
+    registers = DAT400
+    indicator = ModbusIndicator(registers=registers)
+    shown = []
+    for force in (12.0, 55.5, 3.0):
+        answer = indicator.receive(read(registers.peak, 2), IndicatorReading(force))
+        shown.append(int.from_bytes(answer[3:7], signed=True))
+    assert shown == [120, 555, 555]
+    reset = framed(struct.pack(">BBHH", 1, 6, registers.command, registers.reset_peak))
+    assert indicator.receive(reset, IndicatorReading(3.0)) == reset
+    assert indicator.receive(read(registers.peak, 2), IndicatorReading(2.0))[3:7] == struct.pack(">i", 30)
+
+
 def test_modbus_tare_by_command_register() -> None:
     indicator = ModbusIndicator()
     request = framed(struct.pack(">BBHH", 1, 6, 5, 7))

@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -486,3 +487,16 @@ def test_each_column_has_its_own_value() -> None:
     columns = ("gauge_middle", "sigma_gauge_middle", "share_gauge_middle")
     assert [values[name] for name in columns] == [1e-3, 2e-5, 0.75]
     assert (values["frame"], values["last_frame"], values["n_frames"], values["lost"]) == (24, 31, 8, 1)
+
+
+def test_a_reference_holds_from_its_first_row_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("live.results.strain_h5.normal_matrices", lambda pattern, _: pattern)
+    grid = make_grid()
+    first, second = (np.full((21, *grid.shape), value, np.float32) for value in (1.0, 2.0))
+    with closing(StrainWriter(tmp_path / "strain.h5", grid, INFO)) as written:
+        for number, pattern in enumerate((first, first, first, second, second)):
+            row = StrainRow.of(make_measurement(number), INFO)
+            written.write(dataclasses.replace(row, pattern=pattern))  # type: ignore[arg-type]
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        assert [strain.reference(row) for row in range(5)] == [0, 0, 0, 1, 1]
+        np.testing.assert_array_equal(strain.normal(1), second)

@@ -20,6 +20,7 @@ from live.cli import main
 from live.results.export.tables import load_table
 from live.results.quantities import Display
 from live.results.run_folder import open_run
+from tests.live.made_run import THICKNESS_MM, WIDTH_MM
 from tests.live.results.export import vti
 
 SCALE = 0.05
@@ -167,6 +168,8 @@ def test_tiff_says_its_units_to_imagej(run_dir: Path, tmp_path: Path) -> None:
         assert (described["frames"], float(described["finterval"])) == ("12", pytest.approx(0.1))
         # Pixels of the map, which are ZOIs 16 px apart, per mm.
         assert float(tags[282]) == pytest.approx(1 / (16 * SCALE))
+        # Of the first ZOI from the corner of the picture, in pixels of the map: its centre is at 15.5 px.
+        assert [float(described[name]) for name in ("xorigin", "yorigin")] == [pytest.approx(-15.5 / 16)] * 2
         counts, labels = tags[50838], tags[50839]
         assert len(counts) == 1 + 12
         assert labels[counts[0] : counts[0] + counts[1]].decode("utf-16-le") == "0.0000 s, 0.00 N"
@@ -179,6 +182,11 @@ def test_r3xa(run_dir: Path, tmp_path: Path) -> None:
     assert described["date"] == "2030-01-02"
     ids = [item["id"] for part in ("settings", "data_sources", "data_sets") for item in described[part]]
     assert len(ids) == len(set(ids))
+    sizes = next(item["sizes"] for item in described["settings"] if item["id"] == "stg-specimen")
+    assert [(one["title"], one["unit"], one["value"]) for one in sizes] == [
+        ("width", "mm", WIDTH_MM),
+        ("thickness", "mm", THICKNESS_MM),
+    ]
     for item in described["data_sets"]:
         place = out / item["path"]
         assert place.exists(), item

@@ -15,7 +15,7 @@ from hw_mocks.speckle import Speckle
 from live.cli import main
 from live.results.report.comparison import _quoted as quoted
 from live.results.report.comparison import summary
-from live.results.report.curves import force_unit
+from live.results.report.curves import force_unit, stress_strain, valid_share
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, time_steps
 from live.results.report.practice import PracticeValues, reporting_table
 from live.results.report.record import times
@@ -40,6 +40,23 @@ def test_the_line_and_the_instants(run_dir: Path) -> None:
     # 0.2 % of plastic strain beyond the yield of an ideally plastic curve.
     step = PULLED[-1] - PULLED[-2]
     assert YIELD + 0.002 - step <= PULLED[words["yield (0.2 %)"]] <= YIELD + 0.002 + 2 * step
+
+
+def test_the_construction_of_the_yield_point(run_dir: Path) -> None:
+    """The line of E through the curve, the same line beyond by 0.2 %, the point where that meets the curve."""
+    with open_run(run_dir) as run:
+        plot = stress_strain(EvaluatedCurve.of(run))
+        share = valid_share(run).curves[0].y
+        valid = run.strain.values["n_valid"] / run.strain.values["n_zoi"]
+    measured, elastic, offset = plot.curves
+    factor = measured.x[-1] / PULLED[-1]
+    assert offset.label == "0.2 % offset"
+    np.testing.assert_allclose((offset.x - elastic.x) / factor, 0.002, rtol=1e-4)
+    (yielded,) = (mark for mark in plot.marks if mark.text.startswith("Rp0.2"))
+    assert np.interp(yielded.y, offset.y, offset.x) == pytest.approx(yielded.x)
+    assert yielded.x / factor == pytest.approx(YIELD + 0.002, abs=1e-4)
+    np.testing.assert_allclose(share, 100 * valid)
+    assert 50 < share.min() < 100
 
 
 def test_chosen_instants(run_dir: Path) -> None:
