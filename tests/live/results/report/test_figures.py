@@ -52,7 +52,7 @@ def test_the_construction_of_the_yield_point(run_dir: Path) -> None:
     factor = measured.x[-1] / PULLED[-1]
     assert offset.label == "0.2 % offset"
     np.testing.assert_allclose((offset.x - elastic.x) / factor, 0.002, rtol=1e-4)
-    (yielded,) = (mark for mark in plot.marks if mark.text.startswith("Rp0.2"))
+    (yielded,) = (mark for mark in plot.marks if mark.words.startswith("Rp0.2"))
     assert np.interp(yielded.y, offset.y, offset.x) == pytest.approx(yielded.x)
     assert yielded.x / factor == pytest.approx(YIELD + 0.002, abs=1e-4)
     np.testing.assert_allclose(share, 100 * valid)
