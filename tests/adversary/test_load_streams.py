@@ -84,7 +84,13 @@ def run_beside(load: str, folder: Path) -> Outcome:
 
 
 @pytest.mark.timed
-@pytest.mark.parametrize(("kind", "talk"), [(kind, "flood") for kind in PEERS] + [("socket", "closed")])
+@pytest.mark.parametrize(
+    ("kind", "talk"),
+    [
+        *(pytest.param(kind, "flood", marks=() if kind == "pty" else pytest.mark.slow) for kind in PEERS),
+        ("socket", "closed"),
+    ],
+)
 def test_a_test_goes_on_beside_it(kind: str, talk: str, tmp_path: Path) -> None:
     with PEERS[kind](TALKS[talk]) as peer:
         outcome = run_beside(f"{peer.url}?unit=N&wait=0.2", tmp_path / "run")

@@ -190,6 +190,7 @@ def test_means_scatter_as_predicted(
     assert 0.87 < np.mean([found[name] for name in ("exx", "eyy", "exy")]) < 1.13, found
 
 
+@pytest.mark.slow
 def test_a_gauge_of_any_shape() -> None:
     where = np.add.outer(np.abs(np.arange(13) - 6), np.abs(np.arange(13) - 6)) <= 5
     found = scatter_over_predicted(32, 8, 13, 1, NOISE_GL, where)

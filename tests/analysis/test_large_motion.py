@@ -42,7 +42,7 @@ def _standard(image: NDArray[np.floating]) -> NDArray[np.floating]:
     return (image - image.mean()) / max(float(image.std()), 1e-9)
 
 
-@pytest.mark.parametrize("background", ["flat", "clutter"])
+@pytest.mark.parametrize("background", [pytest.param("flat", marks=pytest.mark.slow), "clutter"])
 @pytest.mark.parametrize("size", [32, 64])
 @pytest.mark.parametrize("motion", [(-42, 0, 0), (20, 0, 0.2), (40, -30, 0.05), (0, 80, 0), (-56, 30, 0.1)])
 def test_a_strip_that_leaps_is_found_again(background: str, size: int, motion: Motion) -> None:

@@ -51,7 +51,10 @@ print(numba.threading_layer(), len(found))
 """
 
 
-@pytest.mark.parametrize("layer", ["workqueue", "omp", "tbb"])
+@pytest.mark.parametrize(
+    "layer",
+    ["workqueue", pytest.param("omp", marks=pytest.mark.slow), pytest.param("tbb", marks=pytest.mark.slow)],
+)
 def test_two_kernels_in_three_threads(layer: str) -> None:
     done = subprocess.run(
         [sys.executable, "-c", CODE, layer],

@@ -94,6 +94,7 @@ def test_shifted_pictures_show_the_lens(lens: Path, capsys: pytest.CaptureFixtur
     assert found.rms_px < 0.02
 
 
+@pytest.mark.slow
 def test_a_specimen_that_moves_and_stretches_shows_its_own_strain(corrected: Path, tmp_path: Path) -> None:
     raw = tmp_path / "raw"
     session = str(corrected / "session.h5")

@@ -83,6 +83,7 @@ def test_a_replay_is_bit_equal(good: Path, tmp_path: Path) -> None:
             np.testing.assert_array_equal(live.maps(name), again.maps(name), err_msg=name)
 
 
+@pytest.mark.slow
 def test_a_replay_in_chunks_is_the_same(good: Path, tmp_path: Path) -> None:
     out = tmp_path / "batch"
     (tmp_path / "tests.csv").write_text(f"source\n{good / 'session.h5'}\n")

@@ -244,7 +244,9 @@ def test_a_folder_that_may_not_be_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.timed
-@pytest.mark.parametrize("after_s", [0.0, 0.113, 0.351])
+@pytest.mark.parametrize(
+    "after_s", [0.0, pytest.param(0.113, marks=pytest.mark.slow), pytest.param(0.351, marks=pytest.mark.slow)]
+)
 def test_only_the_youngest_are_lost(tmp_path: Path, after_s: float) -> None:
     remains = kill_once(tmp_path, after_s, fps=100, size=256)
     # How long a flush waits for a core depends on the machine's load here; the script measures it.

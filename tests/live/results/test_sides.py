@@ -122,6 +122,7 @@ def test_the_mean_has_neither_bending_nor_motion(tmp_path: Path, monkeypatch: py
     assert sides.both.E.low < E < sides.both.E.high
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_table(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -386,6 +386,7 @@ def test_a_pattern_that_repeats_is_named_with_its_period() -> None:
     assert text.startswith("LOOK") and "repeats every 9.0 px" in text and "move by 3.6 px" in text
 
 
+@pytest.mark.slow
 def test_the_blocks_of_a_codec_are_named_and_leave_the_pattern(taken: FrameStack) -> None:
     coded = [cv2.imencode(".jpg", one, [cv2.IMWRITE_JPEG_QUALITY, 80])[1] for one in taken.frames]
     shots = shots_of(np.stack([cv2.imdecode(one, cv2.IMREAD_GRAYSCALE) for one in coded]), 8)

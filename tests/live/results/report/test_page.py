@@ -154,6 +154,7 @@ def test_a_run_that_has_just_ended_gets_its_page(tmp_path: Path, capsys: pytest.
     assert "report.html exists already" in printed, "nothing is overwritten"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_browser() is None, reason="no browser here")
 def test_pdf_and_png(run_dir: Path, tmp_path: Path) -> None:
     out, figures = tmp_path / "r.html", tmp_path / "figures"
