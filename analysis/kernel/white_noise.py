@@ -20,6 +20,7 @@ SAMPLE = 50
 """ZOIs whose answer to white noise is computed."""
 FEW = 20
 """ZOIs whose answers to each frequency are averaged."""
+BATCH_PX = 8 * 32**2  # of ZOIs computed together: more do not fit into a processor's cache
 
 
 def white_cubic(ready: PreparedReference, size: int, order: int, unit: Floats) -> Floats:
@@ -39,14 +40,16 @@ def white_cubic(ready: PreparedReference, size: int, order: int, unit: Floats) -
     sample = able[:: max(1, len(able) // SAMPLE)]
     if len(sample) == 0:
         return np.ones(2)
-    return np.asarray(np.median([_of_zoi(ready, z, size, order) / unit[z] for z in sample], axis=0))
+    some = max(1, BATCH_PX // size**2)
+    found = [_of_zois(ready, sample[k : k + some], size, order) for k in range(0, len(sample), some)]
+    return np.asarray(np.median(np.concatenate(found) / unit[sample], axis=0))
 
 
-def _of_zoi(ready: PreparedReference, z: int, size: int, order: int) -> Floats:
-    """The same of one ZOI, px^2 per GL^2."""
-    cubic = _weights(ready, z, size, order)[1]
-    each = [of / (ready.weight * ready.energy[z, k]) for k, of in enumerate(cubic)]
-    return np.array([_median_of_squares(np.linalg.eigvalsh(weights @ weights.T)) for weights in each])
+def _of_zois(ready: PreparedReference, zois: NDArray[np.intp], size: int, order: int) -> Floats:
+    """The same of S ZOIs, of u and of v, (S, 2), px^2 per GL^2."""
+    cubic = _weights(ready, zois, size, order)[2] / (ready.weight * ready.energy[zois, :2])[:, :, None, None]
+    variances = np.asarray(np.linalg.eigvalsh(cubic @ cubic.swapaxes(-1, -2)), np.float64)
+    return _median_of_squares(variances)
 
 
 def responses(ready: PreparedReference, size: int, order: int) -> Floats:
@@ -58,9 +61,11 @@ def responses(ready: PreparedReference, size: int, order: int) -> Floats:
 
     able = np.flatnonzero(ready.status == Status.OK)
     out = np.zeros((8, size, size // 2 + 1))
+    half = (ready.inverse.shape[1] - NUISANCES) // 2
     for z in able[:: max(1, len(able) // FEW)]:
-        affine, cubic = _weights(ready, z, size, order)
-        weights = np.concatenate([affine, *cubic]).reshape(-1, size, size)
+        modes, inverse, cubic = _weights(ready, np.array([z]), size, order)
+        affine = inverse[0][[0, 1, 2, half, half + 1, half + 2]] @ modes[0]
+        weights = np.concatenate([affine, *cubic[0]]).reshape(-1, size, size)
         power = np.abs(rfft2(weights / np.sqrt(np.sum(weights**2, axis=(1, 2), keepdims=True)))) ** 2
         out += np.concatenate([power[:6], power[6:].reshape(2, 4, size, -1).mean(axis=1)])
     out *= halves(size)
@@ -73,37 +78,47 @@ def halves(size: int) -> Floats:
     return np.where((columns == 0) | (2 * columns == size), 1.0, 2.0)
 
 
-def _weights(ready: PreparedReference, z: int, size: int, order: int) -> tuple[Floats, list[Floats]]:
-    """Weights of the pixels in the six affine parameters, (6, n n), and in the cubic shapes of u and of v, (4, n n)."""
+def _weights(
+    ready: PreparedReference, zois: NDArray[np.intp], size: int, order: int
+) -> tuple[Floats, Floats, Floats]:
+    """Of S ZOIs the columns of J and the inverse of J^T J, (S, P, n n) and (S, P, P), and the weights of their pixels
+    in the cubic shapes of u and of v, (S, 2, 4, n n).
+    """
     from analysis.fit.sensitivity import columns
 
-    zoi = _channels(ready, ready.origins[z], size)
+    channels = _channels(ready, ready.origins[zois], size)
     line, xi = ready.shapes.rows[0, :size], (np.arange(size) - (size - 1) / 2) / (size / 2)
-    window = np.outer(line, line).ravel()
-    modes = np.stack([(zoi[k] * np.outer(xi**py, xi**px)).ravel() for k, px, py in columns(order)]) * window
-    degrees = ready.shapes.mix @ xi ** np.arange(4)[:, None]
-    cubic = [np.outer(degrees[j], degrees[3 - j]) for j in range(4)]
-    sensors = ready.inverse[z].astype(np.float64) @ modes
-    half = (len(modes) - NUISANCES) // 2
-    shapes = [np.stack([(zoi[k] * shape).ravel() for shape in cubic]) for k in (0, 1)]
-    return sensors[[0, 1, 2, half, half + 1, half + 2]], [
-        of * window - of @ modes.T @ sensors for of in shapes
-    ]
+    window, powers = np.outer(line, line), xi ** np.arange(4)[:, None]
+    which, along_x, along_y = np.transpose(columns(order))
+    bases = powers[along_y][:, :, None] * powers[along_x][:, None, :] * window
+    modes = (channels[:, which] * bases).reshape(len(zois), len(which), -1)
+    inverse = ready.inverse[zois].astype(np.float64)
+    degrees = ready.shapes.mix @ powers
+    cubic = np.stack([np.outer(degrees[j], degrees[3 - j]) for j in range(4)])
+    shapes = (channels[:, :2, None] * cubic).reshape(len(zois), 8, -1)
+    left = shapes * window.ravel() - (shapes @ modes.swapaxes(1, 2) @ inverse) @ modes
+    return modes, inverse, left.reshape(len(zois), 2, 4, -1)
 
 
-def _channels(ready: PreparedReference, origin: NDArray[np.int64], size: int) -> Floats:
-    """f_x, f_y, f, 1, f_xx, f_yy and f_xy of one ZOI (``sensitivity.columns``), (7, n, n)."""
+def _channels(ready: PreparedReference, origins: NDArray[np.int64], size: int) -> Floats:
+    """f_x, f_y, f, 1, f_xx, f_yy and f_xy of S ZOIs (``sensitivity.columns``), (S, 7, n, n)."""
     rows, columns = (
-        np.clip(at + np.arange(-1, size + 1), 0, end - 1) for at, end in zip(origin, ready.shape, strict=True)
+        np.clip(at[:, None] + np.arange(-1, size + 1), 0, end - 1)
+        for at, end in zip(origins.T, ready.shape, strict=True)
     )
-    fx, fy, f = ready.images[:3, rows[:, None], columns].astype(np.float64)
-    inner = f[1:-1, 1:-1]
-    along_x, along_y = np.diff(f, n=2, axis=1)[1:-1], np.diff(f, n=2, axis=0)[:, 1:-1]
-    across = (f[2:, 2:] + f[:-2, :-2] - f[2:, :-2] - f[:-2, 2:]) / 4
-    return np.stack([fx[1:-1, 1:-1], fy[1:-1, 1:-1], inner, np.ones_like(inner), along_x, along_y, across])
+    fx, fy, f = ready.images[:3, rows[:, :, None], columns[:, None, :]].astype(np.float64)
+    inner = (slice(None), slice(1, -1), slice(1, -1))
+    along_x, along_y = np.diff(f, n=2, axis=2)[:, 1:-1], np.diff(f, n=2, axis=1)[:, :, 1:-1]
+    across = (f[:, 2:, 2:] + f[:, :-2, :-2] - f[:, 2:, :-2] - f[:, :-2, 2:]) / 4
+    ones = np.ones_like(along_x)
+    return np.stack([fx[inner], fy[inner], f[inner], ones, along_x, along_y, across], axis=1)
 
 
-def _median_of_squares(variances: Floats) -> float:
-    """Median of a sum of squares of normal values: of chi^2 with the same mean and variance (Wilson-Hilferty)."""
-    freedom = float(variances.sum() ** 2 / np.sum(variances**2))
-    return float(variances.sum()) * (1 - 2 / (9 * freedom)) ** 3
+def _median_of_squares(variances: Floats) -> Floats:
+    """Medians of sums of squares of normal values, over the last axis of their variances.
+
+    Of chi^2 with the same mean and variance (Wilson-Hilferty).
+    """
+    total = variances.sum(axis=-1)
+    freedom = total**2 / np.sum(variances**2, axis=-1)
+    return np.asarray(total * (1 - 2 / (9 * freedom)) ** 3)
