@@ -56,6 +56,14 @@ def test_force_is_the_programmes_within_noise() -> None:
         assert low - 3 < s.force < high + 3
 
 
+def test_a_weight_hangs_on_the_cell() -> None:
+    """The test takes minutes, so that the specimen does not pull yet."""
+    cell, _ = opened("sim:?seconds=600&hold=60&rate=200&noise_N=0&weight_N=2500")
+    with cell:
+        samples = first(cell, 3)
+    assert [sample.force for sample in samples] == pytest.approx([2500.0] * 3, abs=100)
+
+
 def test_events_and_info_carry_the_address() -> None:
     events: list[Event] = []
     cell, _ = opened("sim:?rate=200&seed=4", events.append)

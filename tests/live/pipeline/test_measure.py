@@ -165,6 +165,14 @@ def test_y_until_the_strains_tell(monkeypatch: pytest.MonkeyPatch, most: int) ->
     assert [again.add(i) for i in course for _ in range(2)][::2] == told, "told twice it counts once"
 
 
+def test_of_few_time_steps_the_larger_sigma_decides_whether_a_strain_is_clear() -> None:
+    one = replace(make_measurement(0).time_step, t=START, exx=1e-3, eyy=0.0, exy=0.0)
+    for sigma_exx, sigma_eyy, axis in ((1e-6, 1e-6, "x"), (1e-4, 1e-6, "y"), (1e-6, 1e-4, "y")):
+        finder = AxisFinder("auto")
+        assert finder.add(replace(one, sigma_exx=sigma_exx, sigma_eyy=sigma_eyy)) == axis
+        assert finder.assumed is (axis == "y")
+
+
 def test_what_is_given_holds() -> None:
     for axis in ("x", "y"):
         finder = AxisFinder(axis)
