@@ -30,16 +30,16 @@ $(VENV)/docs: $(VENV)/base
 demo: $(VENV)/base
 	@$(BIN)/phasedic demo
 
-# Side by side, a file a process, one more than there are processors, since some tests wait; tests in real time then
-# one after another, with the machine to themselves.
-WORKERS  := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
-PARALLEL := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+# Side by side, a file a process; tests in real time then one after another, with the machine to themselves. The fast
+# ones take one process more than there are processors, since some of them wait.
+PARALLEL := -n auto --dist loadfile --no-loadscope-reorder
+MORE     := -n $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 TIMED     = $(shell grep -rl mark.timed tests --include='test_*.py')
 # Modules are compiled once for all processes of the tests, also where Python is told to keep nothing.
 test test-all newest lowest: export PYTHONDONTWRITEBYTECODE =
 
 test: $(VENV)/test
-	@$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not timed"
+	@$(BIN)/python -m pytest $(PARALLEL) $(MORE) -m "not slow and not timed"
 	@$(BIN)/python -m pytest $(TIMED) -m "timed and not slow"
 
 # And those that take long.

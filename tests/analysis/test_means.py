@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -68,3 +70,19 @@ def test_the_sum_of_squares_has_the_same_bits_wherever_it_is_in_memory(shift: in
     moved = np.empty(image.size + 8)[shift : shift + image.size].reshape(image.shape)
     moved[:] = image
     assert sum_of_squares(moved) == sum_of_squares(image) == pytest.approx(np.sum(image**2), rel=1e-14)
+
+
+def test_the_pattern_of_the_zois_of_a_mean_decides_its_noise() -> None:
+    class Pattern:
+        """Twice the noise of the overlap where row 1 is measured alone."""
+
+        @staticmethod
+        def factor(_: str, gauge: np.ndarray) -> float:
+            return 2.0 if gauge[1].all() and gauge.sum() == 6 else 1.0
+
+    plain = StrainField.from_values(GRID, {"u": np.zeros(GRID.shape)}, 0.1)
+    field = dataclasses.replace(plain, sums=Pattern())  # type: ignore[arg-type]
+    row = np.zeros(GRID.shape, bool)
+    row[1] = True
+    assert field.mean("u", row)[1] == pytest.approx(2 * plain.mean("u", row)[1])
+    assert field.mean("u")[1] == pytest.approx(plain.mean("u")[1])
