@@ -48,7 +48,7 @@ class LoadPreview:
         self._draft, self._clock = draft, clock
         self.info: LoadCellInfo | None = None
         self._cell: LoadCell | None = None
-        self._fault = ""
+        self._tried, self._fault = "", ""
         self._samples: deque[LoadSample] = deque()
         self._opened_t = clock()
         self._zeros: list[float] = []
@@ -167,12 +167,19 @@ class LoadPreview:
         address = self.address
         with self._lock:
             self._samples.clear()
-        self.info, self._fault, self._opened_t = None, "", self._clock()
+        self.info, self._opened_t = None, self._clock()
+        if (
+            address != self._tried
+        ):  # else the fault stands until the load cell is open: it is tried again and again
+            self._tried, self._fault = address, ""
         if address == NONE:
             self._reopen.wait()
             return
+        before = self._fault
         cell = open_load(address, self._on_event, self._draft.config.camera.address or NONE)
         self._cell, self.info = cell, cell.info
+        if self._fault == before:
+            self._fault = ""
         with cell:
             self._take(cell)
         if self._recorded and not self._reopen.is_set():

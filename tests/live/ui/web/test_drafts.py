@@ -14,11 +14,12 @@ import pytest
 from acquire.addresses import with_setting
 from acquire.errors import ConfigError, DataError
 from acquire.frame import CameraInfo, Frame, frozen
-from live.config.loading import load_config
+from live.config.loading import Config, load_config
 from live.setup.devices import at_rest
 from live.setup.pictures import read_mask
 from live.setup.scale import from_board
 from live.ui.web.broadcaster import Broadcaster
+from live.ui.web.setup import load_preview
 from live.ui.web.setup.camera_preview import RECENT, CameraPreview
 from live.ui.web.setup.config_draft import ConfigDraft, next_name
 from live.ui.web.setup.draft_changes import CHANGES
@@ -346,3 +347,31 @@ def test_a_region_too_small_for_gauges_is_shown(tmp_path: Path) -> None:
             CameraInfo("sim:", "sim", 256, 192, 8, True, "host"), np.zeros((1, 192, 256), np.float32)
         )
     assert region.drawn is not None and region.drawn.box == (20, 20, 180, 40)
+
+
+def test_a_load_cell_that_is_missing_stays_so_while_it_is_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else a check at that moment is GO."""
+    troubles: list[str] = []
+
+    def missing(address: str, *_: object) -> None:
+        troubles.append(preview.trouble)
+        raise DataError(f"{address}: there is no such port")
+
+    monkeypatch.setattr(load_preview, "open_load", missing)
+    monkeypatch.setattr(load_preview, "RETRY_S", 0.01)
+    rig = tmp_path / "rig.toml"
+    draft = ConfigDraft(Config(), rig, {})
+    draft.change_all({"load.address": "/dev/one?protocol=ascii"})
+    preview = load_preview.LoadPreview(draft)
+    preview.start()
+    try:
+        until(lambda: len(troubles) > 3)
+        draft.change_all({"load.address": "/dev/two?protocol=ascii"})
+        until(lambda: "two" in troubles[-1])
+    finally:
+        preview.close()
+    one, two = ("/dev/one: there is no such port", "/dev/two: there is no such port")
+    assert troubles[:3] == ["", one, one] and set(troubles[3:]) == {one, "", two}
+    assert troubles.count("") == 2, "none while the first try of each runs"
