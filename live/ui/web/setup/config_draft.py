@@ -64,7 +64,7 @@ class ConfigDraft:
         self.changes: dict[str, Any] = {key: v for key, v in permanent.items() if in_file.get(key) != v}
         self._config = given
         # The page and the check change it, each in a thread of its own.
-        self._lock = threading.RLock()
+        self._lock = threading.Lock()
 
     @property
     def config(self) -> Config:

@@ -168,9 +168,8 @@ class LoadPreview:
         with self._lock:
             self._samples.clear()
         self.info, self._opened_t = None, self._clock()
-        if (
-            address != self._tried
-        ):  # else the fault stands until the load cell is open: it is tried again and again
+        # The fault of an address stands until its load cell is open, which is tried again and again.
+        if address != self._tried:
             self._tried, self._fault = address, ""
         if address == NONE:
             self._reopen.wait()
