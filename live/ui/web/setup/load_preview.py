@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from acquire.addresses import parse_address
@@ -19,6 +19,7 @@ from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.printable import brief, printable
 from acquire.system import lower_priority
 from live.pipeline.latency import OUTPUT
+from live.setup.check.verdict import CheckLine
 from live.setup.devices import open_load
 from live.ui.web.setup.config_draft import ConfigDraft
 
@@ -128,13 +129,24 @@ class LoadPreview:
         }
 
     def report(self) -> LoadReport | None:
-        """The check of the last seconds; None without a load cell, and for a recorded one."""
-        info, now = self.info, self._clock()
-        if info is None or self.address == NONE or self._recorded:
+        """The check of the last seconds; None without a load cell, for a recorded one, and before it is open."""
+        opened, info, now = self._tried, self.info, self._clock()
+        if info is None or opened != self.address or opened == NONE or self._recorded:
             return None
         with self._lock:
             samples = tuple(self._samples)
         return report(ListenResult(samples, max(now - KEPT_S, self._opened_t), now), info)
+
+    def lines(self, found: LoadReport | None) -> Iterator[CheckLine]:
+        """What a check says beside the report ``found``: a recorded, missing or closed load cell, and none."""
+        if self.address == NONE:
+            yield CheckLine("load cell", "none: force, stress and modulus are not measured", measured=False)
+        elif self._recorded:
+            yield CheckLine("load cell", "recorded, with the pictures or for itself", measured=False)
+        elif self.trouble:
+            yield CheckLine("load cell", self.trouble, False, "choose the load cell under Devices")
+        elif found is None:
+            yield CheckLine("load cell", "not open yet", False, "wait for the force, then check again")
 
     @property
     def _recorded(self) -> bool:

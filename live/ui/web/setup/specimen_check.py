@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from live.setup.dry_run import picture_kinds
 from live.ui.web.setup.camera_preview import MAX_BYTES, RECENT, CameraPreview
 from live.ui.web.setup.check_panel import figure_values, frame_stack, line_values, table_values
 from live.ui.web.setup.config_draft import ConfigDraft
-from live.ui.web.setup.load_preview import NONE, LoadPreview
+from live.ui.web.setup.load_preview import LoadPreview
 from live.ui.web.setup.specimen_region import SpecimenRegion
 
 log = logging.getLogger(__name__)
@@ -170,24 +170,14 @@ class SpecimenCheck:
         load = None if self._load is None else self._load.report()
         figures = examine(frame_stack(frames, info), config, load)
         shift = config.measure.reference_shift_px
-        lines = [*check_lines(figures, None, shift), *self._load_lines(), self._gauge_line()]
+        of_load = () if self._load is None else self._load.lines(load)
+        lines = [*check_lines(figures, None, shift), *of_load, self._gauge_line()]
         self._keep_figures(figures)
         self.values["checking"] = False
         if edition == self._region.edition:  # else the region has changed meanwhile
             go = all(line.good for line in lines)
             shown = [line_values(line) for line in lines]
             self.values |= {"lines": shown, "go": go, "table": table_values(figures)}
-
-    def _load_lines(self) -> Iterator[CheckLine]:
-        """What the report on the load cell does not have: a cell that is missing, and none."""
-        if self._load is None:
-            return
-        if self._load.address == NONE:
-            yield CheckLine("load cell", "none: force, stress and modulus are not measured", measured=False)
-        elif self._load.report() is None and not self._load.trouble:
-            yield CheckLine("load cell", "recorded, with the pictures or for itself", measured=False)
-        elif self._load.trouble:
-            yield CheckLine("load cell", self._load.trouble, False, "choose the load cell under Devices")
 
     def _gauge_line(self) -> CheckLine:
         """Whether every gauge lies on ZOIs."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -375,3 +376,45 @@ def test_a_load_cell_that_is_missing_stays_so_while_it_is_tried_again(
     one, two = ("/dev/one: there is no such port", "/dev/two: there is no such port")
     assert troubles[:3] == ["", one, one] and set(troubles[3:]) == {one, "", two}
     assert troubles.count("") == 2, "none while the first try of each runs"
+
+
+def test_a_load_cell_that_is_not_open_yet_is_no_recorded_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A check between the choice of a cell and its opening is NO-GO; a cell that was open before is no excuse."""
+    rig = tmp_path / "rig.toml"
+    draft = ConfigDraft(Config(), rig, {})
+    draft.change_all({"load.address": "sim:"})
+    opening, go_on, real = threading.Event(), threading.Event(), load_preview.open_load
+
+    def slow(address: str, *others: Any) -> Any:
+        if "two" in address:
+            opening.set()
+            go_on.wait()
+            address = "sim:"
+        return real(address, *others)
+
+    monkeypatch.setattr(load_preview, "open_load", slow)
+    preview = load_preview.LoadPreview(draft)
+
+    def said() -> list[tuple[str, bool]]:
+        return [(line.value, line.good) for line in preview.lines(preview.report())]
+
+    preview.start()
+    try:
+        until(lambda: preview.report() is not None)
+        assert said() == []
+        draft.change_all({"load.address": "/dev/two?protocol=ascii"})
+        assert said() == [("not open yet", False)], "the thread still reads the cell before"
+        preview.reopen()
+        opening.wait()
+        assert said() == [("not open yet", False)]
+        go_on.set()
+        until(lambda: preview.report() is not None)
+        assert said() == []
+        for address, line in (("session:", "recorded, "), ("none:", "none: ")):
+            draft.change_all({"load.address": address})
+            assert [(text.startswith(line), good) for text, good in said()] == [(True, True)]
+    finally:
+        go_on.set()
+        preview.close()
