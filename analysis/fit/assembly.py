@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import prange
@@ -19,21 +19,51 @@ MIN_AREA = 0.05
 """Area of a pixel of the reference in the deformed image, px: limit."""
 
 
-@helper
-def expect(gain: Any, reference: Any, current: Any, least: Any, out: Any) -> None:
-    """Variance a pixel that noise leaves in the difference of the images, GL^2, written to ``out`` (A,).
+class ExpectedNoise(NamedTuple):
+    """Variance a pixel that the noise of both images makes.
 
-    ``reference`` and ``current`` (A,) are of the two images, ``least`` is what rounding leaves; NaN where the gain is.
+    The fit subtracts the reference as recorded, and scales its contrast by the filtered one, in which there is
+    little noise. At the frequencies of the pattern the filter passes all, and the noise is scaled too.
+
+    Attributes
+    ----------
+    left : (A,), GL^2
+        In the difference of the images.
+    felt : (A,), GL^2
+        At the frequencies of the pattern: it disturbs the parameters.
     """
-    for z in range(len(out)):
-        square = gain[z] ** 2
-        both = (MAX_NOISE_GAIN**2 if square > MAX_NOISE_GAIN**2 else square) * reference[z] + current[z]
-        out[z] = least if both < least else both
+
+    left: NDArray[np.float64]
+    felt: NDArray[np.float64]
+
+
+@helper
+def expect(gain: Any, kept: Any, reference: Any, current: Any, least: Any, out: ExpectedNoise) -> None:
+    """What noise makes of the difference of the images, written to ``out``; NaN where the gain is.
+
+    Parameters
+    ----------
+    gain : (A,)
+    kept : tuple of two floats
+        What the filter keeps of the noise of a pixel in that pixel, and of its variance.
+    reference, current : (A,), GL^2
+        Variance a pixel of the two images.
+    least : float, GL^2
+        What rounding leaves.
+    out : ExpectedNoise
+    """
+    for z in range(len(reference)):
+        scale = min(max(gain[z], -MAX_NOISE_GAIN), MAX_NOISE_GAIN) if gain[z] == gain[z] else np.nan
+        more = scale - 1
+        left = (1 + more * (2 * kept[0] + more * kept[1])) * reference[z] + current[z]
+        felt = scale**2 * reference[z] + current[z]
+        out.left[z] = least if left < least else left
+        out.felt[z] = least if felt < least else felt
 
 
 @helper
 def weigh(
-    measured: Any, left: Any, freedom: Any, gain: Any, reference: Any, current: Any, values: Any,
+    measured: Any, left: Any, freedom: Any, gain: Any, reference: Any, current: Any, share: Any, values: Any,
     residual: Any, from_reference: Any, whole: Any,
 ) -> None:  # fmt: skip
     """What is left over what noise explains, and the variance that scales the unit covariances.
@@ -46,6 +76,8 @@ def weigh(
     freedom, gain : (A,)
     reference, current : (A,), GL^2
         Variance a pixel of the two images.
+    share : (A,)
+        ``ExpectedNoise``, left over felt.
     values : (A, modes)
         Parameters: the noise of a picture that is stretched is a mean over more pixels (``area``).
     residual : (A,) float32, written
@@ -53,7 +85,7 @@ def weigh(
         In grey levels of the reference; NaN where nothing was measured.
     """
     for z in range(len(measured)):
-        residual[z] = left[z] / freedom[z] / (gain[z] ** 2 * reference[z] + current[z])
+        residual[z] = left[z] / freedom[z] / (share[z] * (gain[z] ** 2 * reference[z] + current[z]))
         from_reference[z] = np.nan
         whole[z] = np.nan
         if measured[z]:

@@ -63,13 +63,13 @@ class _Noise(NamedTuple):
         return float(np.median((first / (first + self.current))[ok])) if ok.any() else 0.0
 
 
-def field_of(solution: Solution, expected: PredictedMotion | None = None) -> StrainField:
+def field_of(solution: Solution, predicted: PredictedMotion | None = None) -> StrainField:
     """The field of a solution.
 
     Parameters
     ----------
     solution : Solution
-    expected : PredictedMotion, optional
+    predicted : PredictedMotion, optional
         None: the field has no motion.
     """
     from analysis.fit.assembly import weigh, weigh_blur
@@ -78,7 +78,7 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
     reference, found = solution.reference, solution.found
     ok = solution.status == Status.OK
     gain = found.nuisance[:, 0]
-    noise = _noise_parts(solution, ok)
+    noise, expected = _noise_parts(solution, ok), solution.expected(np.s_[:], found.nuisance)
     residual, first, whole = np.empty((3, len(ok)), np.float32)
     weigh(
         ok,
@@ -87,6 +87,7 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         gain,
         noise.reference,
         noise.current,
+        expected.left / expected.felt,
         found.p,
         residual,
         first,
@@ -113,7 +114,7 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         gain=reference.spread(gain[:, None].astype(np.float32))[0],
         noise=math.sqrt(medians(noise.current[ok][None])[0]) if ok.any() else float("nan"),
         window=reference.settings.window,
-        motion=None if expected is None else _motion(solution, values, expected),
+        motion=None if predicted is None else _motion(solution, values, predicted),
         sums=reference.sums,
         picture=error,
         blur=reference.spread(blur.T),
@@ -156,7 +157,7 @@ def _motion(solution: Solution, values: Floats, expected: PredictedMotion) -> Mo
 def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     """The noise of the two images: together what the fits leave, of which the reference has what was given."""
     gain, white = solution.found.nuisance[:, 0], np.ones(6)
-    reference, current = solution.variances(np.s_[:], gain)
+    reference, current = solution.variances(np.s_[:], solution.found.nuisance)
     common = solution.common
     if common is None or solution.retried or np.count_nonzero(ok) < FEW_REFUSED * len(ok):
         common = solution.pooled(np.flatnonzero(ok))
@@ -175,7 +176,7 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
         elif np.abs(np.log(seen)).max() > np.log(COLOURED):
             some_left = left_of_some(solution, ok)
             colour = colour * by_frequency(solution.reference, some_left[1])
-        whole = ratio * solution.expected(np.s_[:], gain)
+        whole = ratio * solution.expected(np.s_[:], solution.found.nuisance).felt
         parts = _parted(whole, reference * gain**2, gain, solution)
         return _Noise(*parts, colour, math.sqrt(over), seen, some_left)
     if solution.noise is not None or not ok.any():
@@ -270,16 +271,16 @@ def _level_covariances(solution: Solution, noise: _Noise) -> tuple[Covariance, C
 
     ready, model, own = solution.reference.prepared, solution.reference.noise_model, solution.noise
     unit, slope = ready.covariance, ready.covariance_level
-    gain, offset = solution.found.nuisance[:, 0], solution.found.nuisance[:, 1]
+    gain = solution.found.nuisance[:, 0]
     by_gain = 1 / (np.maximum(gain, MIN_NOISE_GAIN) ** 2 * _areas(solution.found.p))
     first = noise.reference[:, None] * unit
     second = (noise.current * by_gain)[:, None] * unit
-    stated = solution.variances(np.s_[:], gain)
+    stated = solution.variances(np.s_[:], solution.found.nuisance)
     if slope is not None and model is not None and model.slope > 0:
         over = noise.reference / stated[0]
         first = over[:, None] * (model.floor * unit + model.slope * slope)
     if slope is not None and own is not None and own.slope > 0:
         over = by_gain * noise.current / stated[1]
-        constant = own.floor + own.slope * (offset + (1 - gain) * ready.pattern.mean)
+        constant = own.floor + own.slope * solution.constant_level(solution.found.nuisance)
         second = over[:, None] * (constant[:, None] * unit + (own.slope * gain)[:, None] * slope)
     return first.astype(np.float32), second.astype(np.float32)

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +27,13 @@ from analysis.kernel.quadrature import Sensors
 from analysis.kernel.reference import SPILL_PX, Places, ReferencePicture
 from analysis.picture.splines import Box, prefilter_taps, tap_table
 
+if TYPE_CHECKING:
+    from analysis.fit.assembly import ExpectedNoise
+
 Floats = NDArray[np.float64]
 
+SAME_LIGHT = 1.0, 0.0
+"""Gain and offset of an image in the light of the reference."""
 DISTURBED_RATIO, DISTURBED_SHARE = 2.0, 0.02
 """Of what is left over what the noise explains, and of the ZOIs that are refused: from here on wild pixels of the
 image are looked for."""
@@ -85,7 +90,7 @@ class Solution:
         self.rounding = reference.rounding + rounding_variance(image)
         self.table = tap_table(reference.settings.interpolant)
         self.tolerance = reference.tolerance(self._current_std())
-        self._noise, current = self.variances(np.s_[:], np.ones(len(guess)))
+        self._noise, current = self.variances(np.s_[:], np.tile(SAME_LIGHT, (len(guess), 1)))
         self._noise_left = np.maximum(prepared.freedom * (self._noise + current), 1e-9)
         self._later = float(current.sum() / max((self._noise + current).sum(), 1e-9))
         able = prepared.status == Status.OK
@@ -219,29 +224,29 @@ class Solution:
         from analysis.fit.verdict import judge
 
         reference, ready, settings = self.reference, self.reference.prepared, self.reference.settings
-        known, expected = self._known, self.expected(which, found.nuisance[:, 0])
+        known, expected = self._known, self.expected(which, found.nuisance)
         far = CENTRE_VARIANCE[settings.order - 1]
         corner_steps = math.inf if settings.estimator == "phase" else CORNER_STEPS
         rule = VerdictArgs(
             self.is_given, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far, corner_steps
         )
         left = self._left(which, found)
-        most = 2 * len(expected) > len(self._places[0])  # some that are retried forgive nothing
+        most = 2 * len(found.p) > len(self._places[0])  # some that are retried forgive nothing
         if self.common is None and most:
             self.common = self._pooled(which, found, left, expected)
         common = PooledError.none(len(known.signal)) if self.common is None else self.common
-        status = np.empty(len(expected), np.uint8)
+        status = np.empty(len(found.p), np.uint8)
         judge(found, left, expected, common.at(which), known.at(which), rule, status)
         return status
 
     def pooled(self, which: NDArray[np.intp]) -> PooledError | None:
         """What the fits of the ZOIs ``which``, as they are kept, leave in common."""
         found = self.found.at(which)
-        return self._pooled(
-            which, found, self._left(which, found), self.expected(which, found.nuisance[:, 0])
-        )
+        return self._pooled(which, found, self._left(which, found), self.expected(which, found.nuisance))
 
-    def _pooled(self, which: Places, found: OutArgs, left: Floats, expected: Floats) -> PooledError | None:
+    def _pooled(
+        self, which: Places, found: OutArgs, left: Floats, expected: ExpectedNoise
+    ) -> PooledError | None:
         from analysis.fit.pooling import pooled
 
         places = np.arange(len(self.guess))[which]
@@ -278,25 +283,35 @@ class Solution:
         """Variance a pixel that the fit leaves, GL^2; rounding leaves something where the images are equal, too."""
         return np.maximum(found.left / self.reference.prepared.freedom[which], self.rounding)
 
-    def expected(self, which: Places, gain: Floats) -> Floats:
-        """Variance a pixel that noise alone leaves in the difference of the images, GL^2."""
-        from analysis.fit.assembly import expect
+    def expected(self, which: Places, light: Floats) -> ExpectedNoise:
+        """What noise alone makes of the difference of the images in ``light``, as in ``variances``."""
+        from analysis.fit.assembly import ExpectedNoise, expect
 
-        out = np.empty(len(gain))
-        expect(np.ascontiguousarray(gain), *self.variances(which, gain), self.rounding, out)
+        pattern, gain = self.reference.prepared.pattern, np.ascontiguousarray(light[:, 0])
+        out = ExpectedNoise(np.empty(len(gain)), np.empty(len(gain)))
+        kept = float(pattern.own_noise[0]), pattern.left_level
+        expect(gain, kept, *self.variances(which, light), self.rounding, out)
         return out
 
-    def variances(self, which: Places, gain: Floats) -> tuple[Floats, Floats]:
-        """Variance a pixel of the reference and of the image at some ZOIs, GL^2; the reference's where not known."""
+    def variances(self, which: Places, light: Floats) -> tuple[Floats, Floats]:
+        """Variance a pixel of the reference and of the image at some ZOIs, GL^2; the reference's where not known.
+
+        ``light`` (B, >= 2) has the gain and the offset of the image: ``OutArgs.nuisance``.
+        """
         level = self.reference.prepared.level[which]
         model, own = self.reference.noise_model, self.noise
         if model is None:
-            reference = np.full(len(gain), self.reference.noise**2)
+            reference = np.full(len(light), self.reference.noise**2)
         else:
             reference = model.variance(level)
         if own is None:
             return reference, reference
-        return reference, own.variance(level if own.slope == 0 else level * np.maximum(gain, 0))
+        gain, constant = np.maximum(light[:, 0], 0), self.constant_level(light)
+        return reference, own.variance(level if own.slope == 0 else gain * level + constant)
+
+    def constant_level(self, light: Floats) -> Floats:
+        """Grey level of the image where the reference is black, in ``light`` as in ``variances``, (B,), GL."""
+        return np.asarray(light[:, 1] + (1 - light[:, 0]) * self.reference.prepared.pattern.mean)
 
 
 def _cleaned(image: NDArray[Any]) -> NDArray[Any]:

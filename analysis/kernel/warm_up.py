@@ -193,7 +193,7 @@ def _prefilter(kinds: Sequence[str]) -> None:
 
 def _rest() -> None:
     """All but the iteration, the prefilter and what only the estimator by phases needs."""
-    from analysis.fit.assembly import clipped_share, expect, scale, weigh, weigh_blur
+    from analysis.fit.assembly import ExpectedNoise, clipped_share, expect, scale, weigh, weigh_blur
     from analysis.fit.iteration import warp_zois
     from analysis.fit.kernel_args import OutArgs, PooledError, ReferenceArgs, VerdictArgs
     from analysis.fit.pooling import explained, medians
@@ -217,13 +217,13 @@ def _rest() -> None:
         ReferenceArgs(none, none, pairs, none, np.ones(2), 1.0, 1.0, none, 0.5),
     )
     rule = VerdictArgs(True, np.empty(2), 1.0, 0.05, 4.0, 6.0)
-    judge(found, none, none, PooledError.none(0), known, rule, np.empty(0, np.uint8))
-    explained(found, none, none, known, np.empty(0, np.intp), 1, pairs)
+    judge(found, none, ExpectedNoise(none, none), PooledError.none(0), known, rule, np.empty(0, np.uint8))
+    explained(found, none, ExpectedNoise(none, none), known, np.empty(0, np.intp), 1, pairs)
     medians(np.ones((2, 2)))
     weigh_blur(single, single, single)
-    expect(np.ones(2), np.ones(2), np.ones(2), 0.0, np.empty(2))
+    expect(*(np.ones(2), (0.5, 0.5), np.ones(2), np.ones(2), 0.0), ExpectedNoise(np.empty(2), np.empty(2)))
     origins, p, gain = np.empty((0, 2), np.int64), np.empty((0, 6)), np.empty((2, 2))[:, 0]
-    weigh(np.empty(0, np.bool_), none, none, gain, none, none, p, single, single, single)
+    weigh(np.empty(0, np.bool_), none, none, gain, none, none, none, p, single, single, single)
     warp_zois(_no_picture(), np.empty(18, np.float32), origins, 32, p, np.empty((0, 32, 32), np.float32))
     unit = np.empty((21, 0), np.float32)
     scale(unit, np.ones(21, np.float32), single, single, unit, unit)

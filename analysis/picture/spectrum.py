@@ -44,6 +44,8 @@ class Pattern:
         Mean square of a filtered gradient over the variance of the noise, where there is only noise.
     own_noise : (3,) float64
         What the noise of a pixel puts into f, f_xx and f_yy of that pixel, shares of it.
+    left_level : float
+        Mean square of the filtered level over the variance of the noise, where there is only noise.
     """
 
     level: NDArray[np.float32]
@@ -53,6 +55,7 @@ class Pattern:
     noise: float
     left_gradient: float
     own_noise: NDArray[np.float64]
+    left_level: float
 
 
 def filtered_pattern(
@@ -86,13 +89,13 @@ def filtered_pattern(
     response = _filtered_spectrum(image, np.float32(mean), places, gain, spectrum)
     along_y = _gradient_response(degree, height)[:, None]
     along_x = _gradient_response(degree, width)[None, : width // 2 + 1]
-    left_gradient, own_noise = _of_noise(response, along_x, width, work)
+    of_noise = _of_noise(response, along_x, width, work)
     grad_x, grad_y, level = out or (np.empty(image.shape, np.float32) for _ in range(3))
     for to, along in ((grad_x, along_x), (grad_y, along_y)):
         np.multiply(spectrum, along, out=work)
         _back(work, width, to)
     _back(spectrum, width, level)
-    return Pattern(level, grad_x, grad_y, mean, float(np.sqrt(variance)), left_gradient, own_noise)
+    return Pattern(level, grad_x, grad_y, mean, float(np.sqrt(variance)), *of_noise)
 
 
 def _padded_places(length: int, mode: Literal["reflect", "edge"]) -> NDArray[np.intp]:
@@ -135,8 +138,8 @@ def _filtered_spectrum(
 
 def _of_noise(
     response: Image, along_x: NDArray[np.complex64], width: int, room: NDArray[np.complex64]
-) -> tuple[float, Floats]:
-    """``Pattern.left_gradient`` and ``Pattern.own_noise`` of a filter, with ``room`` of its shape to work in."""
+) -> tuple[float, Floats, float]:
+    """``left_gradient``, ``own_noise`` and ``left_level`` of a filter (``Pattern``); ``room`` has its shape."""
     floats = room.view(np.float32).reshape(-1)[: response.size].reshape(response.shape)
     for rows in _some_rows(len(response)):
         floats[rows] = np.abs(response[rows] * along_x) ** 2
@@ -147,7 +150,8 @@ def _of_noise(
     for k in (kx, ky):
         np.multiply(response, 2 * np.cos(2 * np.pi * k) - 2, out=doubles)
         own.append(np.mean(doubles))
-    return left, np.array(own, np.float64)
+    np.multiply(response, response, out=floats)
+    return left, np.array(own, np.float64), float(np.mean(floats, dtype=np.float64))
 
 
 def _back(spectrum: NDArray[np.complex64], width: int, out: Image) -> None:

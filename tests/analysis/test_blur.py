@@ -125,17 +125,25 @@ def test_second_differences_up_to_the_edge() -> None:
 
 
 def test_own_noise_is_what_a_pixel_puts_into_the_filtered_picture() -> None:
-    """From the response of the filter to noise: the covariance of f, f_xx and f_yy with the noise of their pixel."""
+    """From the response of the filter to noise: the covariance of f, f_xx and f_yy with the noise of their pixel.
+
+    And the variance of what it makes of noise alone.
+    """
     rng, pattern, found, count = np.random.default_rng(3), 40 * (level() - 0.5) / 0.18, np.zeros(3), 12
+    left = 0.0
     for _ in range(count):
         noise = rng.normal(0, 4, SHAPE)
+        made_of = []
         for sign in (1, -1):  # both, so that the pattern has no part in it
             made = filtered_pattern((pattern + sign * noise).astype(np.float32), 4.0, 5)
             images = padded(made.grad_x, made.grad_y, made.level, made.level)
             continue_rim(images, 2, SHAPE)
             second = with_second_differences(images)[4:6, : SHAPE[0], : SHAPE[1]]
             found += [np.mean(one * sign * noise) / 16 / (2 * count) for one in (made.level, *second)]
+            made_of.append(made.level)
+        left += np.mean((made_of[0] - made_of[1]) ** 2) / 4 / 16 / count
     assert found == pytest.approx(made.own_noise, rel=0.05)
+    assert left == pytest.approx(made.left_level, rel=0.05)
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import pytest
 from analysis import KernelSettings, PhaseKernel, Roi, Status, ZoiGrid
 from analysis.field import profile
 from analysis.field.grid import WINDOWS, Window
-from analysis.fit.assembly import RUN, clipped_share, expect, scale, weigh, weigh_blur
+from analysis.fit.assembly import RUN, ExpectedNoise, clipped_share, expect, scale, weigh, weigh_blur
 from analysis.fit.kernel_args import (
     CONVERGED,
     LEFT_IMAGE,
@@ -34,8 +34,9 @@ def test_a_zoi_is_weighed_by_the_noise_of_both_images() -> None:
     reference, current = np.array([4.0, 1.0, 2.0]), np.array([3.0, 1.0, 1.0])
     values, (residual, first, whole) = np.zeros((3, 6)), np.empty((3, 3), np.float32)
     values[2] = 5.0, 0.5, 0.2, -7.0, -0.1, -0.2  # of u, its gradients, v and its
-    weigh(measured, left, freedom, gain, reference, current, values, residual, first, whole)
-    assert np.allclose(residual, [4 / (1 + 3), 0.5, 0.75 / (2e-4 + 1)])
+    share = np.array([1.0, 1.0, 0.5])
+    weigh(measured, left, freedom, gain, reference, current, share, values, residual, first, whole)
+    assert np.allclose(residual, [4 / (1 + 3), 0.5, 0.75 / (0.5 * (2e-4 + 1))])
     assert np.array_equal(first, [4, np.nan, 2], equal_nan=True)
     # In grey levels of the reference, by a gain of 0.1 at least, over so many pixels as one becomes.
     assert np.allclose(whole, [4 + 3 / 0.25, np.nan, 2 + 1 / 0.01 / (1.5 * 0.8 + 0.2 * 0.1)], equal_nan=True)
@@ -251,7 +252,8 @@ def verdict(
         ),
         VerdictArgs(known, np.array([1.5, 0.5]), 5.0, limit, 4.0, 6.0),
     )
-    judge(found, one * left, one * expected, common or PooledError.none(1), zoi, rule, out)
+    noise = ExpectedNoise(one * expected, one * expected)
+    judge(found, one * left, noise, common or PooledError.none(1), zoi, rule, out)
     return int(out[0])
 
 
@@ -325,9 +327,14 @@ def test_a_centre_beyond_the_pattern_shows_in_its_uncertainty() -> None:
 
 
 def test_noise_is_expected_with_the_gain_within_its_limits_and_not_below_rounding() -> None:
-    gain, out = np.array([[2.0, 0], [9.0, 0], [0.1, 0], [np.nan, 0]])[:, 0], np.empty(4)
-    expect(gain, np.full(4, 3.0), np.full(4, 0.01), 0.08, out)
-    assert out == pytest.approx([12.01, 75.01, 0.08, np.nan], nan_ok=True)
+    gain, out = np.array([[2.0, 0], [9.0, 0], [0.1, 0], [np.nan, 0]])[:, 0], ExpectedNoise(*np.empty((2, 4)))
+    expect(gain, (1.0, 1.0), np.full(4, 3.0), np.full(4, 0.01), 0.08, out)
+    for of_both in out:  # nothing is filtered
+        assert of_both == pytest.approx([12.01, 75.01, 0.08, np.nan], nan_ok=True)
+    expect(gain, (0.5, 0.25), np.full(4, 3.0), np.full(4, 0.01), 0.08, out)
+    left = [3 * (1 + more * 0.5) ** 2 + 0.01 for more in (1, 4, -0.9)]
+    assert out.left == pytest.approx([*left, np.nan], nan_ok=True), "by the reference that is half as noisy"
+    assert out.felt == pytest.approx([12.01, 75.01, 0.08, np.nan], nan_ok=True)
 
 
 def test_the_uncertainty_of_a_blur_is_unknown_where_nothing_was_measured() -> None:

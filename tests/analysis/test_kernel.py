@@ -156,6 +156,36 @@ def test_noise_model_scales_with_the_burst() -> None:
     assert np.allclose(single.sigma("u", "reference"), burst.sigma("u", "reference"), rtol=0.02)
 
 
+@pytest.mark.parametrize(("gain", "offset"), [(0.7, 1600.0), (1.0, 1500.0), (1.4, -100.0)])
+def test_noise_that_grows_with_the_light_is_taken_at_the_light_of_the_image(
+    gain: float, offset: float
+) -> None:
+    """Of one pattern in another light: the scatter is that of the noise there, not at the light of the reference."""
+    model, rng = NoiseModel(gain=0.5, read=1.0), np.random.default_rng(9)
+
+    def noisy(clean: np.ndarray) -> np.ndarray:
+        return clean + rng.normal(0, 1, SHAPE) * np.sqrt(model.variance(clean))
+
+    kernel = PhaseKernel(noisy(picture().astype(float)), GRID, noise=model)
+    clean = picture(u=0.3) * gain + offset
+    fields = [kernel.measure(noisy(clean), noise=model) for _ in range(20)]
+    scatter = np.sqrt(np.mean(np.stack([f.u for f in fields]).var(axis=0, ddof=1)))
+    assert np.sqrt(np.mean(fields[0].sigma("u", "current") ** 2)) == pytest.approx(scatter, rel=0.06)
+    assert np.mean(fields[0].residual) == pytest.approx(0.95, abs=0.05)  # the spline smooths a little
+
+
+@pytest.mark.parametrize("gain", [0.7, 1.4])
+def test_the_noise_of_the_reference_counts_with_the_contrast_as_the_fit_scales_it(gain: float) -> None:
+    """The reference as recorded is subtracted, the filtered one is scaled: little of its noise is scaled with it."""
+    noise, rng = 100.0, np.random.default_rng(10)
+    kernel = PhaseKernel(picture() + rng.normal(0, noise, SHAPE), GRID)
+    field = kernel.measure(picture(u=0.3) * gain + rng.normal(0, 5, SHAPE), noise=5.0)
+    given = PhaseKernel(picture() + rng.normal(0, noise, SHAPE), GRID, noise=noise)
+    assert np.mean(given.measure(picture(u=0.3) * gain, noise=5.0).residual) == pytest.approx(1, abs=0.06)
+    rms = np.sqrt(np.mean((field.u - 0.3) ** 2))
+    assert np.sqrt(np.mean(field.sigma("u") ** 2)) == pytest.approx(rms, rel=0.15)
+
+
 def test_brightness_and_contrast_do_not_matter() -> None:
     reference = picture()
     deformed = picture(u=0.3).astype(np.float32) * 0.7 + 300

@@ -193,7 +193,10 @@ def test_inspect_draws_one_zoi(session: Path, tmp_path: Path, capsys: pytest.Cap
 
 @pytest.mark.parametrize(
     ("words", "message"),
-    [(["--zoi", "9,9", "--frame", "1"], "rows 0 to"), (["--zoi", "x", "--frame", "1"], "row,column")],
+    [
+        (["--zoi", "9,9", "--frame", "1"], "rows 0 to 3 and columns 0 to 5"),
+        (["--zoi", "x", "--frame", "1"], "row,column"),
+    ],
 )
 def test_inspect_refuses(session: Path, tmp_path: Path, words: list[str], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
