@@ -159,6 +159,16 @@ def test_the_simulated_weave_is_measured_better_than_by_the_paper(tmp_path: Path
     assert f"]({outcome.figures[0]})" in outcome.text
 
 
+def test_the_limit_of_a_burst_falls_with_the_root_of_its_frames() -> None:
+    from live.characterise.experiments.burst import BurstStudy
+    from live.characterise.truth import SensorModel
+
+    study, noisy = BurstStudy(quick=True), SensorModel(12, 4.0)
+    one = study.predicted(noisy, 1)
+    assert one == pytest.approx(study.unit * noisy.sigma / 4095) and one > 0
+    assert study.predicted(noisy, 16) == pytest.approx(one / 4)
+
+
 @pytest.mark.slow
 def test_averaging_falls_as_predicted_until_rounding_stops_it(monkeypatch: pytest.MonkeyPatch) -> None:
     import live.characterise.experiments.burst as burst

@@ -218,3 +218,17 @@ def test_a_title_fits_however_long_it_is_and_whatever_is_in_it(results: Path, tm
 def test_letters_that_an_older_opencv_has_not_are_written_plainly(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(cv2, "FontFace", raising=False)
     assert painting._letters("Prüfung, −3 ± 1 µm/m, 2×2") == "Prufung, -3 +- 1 um/m, 2x2"
+
+
+def test_cells_of_a_coarse_overlay_lie_where_their_zois_have_moved() -> None:
+    grid = ZoiGrid.cover(
+        Roi(10, 20, 72, 48), size=24, step=12
+    )  # 5 columns from x = 21.5, 3 rows from y = 31.5
+    cells = np.zeros((*grid.shape, 4), np.uint8)
+    cells[-1, -1] = 0, 0, 255, 255  # blue, nothing of the picture through it
+    picture = np.zeros((50, 60, 3), np.uint8)
+    painting.overlay_cells(picture, 0.5, grid, cells, (4.0, -2.0))
+    rows, columns = np.nonzero(picture[..., 0])
+    # Of the last ZOI: half a step about (69.5 + 4, 55.5 - 2), halved.
+    assert (columns.min(), columns.max() + 1) == (34, 40) and (rows.min(), rows.max() + 1) == (24, 30)
+    assert not picture[..., 1:].any()

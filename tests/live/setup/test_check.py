@@ -484,6 +484,15 @@ def test_the_limits_of_a_check(whole: CheckFigures, name: str) -> None:
         assert line.good == expected, line.text()
 
 
+def test_the_noise_is_said_in_microstrain_as_measured_and_as_predicted(whole: CheckFigures) -> None:
+    def said(figures: CheckFigures) -> str:
+        return next(line.value for line in check_lines(figures) if line.what == "strain noise")
+
+    assert said(with_floor(whole, 100e-6, 120e-6)).startswith("120 µm/m measured, 100 predicted (one ZOI of ")
+    few = replace(whole, stack=replace(whole.stack, frames=whole.stack.frames[:1]))
+    assert said(with_floor(few, 100e-6, math.nan)).startswith("100 µm/m predicted, noise ")
+
+
 def test_strains_that_drift_apart_are_no_change_of_distance(whole: CheckFigures) -> None:
     lines = check_lines(with_drift(whole, 4e-4, -4e-4))
     assert "distance" not in [line.what for line in lines]

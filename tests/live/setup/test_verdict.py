@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 from analysis.quality.steadiness import Steadiness
 from live.setup.check.check_list import automatic_controls, table_lines
 from live.setup.check.noise_floor import StrainNoise, ZoiFloor
+from live.setup.check.stillness import PictureStillness
 from live.setup.check.verdict import CheckLine, _flicker, _sharpness, _vibration, reaching
 from live.setup.region import Region
 from live.setup.specimen_drawing import FAIR, GOOD, POOR, Overlay, _Drawing
@@ -42,6 +44,16 @@ def test_the_softest_and_the_sharpest_side_are_named(
     line = sides(*given)
     assert (line.value, line.good) == (words, good)
     assert line.advice.startswith(f"softer at the {words.split()[2]}:")
+
+
+@pytest.mark.parametrize(("drift", "shown"), [(1.4, 0.0), (1.6, 1.6), (-1.6, -1.6)])
+def test_a_drift_of_the_distance_is_clear_beyond_one_and_a_half_times_the_noise(
+    drift: float, shown: float
+) -> None:
+    still, noisy = Steadiness(0.0, 0.0, 0.0, None, 2.0, 30.0), Steadiness(drift, 1.0, 1.0, None, 2.0, 30.0)
+    quieter = replace(noisy, noise=0.1)
+    found = PictureStillness(still, still, noisy, quieter, ((still, still), (still, still)), still)
+    assert found.dilatation == shown, "of the noisier of both"
 
 
 def flicker(rms: float, drift: float, frequency: float | None, rate: float) -> CheckLine:

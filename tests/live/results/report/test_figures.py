@@ -82,6 +82,7 @@ def test_the_report_has_the_limit_of_the_check(run_dir: Path, radius: float, is_
     picture = 255 * Speckle((192, 256), radius=radius, seed=3).render(Affine(), (192, 256))
     with open_run(run_dir) as run:
         text = str(reporting_table(PracticeValues(run, None, picture[:96, :128], {}, None)))
+    assert "32 px, gaussian weight of standard deviation 5.3 px" in text
     found = re.search(r"autocorrelation; radius ([\d.]+) px", text)
     assert found is not None and float(found[1]) == pytest.approx(radius, rel=0.3)
     assert ("(LOOK: wanted are 1.5 to 4 px)" not in text) is is_wanted
