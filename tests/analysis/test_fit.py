@@ -12,12 +12,14 @@ from analysis.fit.assembly import RUN, ExpectedNoise, clipped_share, expect, sca
 from analysis.fit.kernel_args import (
     CONVERGED,
     LEFT_IMAGE,
+    NUISANCES,
     RUNNING,
     OutArgs,
     PooledError,
     ReferenceArgs,
     VerdictArgs,
 )
+from analysis.fit.noise_bias import noise_bias
 from analysis.fit.shapes import shapes_of
 from analysis.fit.validity import has_pattern
 from analysis.fit.verdict import judge, squared_stretch
@@ -366,3 +368,14 @@ def test_a_glare_that_shifts_the_pattern_a_little_is_seen() -> None:
     found = rejection.count("glare", radius=3.0, size=64, noise=0.01)  # 19 by either limit alone
     assert found.accepted <= 6
     assert found.good_rejected == 0
+
+
+def test_noise_of_the_reference_pretends_a_gradient_by_the_columns_of_its_own_direction() -> None:
+    """Of du_dx all that is taken, less twice the blur along x and once that across; of dv_dy along y."""
+    taken = np.zeros((1, 6 + NUISANCES), np.float32)
+    taken[0, 0], taken[0, -3:] = 10.0, (1.0, 2.0, 0.5)  # of u, and of the blur along x, along y and across
+    bias = noise_bias(np.eye(6 + NUISANCES, dtype=np.float32)[None], taken, np.zeros(3), 1.0, 16)[0]
+    everything = 10 + 1 + 2 + 0.5
+    assert bias[1] == pytest.approx((everything - 2 * 1.0 - 0.5) / 16)
+    assert bias[5] == pytest.approx((everything - 2 * 2.0 - 0.5) / 16)
+    assert not bias[[0, 2, 3, 4]].any()

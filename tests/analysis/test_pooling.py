@@ -8,6 +8,8 @@ import pytest
 
 from analysis import KernelSettings, NoiseModel, PhaseKernel, Roi, Status, StrainField, ZoiGrid
 from analysis.field import mean_blur
+from analysis.field.picture_error import PictureError
+from analysis.fit import pooling
 from analysis.fit.assembly import ExpectedNoise
 from analysis.fit.kernel_args import CONVERGED, OutArgs, ReferenceArgs
 from analysis.fit.pooling import pooled
@@ -414,3 +416,20 @@ def test_half_of_the_noise_is_that_of_the_reference(stated: float | None) -> Non
     field = PhaseKernel(picture(2.0, 1), GRID, noise=stated).measure(picture(2.0, 2, **MOTION), noise=stated)
     of_reference = field.covariance_reference[0][field.ok] / field.covariance[0][field.ok]
     assert np.median(of_reference) == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_colour_that_few_zois_show_is_nearer_to_white() -> None:
+    """With a chance of 1 / sqrt(n) in its logarithm: all of it of many ZOIs, none where it is within chance."""
+    log = np.log(2.0)
+    few, many = (float(pooling._shrunk(np.array([2.0]), n)[0]) for n in (9.0, 1e6))
+    assert many == pytest.approx(2, rel=1e-5)
+    assert np.log(few) == pytest.approx(log * (1 - (1 / 9) / log**2))
+    assert pooling._shrunk(np.array([1.3, 0.8]), 9.0).tolist() == [1.0, 1.0]
+
+
+def test_the_factor_of_a_picture_is_that_of_the_worse_of_u_and_v() -> None:
+    assert PictureError(2.0, (0.25, 4.0)).factor == PictureError(2.0, (4.0, 0.25)).factor == 4.0
+
+
+def test_quantisation_is_averaged_with_the_noise() -> None:
+    assert NoiseModel(0.0, 2.0).averaged(4).floor == pytest.approx((4 + 1 / 12) / 4)

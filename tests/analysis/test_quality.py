@@ -13,8 +13,8 @@ from analysis.field import Roi, ZoiGrid
 from analysis.picture.pattern import autocorrelation_fwhm
 from analysis.picture.spectrum import filtered_pattern
 from analysis.quality.pattern import box_sums, speckle_radius, zoi_pattern
-from analysis.quality.specimen import find_specimen
-from analysis.quality.steadiness import mains_of, steadiness
+from analysis.quality.specimen import _Spread, find_specimen
+from analysis.quality.steadiness import Steadiness, aliased, mains_of, steadiness
 
 TIMES = np.arange(60) / 30.0
 
@@ -23,6 +23,20 @@ def test_a_line_has_its_frequency_and_its_mains() -> None:
     found = steadiness(TIMES, 0.5 + 0.1 * np.sin(2 * np.pi * 10 * TIMES))
     assert found.frequency == pytest.approx(10, abs=0.1) and found.rate == pytest.approx(30)
     assert mains_of(found, 2) == 50.0  # 100 Hz shows at 10 Hz in 30 pictures a second
+
+
+@pytest.mark.parametrize(
+    ("frequency", "rate", "shown"), [(100, 30, 10), (120, 25, 5), (110, 30, 10), (7, 30, 7)]
+)
+def test_a_fast_oscillation_shows_at_its_distance_from_the_nearest_multiple_of_the_rate(
+    frequency: float, rate: float, shown: float
+) -> None:
+    assert aliased(frequency, rate) == pytest.approx(shown)
+
+
+def test_a_vibration_is_what_noise_does_not_explain() -> None:
+    assert Steadiness(0.0, 5.0, 3.0, None, 2.0, 30.0).vibration == pytest.approx(4)
+    assert Steadiness(0.0, 3.0, 5.0, None, 2.0, 30.0).vibration == 0
 
 
 def test_noise_alone_has_no_frequency() -> None:
@@ -128,6 +142,13 @@ def test_the_mask_follows_the_edge(radius: float, noise: float, light: float) ->
     rows, columns = np.flatnonzero(found.mask.any(axis=1)), np.flatnonzero(found.mask.any(axis=0))
     assert (found.box.x, found.box.y) == (columns[0], rows[0])
     assert not found.mask.flags.writeable
+
+
+def test_the_radius_of_speckle_from_contrast_and_gradient() -> None:
+    """C^2 = 2 r^2 g^2 of blobs; the pixels over which a gradient is taken add 0.5 px^2, noise its variance to C^2."""
+    power, inner = np.full((3, 3), 5.0, np.float32), np.ones((3, 3), bool)
+    contrast = np.full((3, 3), 2 * (2.0**2 + 0.5) * 5 + 3, np.float32)
+    assert _Spread(contrast, power, 3.0).radius(inner) == pytest.approx(2)
 
 
 def test_dark_and_bright_decide_nothing() -> None:
