@@ -10,7 +10,9 @@ import pytest
 from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
 from analysis.field import Window
 from analysis.field.uncertainty import variance_of_sum
-from analysis.fit.sums import sum_of_squares
+from analysis.fit.shapes import CHANNELS
+from analysis.fit.sums import MONOMIALS, scatter, sum_of_squares
+from analysis.kernel.images import continue_rim, padded, with_second_differences
 from tests.analysis.speckle import picture
 
 SIZE, STEP = 12, 5
@@ -86,3 +88,26 @@ def test_the_pattern_of_the_zois_of_a_mean_decides_its_noise() -> None:
     row[1] = True
     assert field.mean("u", row)[1] == pytest.approx(2 * plain.mean("u", row)[1])
     assert field.mean("u")[1] == pytest.approx(plain.mean("u")[1])
+
+
+def test_what_a_zoi_takes_of_each_pixel_is_the_sum_of_its_channels_and_monomials() -> None:
+    rng, size, at = np.random.default_rng(5), 8, (3, 2)
+    images = padded(*rng.normal(size=(4, 14, 13)).astype(np.float32))
+    continue_rim(images, 2, (14, 13))
+    weights = np.zeros((1, CHANNELS, len(MONOMIALS)))
+    weights[0, :2] = rng.normal(size=(2, len(MONOMIALS)))
+    weights[0, 2:4, :3] = rng.normal(size=(2, 3))
+    weights[0, 4:, 0] = rng.normal(size=CHANNELS - 4)
+    line, along = rng.random(size), np.linspace(-1, 1, size)
+    out = np.zeros((size, size))
+    flat, samples, pitch = images.reshape(-1), images[0].size, images.shape[2]
+    scatter(flat, samples, pitch, np.array([at]), weights, line, along, np.array(at), out)
+    place = np.s_[at[0] : at[0] + size, at[1] : at[1] + size]
+    second = with_second_differences(images)[4:]
+    channels = [images[0], images[1], images[2], np.ones_like(images[0]), *second]
+    eta, xi = np.meshgrid(along, along, indexing="ij")
+    expected = np.zeros((size, size))
+    for channel, weight in zip(channels, weights[0], strict=True):
+        for (x, y), share in zip(MONOMIALS, weight, strict=True):
+            expected += np.outer(line, line) * share * channel[place] * xi**x * eta**y
+    assert out == pytest.approx(expected, abs=1e-5)
