@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,7 +19,7 @@ from live.commands.options import configured, overrides
 from live.commands.report import _first_free, _targets
 from live.commands.scale import board_of
 from live.commands.study import _csv, _line, _settings
-from live.config.loading import load_config
+from live.config.loading import Config, load_config
 from live.replay.study import NO_WINDOW, StudyResult, StudySetting
 from live.setup.check.quick_check import QuickCheck
 from live.setup.check.verdict import CheckLine
@@ -148,3 +149,16 @@ def test_a_page_gets_a_number_where_it_or_what_is_saved_beside_it_is_there(tmp_p
     (tmp_path / "report.csv").touch()
     (tmp_path / "report-2.pdf").touch()
     assert _first_free(page, words).name == "report-3.html"
+
+
+def test_a_second_camera_makes_a_run_of_two_sides(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    taken: list[tuple[list[str], bool]] = []
+
+    def run_sides(sides: Mapping[str, Config], screen: object, *, page: bool) -> int:
+        taken.append((list(sides), page))
+        return 42
+
+    monkeypatch.setattr("live.commands.two_cameras.run_sides", run_sides)
+    words = ["run", "--camera", "sim:", "--load", "none:", "--out", str(tmp_path / "run")]
+    assert main([*words, "--back", "sim:?side=back"]) == 42
+    assert taken == [(["front", "back"], False)]
