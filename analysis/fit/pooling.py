@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper
-from analysis.fit.assembly import MIN_NOISE_GAIN, ExpectedNoise, area
+from analysis.fit.assembly import MIN_NOISE_GAIN, area
 from analysis.fit.kernel_args import CONVERGED, OutArgs, PooledError, ReferenceArgs
 from analysis.fit.validity import AGREES, COLOURED, LOST_SHARE
 
@@ -55,7 +55,7 @@ MAD = 1.4826
 
 
 def pooled(
-    found: OutArgs, left: Floats, expected: ExpectedNoise, known: ReferenceArgs, places: Places, given: bool
+    found: OutArgs, left: Floats, expected: Floats, known: ReferenceArgs, places: Places, given: bool
 ) -> PooledError | None:
     """The common error of the ZOIs that were fitted, at the contrasts of all; None where too few explain their pattern.
 
@@ -63,10 +63,8 @@ def pooled(
     ----------
     found : OutArgs
         Of B ZOIs, some of the A; of more than ``MAX_POOLED`` one in so many counts.
-    left : (B,), GL^2
-        Variance a pixel that the fit leaves.
-    expected : ExpectedNoise
-        Of the B, from the noise as stated.
+    left, expected : (B,), GL^2
+        Variance a pixel that the fit leaves, and that the noise as stated explains.
     known : ReferenceArgs
         Of all A.
     places : (B,)
@@ -118,13 +116,7 @@ def medians(rows: Any) -> Any:
 
 @helper
 def explained(
-    found: OutArgs,
-    left: Any,
-    expected: ExpectedNoise,
-    known: ReferenceArgs,
-    places: Any,
-    every: int,
-    out: Any,
+    found: OutArgs, left: Any, expected: Any, known: ReferenceArgs, places: Any, every: int, out: Any
 ) -> int:
     """How many of one in ``every`` ZOIs have a clear pattern and explain it; 0 where most with a clear one do not.
 
@@ -135,23 +127,23 @@ def explained(
     tried = count = 0
     for i in range(0, len(places), every):
         z = places[i]
-        gain, noise = found.nuisance[i, 0], expected.left[i]
+        gain = found.nuisance[i, 0]
         of_u, of_v = known.unit[z, 0], known.unit[z, 1]
-        if not (math.isfinite(left[i]) and max(of_u, of_v) * min(left[i], noise) < CLEAR_SIGMA**2):
+        if not (math.isfinite(left[i]) and max(of_u, of_v) * min(left[i], expected[i]) < CLEAR_SIGMA**2):
             continue
         tried += 1
         pattern = known.signal[z] * min(max(gain, 0.0), 1.0) ** 2
-        if found.state[i] != CONVERGED or not left[i] < max(LOST_SHARE * pattern, 1.5 * noise):
+        if found.state[i] != CONVERGED or not left[i] < max(LOST_SHARE * pattern, 1.5 * expected[i]):
             continue
         of_both = 1 - known.later + known.later / area(found.p, i)
-        error = of_both * expected.felt[i] / max(gain, MIN_NOISE_GAIN) ** 2
+        error = of_both * expected[i] / max(gain, MIN_NOISE_GAIN) ** 2
         out[0, count] = known.signal[z]
-        out[1, count] = left[i] / noise
+        out[1, count] = left[i] / expected[i]
         out[2, count] = math.sqrt(2 / max(known.pixels[z], 1.0))
-        out[3, count] = found.left[i] / (known.pixels[z] * noise)
+        out[3, count] = found.left[i] / (known.pixels[z] * expected[i])
         out[4, count] = found.cubic[i, 0] / (error * of_u)
         out[5, count] = found.cubic[i, 1] / (error * of_v)
-        bends = found.bending[i] * max(gain, MIN_NOISE_GAIN) ** 2 / left[i] * (noise / expected.felt[i])
+        bends = found.bending[i] * max(gain, MIN_NOISE_GAIN) ** 2 / left[i]
         out[6, count], out[7, count] = bends / max(of_u, of_v), bends / (of_u + of_v)
         count += 1
     return count if count >= MIN_MATCHED * tried else 0

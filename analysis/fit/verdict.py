@@ -10,7 +10,7 @@ from typing import Any
 
 from analysis.compiled.loops import helper, inlined
 from analysis.field import Status
-from analysis.fit.assembly import MIN_NOISE_GAIN, ExpectedNoise
+from analysis.fit.assembly import MIN_NOISE_GAIN
 from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, PooledError, ReferenceArgs, VerdictArgs
 from analysis.fit.validity import (
     AGREES,
@@ -42,8 +42,7 @@ NO_PATTERN = int(Status.NO_PATTERN)
 
 @helper
 def judge(
-    found: OutArgs, left: Any, expected: ExpectedNoise, common: PooledError, known: ReferenceArgs, rule: VerdictArgs,
-    out: Any,
+    found: OutArgs, left: Any, expected: Any, common: PooledError, known: ReferenceArgs, rule: VerdictArgs, out: Any
 ) -> None:  # fmt: skip
     """Write a status for each measured ZOI.
 
@@ -51,10 +50,8 @@ def judge(
     ----------
     found : OutArgs
         Of the iteration.
-    left : (A,), GL^2
-        Variance a pixel that the fit leaves.
-    expected : ExpectedNoise
-        From the noise of both images as stated.
+    left, expected : (A,), GL^2
+        Variance a pixel that the fit leaves, and expected from the noise of both images as stated.
     common : PooledError
         A ZOI that leaves no more than its like is not refused for it.
     known : ReferenceArgs
@@ -65,15 +62,15 @@ def judge(
     if colour < COLOURED:
         colour = 1.0
     for z in range(len(out)):
-        gain, stated, felt = found.nuisance[z, 0], expected.left[z], expected.felt[z]
+        gain = found.nuisance[z, 0]
         spread = math.sqrt(2 / max(known.pixels[z], 1.0))
         chance = NOISE_FACTOR + CHANCE * spread
         if not rule.noise_known:
             chance = max(chance, UNKNOWN_NOISE_FACTOR if common.scatter == 0 else POOLED_NOISE_FACTOR)
             chance *= min(common.ratio[z], 1.0)
         pattern = known.signal[z] * min(gain, 1.0) ** 2
-        error = common.forgiven[z] * stated
-        noise = min(stated, max(error, AGREES[0] * stated)) if rule.noise_known else stated
+        error = common.forgiven[z] * expected[z]
+        noise = min(expected[z], max(error, AGREES[0] * expected[z])) if rule.noise_known else expected[z]
         allowed = chance * noise
         if common.forgiven[z] > 1:
             usual = error * (NOISE_FACTOR + CHANCE * max(common.scatter, spread))
@@ -82,9 +79,9 @@ def judge(
             out[z] = OUTSIDE
         elif not left[z] <= allowed + LOST_SHARE * pattern:
             out[z] = LOST
-        elif found.state[z] != CONVERGED or _slow(found, z, known, felt, rule):
+        elif found.state[z] != CONVERGED or _slow(found, z, known, expected[z], rule):
             out[z] = NOT_CONVERGED
-        elif _is_empty(known, z, left[z], stated, error) or _is_noise(known, z, left[z], stated):
+        elif _is_empty(known, z, left[z], expected[z], error) or _is_noise(known, z, left[z], expected[z]):
             out[z] = NO_PATTERN
         elif not (MIN_GAIN < gain < MAX_GAIN and left[z] <= allowed + MODEL_SHARE * pattern):
             out[z] = POOR_MATCH
@@ -92,7 +89,7 @@ def judge(
             by_noise = NOISE_FACTOR * max(noise, error) if rule.noise_known else allowed
             misfit = _used(left[z], by_noise, allowed + MODEL_SHARE * pattern - by_noise)
             many = colour if common.forgiven[z] > 1 else 1.0
-            variance = max(noise, left[z]) * (felt / stated) / max(gain, MIN_NOISE_GAIN) ** 2
+            variance = max(noise, left[z]) / max(gain, MIN_NOISE_GAIN) ** 2
             bent = _bent(found, z, known, variance, common.bent, many, rule)
             doubt = (misfit + bent) * _beyond(known, z, rule.far)
             out[z] = OK if doubt <= 1 else POOR_MATCH if misfit > bent else UNEVEN

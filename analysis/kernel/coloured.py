@@ -86,7 +86,7 @@ def beside_strain(solution: Solution, ok: NDArray[np.bool_]) -> float | None:
     ready = solution.reference.prepared
     dx, dy = (_in_parts(zois_of(ready.images[k], ready.origins[which], size)) for k in (0, 1))
     rest = left - _shifts(left, dx, dy)
-    noise = float(np.median(solution.expected(which, solution.found.nuisance[which]).left))
+    noise = float(np.median(solution.expected(which, solution.found.nuisance[which]).felt))
     free = 2 * left[..., 0].size
     explained = np.sum(left**2) - np.sum(rest**2) - free * noise
     excess = np.sum(left**2) - left.size * noise

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,10 @@ from analysis.kernel.coloured import (
     own_error,
 )
 from analysis.kernel.solve import Solution
+
+if TYPE_CHECKING:
+    from analysis.fit.assembly import ExpectedNoise
+    from analysis.fit.kernel_args import PooledError
 
 Floats = NDArray[np.float64]
 Covariance = NDArray[np.float32]
@@ -162,8 +166,11 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     if common is None or solution.retried or np.count_nonzero(ok) < FEW_REFUSED * len(ok):
         common = solution.pooled(np.flatnonzero(ok))
     if common is not None:
-        seen, colour, ratio, some_left = common.colour, common.colour.repeat(3), common.ratio, None
-        over = common.usual if ok.all() else float(np.median(ratio[ok]))
+        expected = solution.expected(np.s_[:], solution.found.nuisance)
+        share = _left_of_felt(solution, common, expected)
+        ratio, usual, some_left = common.ratio / share, float(np.median(share[ok])), None
+        seen = common.colour * usual
+        colour, over = seen.repeat(3), common.usual / usual if ok.all() else float(np.median(ratio[ok]))
         doubtful = max(colour.max(), over) > DOUBTFUL and not (common.apart or solution.had_lines)
         rest = beside_strain(solution, ok) if doubtful else None
         if rest is not None:
@@ -176,7 +183,7 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
         elif np.abs(np.log(seen)).max() > np.log(COLOURED):
             some_left = left_of_some(solution, ok)
             colour = colour * by_frequency(solution.reference, some_left[1])
-        whole = ratio * solution.expected(np.s_[:], solution.found.nuisance).felt
+        whole = ratio * expected.felt
         parts = _parted(whole, reference * gain**2, gain, solution)
         return _Noise(*parts, colour, math.sqrt(over), seen, some_left)
     if solution.noise is not None or not ok.any():
@@ -185,6 +192,15 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     found = max(float(np.median(left[ok])), solution.rounding)
     whole = np.full(len(ok), found)
     return _Noise(*_parted(whole, reference, np.ones(len(ok)), solution), white, float("nan"), white[:2])
+
+
+def _left_of_felt(solution: Solution, common: PooledError, expected: ExpectedNoise) -> Floats:
+    """By how much less noise the fits leave than they feel, (A,) variances: ``common`` takes one for the other.
+
+    1 where the noise as given stands, since nothing is taken from what is left.
+    """
+    stands = solution.is_given and bool((common.ratio == 1).all())
+    return np.ones(len(common.ratio)) if stands else expected.left / expected.felt
 
 
 def _parted(whole: Floats, reference: Floats, gain: Floats, solution: Solution) -> tuple[Floats, Floats]:

@@ -224,7 +224,7 @@ class Solution:
         from analysis.fit.verdict import judge
 
         reference, ready, settings = self.reference, self.reference.prepared, self.reference.settings
-        known, expected = self._known, self.expected(which, found.nuisance)
+        known, expected = self._known, self.expected(which, found.nuisance).felt
         far = CENTRE_VARIANCE[settings.order - 1]
         corner_steps = math.inf if settings.estimator == "phase" else CORNER_STEPS
         rule = VerdictArgs(
@@ -242,11 +242,10 @@ class Solution:
     def pooled(self, which: NDArray[np.intp]) -> PooledError | None:
         """What the fits of the ZOIs ``which``, as they are kept, leave in common."""
         found = self.found.at(which)
-        return self._pooled(which, found, self._left(which, found), self.expected(which, found.nuisance))
+        expected = self.expected(which, found.nuisance).felt
+        return self._pooled(which, found, self._left(which, found), expected)
 
-    def _pooled(
-        self, which: Places, found: OutArgs, left: Floats, expected: ExpectedNoise
-    ) -> PooledError | None:
+    def _pooled(self, which: Places, found: OutArgs, left: Floats, expected: Floats) -> PooledError | None:
         from analysis.fit.pooling import pooled
 
         places = np.arange(len(self.guess))[which]

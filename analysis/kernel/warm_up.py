@@ -217,8 +217,8 @@ def _rest() -> None:
         ReferenceArgs(none, none, pairs, none, np.ones(2), 1.0, 1.0, none, 0.5),
     )
     rule = VerdictArgs(True, np.empty(2), 1.0, 0.05, 4.0, 6.0)
-    judge(found, none, ExpectedNoise(none, none), PooledError.none(0), known, rule, np.empty(0, np.uint8))
-    explained(found, none, ExpectedNoise(none, none), known, np.empty(0, np.intp), 1, pairs)
+    judge(found, none, none, PooledError.none(0), known, rule, np.empty(0, np.uint8))
+    explained(found, none, none, known, np.empty(0, np.intp), 1, pairs)
     medians(np.ones((2, 2)))
     weigh_blur(single, single, single)
     expect(*(np.ones(2), (0.5, 0.5), np.ones(2), np.ones(2), 0.0), ExpectedNoise(np.empty(2), np.empty(2)))

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from analysis import KernelSettings, PhaseKernel, Roi, Status, ZoiGrid
-from analysis.fit.assembly import ExpectedNoise
 from analysis.fit.kernel_args import CONVERGED, OutArgs, PooledError, ReferenceArgs, VerdictArgs
 from analysis.fit.validity import information
 from analysis.fit.verdict import judge
@@ -87,7 +86,7 @@ def test_a_fit_that_follows_the_noise_of_the_reference(
         information_over_noise * one, 0.5,
     )  # fmt: skip
     rule = VerdictArgs(True, np.array([1.5, 0.5]), 5.0, 0.05, 4.0, 6.0)
-    judge(found, left * one, ExpectedNoise(one, one), PooledError.none(1), known, rule, out)
+    judge(found, left * one, one, PooledError.none(1), known, rule, out)
     assert Status(int(out[0])) == status
 
 
@@ -122,5 +121,5 @@ def test_a_slow_fit_that_seems_certain_is_on_a_corner(
     unit = np.full((1, 2), sigma**2 / beyond)
     known = ReferenceArgs(900 * one, 350 * one, unit, sigma * one, np.ones(2), 1.5, 1.0, 100 * one, 0.5)
     rule = VerdictArgs(True, np.array([1.5, 0.5]), 5.0, 0.05, 2.5, 6.0)
-    judge(found, one, ExpectedNoise(one, one), PooledError.none(1), known, rule, out)
+    judge(found, one, one, PooledError.none(1), known, rule, out)
     assert Status(int(out[0])) == status

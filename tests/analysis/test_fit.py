@@ -254,8 +254,7 @@ def verdict(
         ),
         VerdictArgs(known, np.array([1.5, 0.5]), 5.0, limit, 4.0, 6.0),
     )
-    noise = ExpectedNoise(one * expected, one * expected)
-    judge(found, one * left, noise, common or PooledError.none(1), zoi, rule, out)
+    judge(found, one * left, one * expected, common or PooledError.none(1), zoi, rule, out)
     return int(out[0])
 
 

@@ -171,7 +171,7 @@ def test_noise_that_grows_with_the_light_is_taken_at_the_light_of_the_image(
     fields = [kernel.measure(noisy(clean), noise=model) for _ in range(20)]
     scatter = np.sqrt(np.mean(np.stack([f.u for f in fields]).var(axis=0, ddof=1)))
     assert np.sqrt(np.mean(fields[0].sigma("u", "current") ** 2)) == pytest.approx(scatter, rel=0.06)
-    assert np.mean(fields[0].residual) == pytest.approx(0.95, abs=0.05)  # the spline smooths a little
+    assert np.mean(fields[0].residual) == pytest.approx(0.97, abs=0.06)  # the spline smooths a little
 
 
 @pytest.mark.parametrize("gain", [0.7, 1.4])

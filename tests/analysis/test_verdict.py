@@ -8,7 +8,6 @@ import pytest
 from analysis import KernelSettings, NoiseModel, PhaseKernel, Roi, Status, ZoiGrid
 from analysis.evaluate import AreaGauge
 from analysis.field import StrainField
-from analysis.fit.assembly import ExpectedNoise
 from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, PooledError, ReferenceArgs, VerdictArgs
 from analysis.fit.verdict import judge
 from analysis.kernel.images import as_model
@@ -46,7 +45,7 @@ def verdict(
     rule = VerdictArgs(noise_known, np.array([1.0, 1.0]), 32 / 6, 0.05, 4.0, 6.0)
     out = np.empty(1, np.uint8)
     common = PooledError.none(1)._replace(forgiven=np.full(1, usual))
-    judge(found, found.left, ExpectedNoise(*np.full((2, 1), EXPECTED)), common, known, rule, out)
+    judge(found, found.left, np.full(1, EXPECTED), common, known, rule, out)
     return Status(int(out[0]))
 
 
