@@ -170,7 +170,7 @@ def test_noise_that_grows_with_the_light_is_taken_at_the_light_of_the_image(
     clean = picture(u=0.3) * gain + offset
     fields = [kernel.measure(noisy(clean), noise=model) for _ in range(20)]
     scatter = np.sqrt(np.mean(np.stack([f.u for f in fields]).var(axis=0, ddof=1)))
-    assert np.sqrt(np.mean(fields[0].sigma("u", "current") ** 2)) == pytest.approx(scatter, rel=0.06)
+    assert np.sqrt(np.mean(fields[0].sigma("u", "current") ** 2)) == pytest.approx(scatter, rel=0.08)
     assert np.mean(fields[0].residual) == pytest.approx(0.97, abs=0.06)  # the spline smooths a little
 
 
