@@ -221,9 +221,8 @@ def test_letters_that_an_older_opencv_has_not_are_written_plainly(monkeypatch: p
 
 
 def test_cells_of_a_coarse_overlay_lie_where_their_zois_have_moved() -> None:
-    grid = ZoiGrid.cover(
-        Roi(10, 20, 72, 48), size=24, step=12
-    )  # 5 columns from x = 21.5, 3 rows from y = 31.5
+    # 5 columns from x = 21.5 and 3 rows from y = 31.5.
+    grid = ZoiGrid.cover(Roi(10, 20, 72, 48), size=24, step=12)
     cells = np.zeros((*grid.shape, 4), np.uint8)
     cells[-1, -1] = 0, 0, 255, 255  # blue, nothing of the picture through it
     picture = np.zeros((50, 60, 3), np.uint8)

@@ -228,8 +228,8 @@ def test_the_strain_rate_is_held_through_yield(tmp_path: Path) -> None:
     """Within the 20 % of ISO 6892-1 over a second, where the machine alone would be 40 % off."""
     outcome = main(str(tmp_path / "run"), RATE, UNTIL)
     assert outcome.exit_code == 0
-    late = [e.text for e in outcome.run_state.event_log.events() if "late (p95)" in e.text]
-    if late:
+    late = [e.text for e in outcome.run_state.event_log.events() if "another program takes" in e.text]
+    if late:  # a program that is late by itself fails
         pytest.skip(f"this machine is too busy for the control of a rate: {late[0]}")
     time_steps, specimen = outcome.run_state.history.time_steps, outcome.rig.specimen
     assert specimen is not None
