@@ -36,6 +36,11 @@ class ExpectedNoise(NamedTuple):
     left: NDArray[np.float64]
     felt: NDArray[np.float64]
 
+    @property
+    def share(self) -> NDArray[np.float64]:
+        """Left over felt, (A,)."""
+        return np.asarray(self.left / self.felt)
+
 
 @helper
 def expect(gain: Any, kept: Any, reference: Any, current: Any, least: Any, out: ExpectedNoise) -> None:
@@ -77,7 +82,7 @@ def weigh(
     reference, current : (A,), GL^2
         Variance a pixel of the two images.
     share : (A,)
-        ``ExpectedNoise``, left over felt.
+        ``ExpectedNoise.share``.
     values : (A, modes)
         Parameters: the noise of a picture that is stretched is a mean over more pixels (``area``).
     residual : (A,) float32, written

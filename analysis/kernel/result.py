@@ -82,7 +82,8 @@ def field_of(solution: Solution, predicted: PredictedMotion | None = None) -> St
     reference, found = solution.reference, solution.found
     ok = solution.status == Status.OK
     gain = found.nuisance[:, 0]
-    noise, expected = _noise_parts(solution, ok), solution.expected(np.s_[:], found.nuisance)
+    expected = solution.expected(np.s_[:], found.nuisance)
+    noise = _noise_parts(solution, ok, expected)
     residual, first, whole = np.empty((3, len(ok)), np.float32)
     weigh(
         ok,
@@ -91,7 +92,7 @@ def field_of(solution: Solution, predicted: PredictedMotion | None = None) -> St
         gain,
         noise.reference,
         noise.current,
-        expected.left / expected.felt,
+        expected.share,
         found.p,
         residual,
         first,
@@ -158,15 +159,17 @@ def _motion(solution: Solution, values: Floats, expected: PredictedMotion) -> Mo
     return motion_after(expected.motion, values, expected.values, solution.tolerance.trust, lever)
 
 
-def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
-    """The noise of the two images: together what the fits leave, of which the reference has what was given."""
+def _noise_parts(solution: Solution, ok: NDArray[np.bool_], expected: ExpectedNoise) -> _Noise:
+    """The noise of the two images: together what the fits leave, of which the reference has what was given.
+
+    ``expected`` is the noise as stated.
+    """
     gain, white = solution.found.nuisance[:, 0], np.ones(6)
     reference, current = solution.variances(np.s_[:], solution.found.nuisance)
     common = solution.common
     if common is None or solution.retried or np.count_nonzero(ok) < FEW_REFUSED * len(ok):
         common = solution.pooled(np.flatnonzero(ok))
     if common is not None:
-        expected = solution.expected(np.s_[:], solution.found.nuisance)
         share = _left_of_felt(solution, common, expected)
         ratio, usual, some_left = common.ratio / share, float(np.median(share[ok])), None
         seen = common.colour * usual
@@ -200,7 +203,7 @@ def _left_of_felt(solution: Solution, common: PooledError, expected: ExpectedNoi
     1 where the noise as given stands, since nothing is taken from what is left.
     """
     stands = solution.is_given and bool((common.ratio == 1).all())
-    return np.ones(len(common.ratio)) if stands else expected.left / expected.felt
+    return np.ones(len(common.ratio)) if stands else expected.share
 
 
 def _parted(whole: Floats, reference: Floats, gain: Floats, solution: Solution) -> tuple[Floats, Floats]:

@@ -305,8 +305,9 @@ class Solution:
             reference = model.variance(level)
         if own is None:
             return reference, reference
-        gain, constant = np.maximum(light[:, 0], 0), self.constant_level(light)
-        return reference, own.variance(level if own.slope == 0 else gain * level + constant)
+        if own.slope > 0:
+            level = np.maximum(light[:, 0], 0) * level + self.constant_level(light)
+        return reference, own.variance(level)
 
     def constant_level(self, light: Floats) -> Floats:
         """Grey level of the image where the reference is black, in ``light`` as in ``variances``, (B,), GL."""

@@ -221,7 +221,8 @@ def _rest() -> None:
     explained(found, none, none, known, np.empty(0, np.intp), 1, pairs)
     medians(np.ones((2, 2)))
     weigh_blur(single, single, single)
-    expect(*(np.ones(2), (0.5, 0.5), np.ones(2), np.ones(2), 0.0), ExpectedNoise(np.empty(2), np.empty(2)))
+    expected = ExpectedNoise(np.empty(2), np.empty(2))
+    expect(np.ones(2), (0.5, 0.5), np.ones(2), np.ones(2), 0.0, expected)
     origins, p, gain = np.empty((0, 2), np.int64), np.empty((0, 6)), np.empty((2, 2))[:, 0]
     weigh(np.empty(0, np.bool_), none, none, gain, none, none, none, p, single, single, single)
     warp_zois(_no_picture(), np.empty(18, np.float32), origins, 32, p, np.empty((0, 32, 32), np.float32))
