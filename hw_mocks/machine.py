@@ -112,11 +112,11 @@ class Machine:
                 with (
                     contextlib.suppress(OSError),
                     connection,
-                    connection.makefile("rw", newline="\n") as lines,
+                    # For reading alone: a text file that is also written to forgets what it has read ahead.
+                    connection.makefile("r", newline="\n", encoding="utf-8", errors="replace") as lines,
                 ):
                     for line in lines:
-                        lines.write(self._answer(line) + "\n")
-                        lines.flush()
+                        connection.sendall(f"{self._answer(line)}\n".encode())
 
     def _answer(self, line: str) -> str:
         word, _, value = line.strip().partition(" ")

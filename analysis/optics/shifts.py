@@ -136,7 +136,8 @@ def _solved(start: Floats, free: list[int], count: int, pictures: Sequence[_Pict
             for one, motion in zip(pictures, motions, strict=True)
         ]
         normal = np.sum([step.lens.T @ step.lens for step in steps], axis=0)
-        if not np.linalg.cond(normal * np.outer(*2 * [1 / np.sqrt(np.diag(normal))])) < _WORST:
+        unit = np.sqrt(np.diag(normal))
+        if not unit.min() > 0 or not np.linalg.cond(normal / np.outer(unit, unit)) < _WORST:
             raise ValueError(
                 "the shifts do not show the lens; shift by a tenth of the picture, along x and along y"
             )

@@ -90,8 +90,8 @@ def _places(field: StrainField) -> Floats:
 
 
 def _box(places: Floats) -> tuple[float, float, float, float]:
-    (left, top), (right, bottom) = places.min(axis=0), places.max(axis=0)
-    return max(float(left), 0.0), max(float(top), 0.0), float(right - left), float(bottom - top)
+    (left, top), (right, bottom) = np.maximum(places.min(axis=0), 0.0), places.max(axis=0)
+    return float(left), float(top), float(right - left), float(bottom - top)
 
 
 def from_boards(pictures: Iterable[NDArray[Any]], board: Board, *, k3: bool = False) -> LensCalibration:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import subprocess
 import sys
 import time
@@ -180,3 +181,14 @@ def test_what_an_address_gives_is_what_it_says() -> None:
     assert not options.flag("lockstep", True) and options.flag("other", True)
     assert options.choice("mode", ("a", "b"), "a") == "b"
     options.done()
+
+
+def test_limits_of_opencv_stand_in_the_environment_before_it_is_loaded() -> None:
+    code = (
+        "import os; from acquire.cv2_loader import load_cv2; cv2 = load_cv2()\n"
+        "print(*(os.environ['OPENCV_' + name] for name in ('IO_MAX_IMAGE_PIXELS', 'VIDEOIO_V4L_SELECT_TIMEOUT')),"
+        " getattr(cv2.utils, 'logging', cv2).getLogLevel())"
+    )
+    plain = {key: value for key, value in os.environ.items() if not key.startswith("OPENCV_")}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, env=plain)
+    assert done.stdout.split() == ["268435456", "1", "0"], done.stderr

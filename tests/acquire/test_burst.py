@@ -13,9 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from acquire.burst.accumulate import BurstAccumulator, average_bursts, burst_of, motion_between_frames
+from acquire.burst.accumulate import (
+    BurstAccumulator,
+    _solve,
+    average_bursts,
+    burst_of,
+    motion_between_frames,
+)
 from acquire.burst.flat_field import FlatField, load_mean, save_mean
 from acquire.errors import ConfigError, DataError
+from acquire.files.picture import write_picture
 from acquire.frame import Burst, Frame, frozen
 
 
@@ -265,3 +272,51 @@ def test_means_are_kept_to_the_last_bit(tmp_path: Path) -> None:
     (tmp_path / "text.tif").write_text("no picture")
     with pytest.raises(DataError, match="not an image"):
         load_mean(str(tmp_path / "text.tif"))
+
+
+def test_the_displacement_of_a_tile_from_its_sums() -> None:
+    """Of 100 pixels with a noise of 0.2: 1 is taken off the squares, 2 noise^2 (xx + yy) / D off the motion's."""
+    assert _solve(101, 0, 101, 10, 0, 100, noise=0.2) == pytest.approx(math.sqrt(0.01 - 0.0016))
+    assert _solve(101, 0, 101, 0, -10, 100, noise=0.2) == pytest.approx(math.sqrt(0.01 - 0.0016))
+    u, v = 100 * 10 / 6400, -60 * 10 / 6400
+    assert _solve(101, 60, 101, 10, 0, 100, noise=0.2) == pytest.approx(math.sqrt(u * u + v * v - 0.0025))
+    assert _solve(101, 0, 101, 1, 1, 100, noise=0.2) == 0.0, "no more than noise shows"
+
+
+@pytest.mark.parametrize(
+    ("square", "noise", "seen"), [(2.0, 0.2, False), (2.1, 0.2, True), (1.0, 0.0, False), (1.1, 0.0, True)]
+)
+def test_contrast_is_seen_above_the_noise_and_a_tenth_of_a_grey_level_a_pixel(
+    square: float, noise: float, seen: bool
+) -> None:
+    assert math.isnan(_solve(square, 0, square, 0.1, 0, 100, noise=noise)) != seen
+
+
+def test_a_frame_of_the_very_instant_of_the_command_counts() -> None:
+    bursts = list(average_bursts([small(i) for i in range(6)], 2, not_before=small(2).t))
+    assert [b.first_index for b in bursts] == [2, 4]
+
+
+def test_the_longest_burst_has_65536_frames() -> None:
+    assert list(average_bursts([], 65536)) == []
+
+
+def test_a_pixel_is_useless_below_a_twentieth_of_the_median_of_the_flat() -> None:
+    flat = np.full((5, 5), 1000.0, np.float32)
+    flat[0, :3] = (49.0, 51.0, 5000.0)
+    field = FlatField.from_images(None, flat)
+    assert np.argwhere(field.useless).tolist() == [[0, 0]]
+    assert field.gain[0, :4].tolist() == pytest.approx([1.0, 1000 / 51, 0.2, 1.0])
+    assert not field.dark.any()
+
+
+@pytest.mark.parametrize(
+    "image", [np.ones((4, 5, 3), np.uint8), np.full((4, 5), np.nan, np.float32)], ids=["colour", "nan"]
+)
+def test_a_colour_picture_or_one_without_numbers_is_no_mean(tmp_path: Path, image: NDArray[Any]) -> None:
+    write_picture(tmp_path / "dark.tif", image)
+    with pytest.raises(DataError, match=r"dark\.tif: is not a grey TIFF; take the frame anew"):
+        load_mean(str(tmp_path / "dark.tif"))
+    write_picture(tmp_path / "grey.tif", np.full((4, 5), 7, np.uint8))
+    mean = load_mean(str(tmp_path / "grey.tif"))
+    assert mean is not None and mean.dtype == np.float32 and np.all(mean == 7)

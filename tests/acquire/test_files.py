@@ -11,7 +11,14 @@ import pytest
 
 from acquire.camera.opening import with_scheme
 from acquire.errors import DataError
-from acquire.files.picture import check_regular, decode, read_bytes, read_picture, write_picture
+from acquire.files.picture import (
+    check_regular,
+    decode,
+    picture_source,
+    read_bytes,
+    read_picture,
+    write_picture,
+)
 from acquire.printable import printable
 
 
@@ -135,3 +142,41 @@ def test_the_folder_of_a_run_is_its_session(tmp_path: Path) -> None:
     assert with_scheme(str(run)) == f"session:{run}/session.h5"
     assert with_scheme(f"{run}?fps=5") == f"session:{run}/session.h5?fps=5"
     assert with_scheme(str(shots)) == f"files:{shots}"
+
+
+def test_a_file_of_two_gigabytes_is_decoded_by_its_name(tmp_path: Path) -> None:
+    """OpenCV takes no more of them from memory; nothing of it is read here."""
+    path, odd = tmp_path / "a.tif", Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff.tif"))
+    for one in (path, odd):
+        with one.open("wb") as file:
+            file.truncate(2**31)
+    assert picture_source(path) == str(path)
+    with pytest.raises(DataError, match="more than 2 GB is read by its name, which must be UTF-8; rename it"):
+        picture_source(odd)
+    with pytest.raises(DataError, match=r"2147 MB are more than the 2147 MB such a file may have"):
+        read_bytes(path)
+
+
+def test_a_cut_off_jpeg_is_seen_by_its_end(tmp_path: Path) -> None:
+    path, content = tmp_path / "a.jpg", cv2.imencode(".jpg", smooth())[1].tobytes()
+    for more in (b"", b"\0" * 20):
+        path.write_bytes(content + more)
+        assert read_picture(path).shape == (480, 640)
+    for broken in (content[:-1], content + b"x", content[:-2]):
+        path.write_bytes(broken)
+        with pytest.raises(DataError, match=r"a\.jpg: not an image, or cut off"):
+            read_picture(path)
+
+
+def test_a_picture_is_written_as_its_name_says(tmp_path: Path) -> None:
+    for name in ("a.png", "a.TIF"):
+        write_picture(tmp_path / name, smooth(np.uint16))
+        assert np.array_equal(read_picture(tmp_path / name), smooth(np.uint16))
+    for name, words in (
+        ("a.xyz", "no format of pictures has such an ending"),
+        ("no/a.png", "cannot be written"),
+    ):
+        with pytest.raises(DataError, match=words):
+            write_picture(tmp_path / name, smooth())
+    with pytest.raises(DataError, match="cannot be written: File exists; look at the folder and the disk"):
+        write_picture(tmp_path / "a.png", smooth())

@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -16,7 +17,21 @@ import pytest
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.hdf5 import COMPRESSED, DiskSync, PictureReader, PictureStack, compile_loops, create_file
+from acquire.hdf5 import (
+    COMPRESSED,
+    DiskSync,
+    JsonField,
+    PaddedFile,
+    PictureReader,
+    PictureStack,
+    check_size,
+    compile_loops,
+    create_file,
+    read_superblock,
+    reason,
+    stored_rows,
+    to_json,
+)
 from acquire.hdf5 import disk as pace_module
 from acquire.hdf5.damage import METADATA_BYTES
 from acquire.hdf5.disk import FlushTimer, forecast, free_bytes, network_share
@@ -380,3 +395,115 @@ def test_a_disk_that_fails_ends_the_recording_and_one_that_cannot_is_let_be(
         for number in range(5):
             session.write_frame(frame(number))
         session.close()
+
+
+def test_the_nearest_folder_that_is_there_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Path] = []
+
+    def usage(place: Path) -> Any:
+        asked.append(place)
+        return SimpleNamespace(free=7)
+
+    monkeypatch.setattr(pace_module.shutil, "disk_usage", usage)
+    (tmp_path / "there.h5").touch()
+    for name in ("there.h5", "a/b/session.h5", "."):
+        assert free_bytes(tmp_path / name) == 7
+    assert free_bytes("/no such folder/a") == 7
+    assert asked == [tmp_path / "there.h5", tmp_path, tmp_path, Path("/")]
+
+
+@pytest.mark.parametrize(
+    "kind", ["nfs", "nfs4", "cifs", "smb3", "smbfs", "fuse.sshfs", "9p", "afs", "ceph", "davfs"]
+)
+def test_kinds_of_network_shares(tmp_path: Path, kind: str) -> None:
+    mounts = tmp_path / "mounts"
+    mounts.write_text(f"short line\nx / {kind} rw 0 0\n")
+    assert network_share("/a", mounts) == kind
+    mounts.write_text(f"x / {kind}x rw 0 0\n")
+    assert network_share("/a", mounts) is None
+
+
+def test_what_is_recorded_is_on_the_disk_within_a_second() -> None:
+    """Or after 32 MiB, of which the last 8 stay in memory; the last time is waited for, but not for ever."""
+    assert (pace_module.SYNC_S, pace_module.SYNC_BYTES, pace_module.KEPT_BYTES) == (1.0, 2**25, 2**23)
+    assert pace_module.CLOSE_TIMEOUT_S == 10.0
+
+
+def test_rows_before_a_hole_are_those_that_are_stored(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        rows = file.create_dataset("rows", (12,), "f8", maxshape=(None,), chunks=(4,))
+        assert stored_rows(rows) == 0
+        rows[0:4] = rows[8:12] = 1.0
+        assert stored_rows(rows) == 4
+        rows[4:8] = 1.0
+        assert stored_rows(rows) == 12
+        wide = file.create_dataset("wide", (4, 6), "u1", maxshape=(None, 6), chunks=(2, 4))
+        wide[:, :] = 1
+        assert stored_rows(wide) == 4
+        holed = file.create_dataset("holed", (4, 6), "u1", maxshape=(None, 6), chunks=(2, 4))
+        holed[0:2, :] = 1
+        holed[2:4, 0:4] = 1
+        assert stored_rows(holed) == 2
+        assert stored_rows(file.create_dataset("flat", data=np.ones(5))) == 5
+        assert stored_rows(file.create_dataset("empty", (5,), "f8")) == 0
+
+
+def test_the_first_bytes_of_a_file_tell_its_size_and_whether_it_is_finished(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    file = create_file(path, lambda head: head.create_dataset("b", data=np.arange(1000)))
+    file.flush()
+    assert read_superblock(path).unfinished
+    file.close()
+    block = read_superblock(path)
+    assert (block.unfinished, block.size) == (False, path.stat().st_size)
+    check_size(path, block)
+    content = path.read_bytes()
+    path.write_bytes(content[:-1])
+    with pytest.raises(
+        DataError, match=rf"is truncated: {len(content) - 1} of {len(content)} bytes are there"
+    ):
+        check_size(path, block)
+    path.write_bytes(content[:47])
+    with pytest.raises(DataError, match="is truncated to 47 bytes; nothing in it can be read"):
+        read_superblock(path)
+    with PaddedFile(path, 60) as padded:
+        assert padded.read() == content[:47] + bytes(13)
+        assert padded.seek(-3, os.SEEK_END) == 57 and padded.read() == bytes(3)
+        assert padded.seek(5) == 5 and padded.seek(2, os.SEEK_CUR) == 7 and padded.read(2) == content[7:9]
+    with pytest.raises(DataError, match="is no regular file"):
+        read_superblock(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("field", "taken", "refused"),
+    [
+        (JsonField(int, 1, 3), [1, 3], [0, 4, True, 2.0, "2", None]),
+        (JsonField(float, 0, 1), [0, 0.5, 1], [-0.1, 1.1, True, math.nan, "0.5", None]),
+        (JsonField(float), [1e300, 5], [math.inf, math.nan]),
+        (JsonField(bool), [True, False], [0, 1, "true", None]),
+        (JsonField(str, words=("a", "b")), ["a", "b"], ["", "ab", None, 5]),
+        (JsonField(str), ["", "x"], [None, b"x"]),
+        (JsonField(dict), [{}], [[], None]),
+        (JsonField(int, missing=True), [None, 5], ["5"]),
+    ],
+)
+def test_what_a_value_in_json_may_be(field: JsonField, taken: list[Any], refused: list[Any]) -> None:
+    assert [field.takes(value) for value in taken] == [True] * len(taken)
+    assert [field.takes(value) for value in refused] == [False] * len(refused)
+
+
+def test_words_of_the_library_are_shortened() -> None:
+    assert reason(OSError("a (errno = 28, error message = 'No space left on device', buf = 0)")) == (
+        "No space left on device"
+    )
+    assert reason(OSError(5, "Input/output error")) == "Input/output error"
+    assert reason(RuntimeError("a\n  b" + "c" * 300)) == "a b" + "c" * 197
+
+
+def test_strict_json_of_what_python_has() -> None:
+    value = {
+        1: (math.inf, np.float32(0.5), np.arange(2)),
+        "a": {"b": math.nan, "c": Path("x")},
+        "d": [True, None],
+    }
+    assert to_json(value) == '{"1": [null, 0.5, [0, 1]], "a": {"b": null, "c": "x"}, "d": [true, null]}'

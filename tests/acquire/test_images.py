@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from acquire.events import Event
 from acquire.opencv import images
 from acquire.opencv.gray import to_gray
 from acquire.opencv.image_metadata import count_pages, read_stamps
-from acquire.opencv.images import MAX_REPORTED, natural_key, picture_times, read_image
+from acquire.opencv.images import MAX_REPORTED, natural_key, picture_names, picture_times, read_image
 
 
 def picture(value: int = 0, shape: tuple[int, ...] = (12, 16), dtype: type = np.uint8) -> NDArray[Any]:
@@ -295,3 +296,124 @@ def test_real_photographs_are_read_as_grey(data_dir: Path) -> None:
         frames = list(camera)
     assert len(frames) == 6
     assert {frame.image.shape for frame in frames} == {(1040, 400)}
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_one_plane_is_grey_whatever_is_asked_for(dtype: type) -> None:
+    one = picture(dtype=dtype)
+    for gray in (None, "luma", "r"):
+        assert np.array_equal(to_gray(one[:, :, np.newaxis], gray, "a.png"), one)
+        assert to_gray(one, gray, "a.png") is one
+
+
+def test_alpha_is_ignored() -> None:
+    one, other = picture(1), picture(9)
+    assert np.array_equal(to_gray(np.dstack([one, one, one, other]), None, "a.png"), one)
+    assert np.array_equal(to_gray(np.dstack([one, other, one, one]), "g", "a.png"), other)
+
+
+@pytest.mark.parametrize("shape", [(3, 4, 2), (3, 4, 5), (3,), (2, 3, 4, 3)])
+def test_what_is_neither_grey_nor_colour(shape: tuple[int, ...]) -> None:
+    with pytest.raises(DataError, match="is neither grey nor colour"):
+        to_gray(np.zeros(shape, np.uint8), "luma", "a.png")
+
+
+@pytest.mark.parametrize(
+    ("most", "words"),
+    [
+        (255, ""),
+        (256, "if the camera has 10 bits say bits=10"),
+        (1023, "if the camera has 10 bits say bits=10"),
+        (1024, "if the camera has 12 bits say bits=12"),
+        (4096, "if the camera has 14 bits say bits=14"),
+        (16384, ""),
+    ],
+)
+def test_the_bits_of_16_bit_files_are_guessed_from_the_largest_value(
+    tmp_path: Path, most: int, words: str
+) -> None:
+    path = write(tmp_path / "a.png", np.array([[0, most]], np.uint16))
+    (warning, *_) = (*open_camera(f"files:{path}").info.warnings, "")
+    assert words in warning and bool(words) == bool(warning)
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("fps=0", "a number from 1e-06 to 1e"),
+        ("bits=0", "a whole number from 1 to 16"),
+        ("white=65536", "a whole number from 1 to 65535"),
+        ("white=0", "a whole number from 1 to 65535"),
+    ],
+)
+def test_settings_of_files_beyond_their_bounds(tmp_path: Path, setting: str, words: str) -> None:
+    path = write(tmp_path / "a.png", picture())
+    with pytest.raises(ConfigError, match=words):
+        open_camera(f"files:{path}?{setting}")
+
+
+@pytest.mark.parametrize("suffix", [".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm", ".PNG"])
+def test_pictures_of_a_folder_by_their_endings(tmp_path: Path, suffix: str) -> None:
+    write(tmp_path / f"a{suffix}", picture())
+    (tmp_path / "a.csv").touch()
+    info = open_camera(f"files:{tmp_path}").info
+    assert (info.name, info.fps, info.clock) == (f"1 image file, a{suffix} ...", 1.0, "nominal")
+    assert info.pixel_format == suffix[1:].upper()
+
+
+def test_pages_have_their_places_and_two_of_a_name_no_times(tmp_path: Path) -> None:
+    write(tmp_path / "b.png", picture())
+    assert cv2.imwritemulti(str(tmp_path / "a.tif"), [picture(), picture()])
+    address = parse_address(f"files:{tmp_path}/*.*")
+    assert picture_names(address) == [("a.tif", 0), ("a.tif", 1), ("b.png", 0)]
+    with pytest.raises(ConfigError, match="share a name, or one has several pages"):
+        picture_times(address)
+    (tmp_path / "times.csv").write_text("1\n2\n")
+    with open_camera(f"files:{tmp_path}/*.[tp]*?stamps={tmp_path}/times.csv") as camera:
+        frames = iter(camera)
+        assert [next(frames).t for _ in range(2)] == [1.0, 2.0]
+        with pytest.raises(DataError, match="2 times, but there are more pictures"):
+            next(frames)
+
+
+@pytest.mark.parametrize(
+    ("text", "row"), [("a.png,5,1\nb.png,6,2\n", "row 1"), ("1\n\n2,3,4\n", "row 2"), ("x,y\na,b\n", "row 1")]
+)
+def test_a_time_stands_alone_or_behind_one_name(tmp_path: Path, text: str, row: str) -> None:
+    (tmp_path / "times.csv").write_text(text)
+    with pytest.raises(DataError, match=rf"{row} of the times is .*; wanted: \[file name,\] s"):
+        read_stamps(tmp_path / "times.csv", [Path("a.png"), Path("b.png")])
+
+
+def directories(order: str, *offsets: int, big: bool = False) -> bytes:
+    """A TIFF of empty directories, each with the offset of the next."""
+    head = b"II" if order == "<" else b"MM"
+    if big:
+        head += struct.pack(f"{order}HHHQ", 43, 8, 0, 16)
+        return head + b"".join(struct.pack(f"{order}QQ", 0, offset) for offset in offsets)
+    head += struct.pack(f"{order}HI", 42, 8)
+    return head + b"".join(struct.pack(f"{order}HI", 0, offset) for offset in offsets)
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_pages_of_a_tiff_are_its_directories(tmp_path: Path, order: str) -> None:
+    path = tmp_path / "a.tif"
+    for content, count in (
+        (directories(order, 0), 1),
+        (directories(order, 14, 20, 0), 3),
+        (directories(order, 0, big=True), 1),
+        (directories(order, 32, 48, 0, big=True), 3),
+        (b"no TIFF at all, whatever it is", 1),
+    ):
+        path.write_bytes(content)
+        assert count_pages(path) == count
+    for content in (directories(order, 14, 8), directories(order, 8), directories(order, 32, 16, big=True)):
+        path.write_bytes(content)
+        with pytest.raises(DataError, match="the directories of this TIFF run in a circle; save it anew"):
+            count_pages(path)
+    for content in (directories(order, 999), directories(order, 2**63, big=True)):
+        path.write_bytes(content)
+        with pytest.raises(DataError, match="a TIFF that is cut off"):
+            count_pages(path)
+    path.rename(tmp_path / "a.png")
+    assert count_pages(tmp_path / "a.png") == 1

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError, DataError
-from acquire.load_cell import stillness
+from acquire.load_cell import LoadStillness, stillness
 from acquire.load_cell.calibration import Point, fit, load, point, save
-from acquire.load_cell.check import ListenResult, LoadReport, listen, report_lines
+from acquire.load_cell.check import ListenResult, LoadReport, _as_of_now, listen, report_lines
 from acquire.load_cell.check import report as report_heard
 from acquire.load_cell.contract import NoLoadCell
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
@@ -303,3 +303,93 @@ def test_a_slow_cell_has_no_gaps_as_long_as_it_keeps_its_pace() -> None:
 def test_an_underload_is_as_far_beyond_the_range_as_an_overload() -> None:
     found = report(changed(steady(), 50, LoadSample(1.0, NAN, flags=LoadFlag.UNDERLOAD)))
     assert found.remarks == ("1 samples in overload or saturated: unload the cell, or check its wiring",)
+
+
+@pytest.mark.parametrize(
+    ("n", "moved", "reach", "still"),
+    [
+        (2, 0.0, 0.0, False),
+        (3, 0.0, 0.0, True),
+        (48, 3.5, 5.0, True),  # 5 sqrt(12 / 48) times the noise, and two digits
+        (48, 3.51, 5.0, False),
+        (48, -3.51, 5.0, False),
+        (1200, 2.0, 5.0, True),  # the noise, and two digits
+        (1200, 2.01, 5.0, False),
+        (48, 0.0, 11.5, True),  # ten times the noise, and three digits
+        (48, 0.0, 11.51, False),
+    ],
+)
+def test_how_far_a_still_load_may_go(n: int, moved: float, reach: float, still: bool) -> None:
+    assert LoadStillness(n, 100.0, 1.0, 0.5, moved, reach).still == still
+
+
+def test_of_twelve_values_a_single_odd_one_does_not_count() -> None:
+    def noise(n: int) -> float:
+        return stillness(np.arange(n), np.where(np.arange(n) == n // 2, 10.0, 0.0)).noise_N
+
+    assert noise(12) == 0.0
+    assert noise(11) == pytest.approx(math.sqrt(600 / 9 / 6)), (
+        "of fewer the mean square of second differences"
+    )
+
+
+def test_noise_is_the_median_of_second_differences() -> None:
+    """0, 1, 3, 3, 1, 0 and again: second differences of 1 and 2, of which the median is 1.5, 3/2 sigma over sqrt 6."""
+    values = [0.0, 1.0, 3.0, 3.0, 1.0, 0.0] * 3
+    second = np.abs(np.diff(values, 2))
+    expected = 1.4826 * float(np.median(second)) / math.sqrt(6)
+    assert stillness(np.arange(18), values).noise_N == pytest.approx(expected) and expected > 0
+    assert stillness(np.arange(18), values).step_N == 1.0
+
+
+@pytest.mark.parametrize(("rate", "slow"), [(4.9, True), (5.1, False)])
+def test_fewer_than_five_samples_a_second_are_few(rate: float, slow: bool) -> None:
+    assert any("samples a second" in one for one in report(steady(60, rate)).remarks) == slow
+
+
+@pytest.mark.parametrize(("count", "stuck"), [(19, False), (20, True)])
+def test_twenty_equal_values_are_a_frozen_display(count: int, stuck: bool) -> None:
+    found = report([LoadSample(k / 50, 7.0) for k in range(count)])
+    assert any("every value is the same" in one for one in found.remarks) == stuck
+    assert found.ready != stuck
+
+
+@pytest.mark.parametrize(("step", "taken"), [(0.5, False), (0.51, True), (-0.51, True)])
+def test_readings_must_change_by_five_times_their_scatter(step: float, taken: bool) -> None:
+    """Of the mean of a hundred readings with a noise of 1: 0.1."""
+    points = [Point(0.0, 100.0, 1.0, 100), Point(50.0, 100.0 + step, 1.0, 100)]
+    if taken:
+        assert fit(points).gain == pytest.approx(50 / step)
+        return
+    with pytest.raises(DataError, match="do not change with the load"):
+        fit(points)
+
+
+def test_a_point_is_the_mean_and_the_scatter_of_its_readings() -> None:
+    assert point(5.0, [1.0, 1.0, 4.0, 4.0, math.inf]) == Point(5.0, 2.5, 1.5, 4)
+
+
+def test_a_report_for_a_person() -> None:
+    samples = [LoadSample(k / 50, 100.0 + 0.5 * (k % 2), flags=LoadFlag.NET, raw=b"a\xff") for k in range(51)]
+    assert report_lines(report(samples, seconds=1.5)) == [
+        "51 samples in 1.5 s, 51 with a value",
+        "rate     50 1/s, jitter 0.00 ms, longest gap 500 ms",
+        "force    mean 100.245 N, from 100 to 100.5 N (20.1% of the capacity)",
+        "noise    0.605 N (one reading), 2 different values, step 0.5 N",
+        "moved    0.0714 N (means of a tenth of the time)",
+        "flag     net: 51",
+        "line     'a\\\\xff'",
+        "look     silence for the last 0.50 s: the device stopped sending; power, cable?",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "heard"),
+    [(99.1, 109.9, (100.0, 110.0)), (98.9, 109.9, (98.9, 109.9)), (100.0, 111.1, (100.0, 111.1))],
+)
+def test_samples_of_now_are_stamped_within_a_second_of_listening(
+    first: float, last: float, heard: tuple[float, float]
+) -> None:
+    found = _as_of_now((LoadSample(first, 1.0), LoadSample(last, 1.0)), 100.0, 110.0)
+    assert (found.began, found.ended) == heard and len(found.samples) == 2
+    assert _as_of_now((), 100.0, 110.0) == ListenResult((), 100.0, 110.0)

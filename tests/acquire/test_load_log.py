@@ -144,3 +144,34 @@ def test_tares_are_summed_up() -> None:
         log.take_event(Event(t, EventKind.TARE, "a cell", "", "info", data))
     log.take_event(Event(0.1, EventKind.NOTE, "operator", "", "info", {"step_N": 7.0}))
     assert [log.zero_at(t) for t in (0.4, 0.5, 2.0, 2.5, 9.0)] == [0.0, 100.0, 100.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(("gap_s", "known"), [(0.25, True), (0.2501, False)])
+def test_a_quarter_of_a_second_is_bridged_where_nothing_is_said(gap_s: float, known: bool) -> None:
+    log = LoadLog()
+    for t in (0.0, gap_s):
+        log.append(LoadSample(t, 8.0))
+    assert math.isnan(log.force_at(0.1)) != known
+
+
+def test_across_a_tare_forces_count_from_the_zero_of_the_first() -> None:
+    log = log_of((0.0, 100.0), (0.2, 100.0), (0.4, 0.0), (0.6, 10.0))
+    log.take_event(Event(0.3, EventKind.TARE, "a cell", "", "info", {"step_N": 100.0}))
+    assert log.forces_one_zero([0.1, 0.5]).tolist() == pytest.approx([100.0, 105.0])
+    assert log.forces_one_zero([0.5, 0.1]).tolist() == pytest.approx([5.0, 0.0])
+    assert log.forces_one_zero([]).shape == (0,)
+
+
+def test_samples_stamped_before_their_load_are_waited_for_no_shorter() -> None:
+    log = LoadLog(lag_s=-0.2)
+    for k in range(11):
+        log.append(LoadSample(k / 10, float(k)))
+    assert log.covers(1.0) and not log.covers(1.1)
+    assert log.force_at(1.0) == pytest.approx(8.0)
+
+
+def test_an_empty_log_covers_nothing_and_a_mean_has_both_its_ends() -> None:
+    log = LoadLog()
+    assert not log.covers(0.0) and len(log) == 0 and log.latest is None
+    log = log_of((0.0, 1.0), (0.1, 2.0), (0.2, 6.0))
+    assert log.mean(0.0, 0.2) == (3.0, 3) and log.mean(0.0, 0.19) == (1.5, 2)

@@ -84,3 +84,10 @@ def test_a_gap_begins_the_sum_anew_and_is_counted() -> None:
     assert [(burst.first_index, burst.last_index, burst.n) for burst in made] == [(2, 3, 2)]
     brief = made[0].without_pictures()
     assert (brief.nbytes, brief.first_index, brief.lost) == (0, 2, 0)
+
+
+@pytest.mark.parametrize(
+    ("bits", "n", "itemsize"), [(1, 65535, 2), (1, 65536, 4), (16, 1, 2), (15, 2, 2), (15, 3, 4)]
+)
+def test_a_sum_takes_two_bytes_up_to_65535(bits: int, n: int, itemsize: int) -> None:
+    assert sum_kind(bits, n).itemsize == itemsize

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -99,3 +102,108 @@ def test_signals_call_what_they_called_before() -> None:
 
 def test_the_group_of_a_file_is_known_where_it_has_a_name(tmp_path: Path) -> None:
     assert system.group_of(tmp_path / "nothing") == ""
+
+
+def blocked() -> set[signal.Signals]:
+    """What this thread does not get now."""
+    return {signal.Signals(number) for number in signal.pthread_sigmask(signal.SIG_BLOCK, [])}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="cannot block signals")
+def test_signals_are_blocked_within_and_as_before_after() -> None:
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])
+    try:
+        with pytest.raises(LookupError), system.blocked_signals(signal.SIGINT, signal.SIGTERM):
+            assert blocked() >= {signal.SIGINT, signal.SIGTERM, signal.SIGUSR1}
+            system.unblock_signals(signal.SIGTERM)
+            assert signal.SIGTERM not in blocked() and signal.SIGINT in blocked()
+            raise LookupError
+        assert blocked() == {*before, signal.SIGUSR1}
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@linux
+def test_a_thread_is_nicer_by_as_much_as_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[tuple[int, int, int]] = []
+    monkeypatch.setattr(system.threading, "get_native_id", lambda: 77)
+    monkeypatch.setattr(os, "getpriority", lambda which, who: 3)
+    monkeypatch.setattr(os, "setpriority", lambda which, who, nice: given.append((which, who, nice)))
+    system.lower_priority(4)
+    assert given == [(os.PRIO_PROCESS, 77, 7)]
+
+
+@linux
+def test_a_process_that_is_not_ours_runs_and_a_zombie_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers: dict[int, type[Exception] | None] = {
+        11: None,
+        12: PermissionError,
+        13: ProcessLookupError,
+        14: None,
+    }
+
+    def kill(pid: int, number: int) -> None:
+        assert number == 0, "it is only asked after"
+        if error := answers[pid]:
+            raise error
+
+    monkeypatch.setattr(os, "kill", kill)
+    proc(monkeypatch, **{"11_stat": stat("S", 1, 1), "14_stat": stat("Z", 1, 1)})
+    assert [system.is_running(pid) for pid in (11, 12, 13, 14)] == [True, True, False, False]
+
+
+def test_as_much_is_sent_as_fits_now() -> None:
+    ours, its = socket.socketpair()
+    ours.setblocking(False)
+    with ours, its:
+        assert system.send_some(ours, [memoryview(b"abc"), memoryview(b"de")]) == 5
+        assert its.recv(100) == b"abcde"
+        with pytest.raises(BlockingIOError):
+            while True:
+                system.send_some(ours, [memoryview(bytes(1 << 16))])
+
+
+def test_a_connection_is_closed_by_its_other_end_alone() -> None:
+    ours, its = socket.socketpair()
+    with ours:
+        its.sendall(b"still to be read")
+        its.close()
+        system.wait_until_closed(ours)
+        assert ours.recv(100) == b"still to be read"
+
+
+@linux
+def test_where_proc_tells_nothing_psutil_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    proc(monkeypatch, self_statm="no numbers")
+    monkeypatch.setitem(sys.modules, "psutil", None)
+    assert math.isnan(system.memory_MiB()) and system.processor_times() is None
+
+    class Process:
+        def memory_info(self) -> Any:
+            return SimpleNamespace(rss=5 * 2**20)
+
+        def children(self) -> list[Any]:
+            return [SimpleNamespace(cpu_times=lambda: SimpleNamespace(user=1.5, system=0.25))] * 2
+
+    class Times(NamedTuple):
+        user: float
+        system: float
+        idle: float
+        iowait: float
+
+    fake = SimpleNamespace(Process=Process, cpu_times=lambda: Times(10, 2, 900, 40), Error=OSError)
+    monkeypatch.setitem(sys.modules, "psutil", fake)
+    assert system.memory_MiB() == 5.0
+    assert system._times_by_psutil() == (12.0, 3.5)
+
+
+def test_a_pseudo_terminal_passes_bytes_as_they_are() -> None:
+    ours, port, name = system.open_pty()
+    try:
+        os.write(ours, b"\x03\r\xff\n")
+        assert os.read(port, 100) == b"\x03\r\xff\n" and name.startswith("/dev/")
+        with pytest.raises(BlockingIOError):
+            os.read(ours, 1)
+    finally:
+        os.close(ours)
+        os.close(port)

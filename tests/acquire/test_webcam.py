@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import queue
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -202,3 +204,114 @@ def test_stop_ends_a_stalled_camera() -> None:
         threading.Timer(0.05, camera.stop).start()
         assert list(camera) == []  # although its read still blocks
     capture.gate.set()
+
+
+class StampedVideo(FakeCapture):
+    """A video of these stamps, ms, 25 pictures a second."""
+
+    def __init__(self, *stamps: float) -> None:
+        super().__init__(shots(*range(len(stamps))), FPS=25.0, FRAME_WIDTH=6, FRAME_HEIGHT=4, FRAME_COUNT=9)
+        self._stamps = stamps
+
+    def get(self, prop: int) -> float:
+        return self._stamps[self.read_count - 1] if prop == cv2.CAP_PROP_POS_MSEC else super().get(prop)
+
+
+def test_times_of_a_video_that_does_not_count_on_go_on_by_its_rate(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.avi").touch()
+    monkeypatch.setattr(cv2, "VideoCapture", lambda *_: StampedVideo(0, 0, 0, 200, 200, 100))
+    events: list[Event] = []
+    with open_camera(f"video:{tmp_path}/a.avi", events.append) as camera:
+        frames = list(camera)
+    assert [frame.t for frame in frames] == pytest.approx([0, 0.04, 0.08, 0.2, 0.24, 0.28])
+    assert [frame.raw_t for frame in frames] == pytest.approx([0, 0, 0, 0.2, 0.2, 0.1])
+    assert events[0].text.endswith("ends after 6 of 9 frames; it may be cut off")
+    assert events[0].data == {"missing": 3}
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("width=0", "allowed: a number from 1"),
+        ("height=0.5", "allowed: a number from 1"),
+        ("fps=0", "allowed: a number from 0.001"),
+        ("gray=x", "allowed: one of luma, r, g, b"),
+        ("colour=1", "unknown setting 'colour'; known: width, height, fps, exposure, gain, gray"),
+    ],
+)
+def test_settings_of_a_camera_of_opencv(setting: str, words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        open_camera(f"opencv:0?{setting}")
+
+
+def test_a_camera_of_opencv_gets_its_settings_by_their_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[int] = []
+    fake = FakeCapture(shots(1))
+
+    def capture(number: int) -> FakeCapture:
+        opened.append(number)
+        return fake
+
+    monkeypatch.setattr(cv2, "VideoCapture", capture)
+    address = "opencv:3?width=640&height=480&fps=25&exposure=-5&gain=2&gray=r"
+    with open_camera(address) as camera:
+        assert opened == [3] and camera.info.fps == 25
+    names = ("FRAME_WIDTH", "FRAME_HEIGHT", "FPS", "EXPOSURE", "GAIN")
+    assert [fake.values[getattr(cv2, f"CAP_PROP_{name}")] for name in names] == [640, 480, 25, -5, 2]
+
+
+@pytest.mark.parametrize(("fps", "known"), [(0.0, None), (30.0, 30.0), (100000.0, None), (-1.0, None)])
+def test_a_rate_beyond_sense_is_not_known(fps: float, known: float | None) -> None:
+    assert camera_of(FakeCapture(shots(1), FPS=fps)).info.fps == known
+
+
+@pytest.mark.parametrize(("now", "clock"), [(100.9, "device"), (99.1, "device"), (101.1, "host")])
+def test_stamps_are_the_drivers_where_they_are_of_this_clock(now: float, clock: str) -> None:
+    camera = OpenCVCamera(
+        "opencv:0", lambda: StampedCapture([100.0]), OpenCVSettings(), ignore_event, now=lambda: now
+    )
+    assert camera.info.clock == clock
+    assert len(camera.info.warnings) == (1 if clock == "device" else 2)
+
+
+def test_a_picture_of_another_size_is_left_out_and_told() -> None:
+    events: list[Event] = []
+    reads: list[Read] = [*shots(0, 1), (True, np.zeros((8, 6, 3), np.uint8)), *shots(2)]
+    frames = take(camera_of(FakeCapture(reads), events=events.append), 2)
+    assert [(int(frame.image[0, 0]), frame.index) for frame in frames] == [(1, 0), (2, 1)]
+    assert events[0].text == "opencv:0: a picture of another size, 6x8, was left out"
+    assert (events[0].level, events[0].data) == ("warning", {"last_index": 0})
+
+
+def test_a_dead_camera_is_tried_ever_more_seldom(monkeypatch: pytest.MonkeyPatch) -> None:
+    waits: list[float] = []
+    events: list[Event] = []
+    dead = [FakeCapture([], opens=False) for _ in range(5)]
+    camera = camera_of(FakeCapture(shots(1)), *dead, FakeCapture(shots(2)), events=events.append)
+    monkeypatch.setattr(camera.stopped, "wait", lambda seconds: bool(waits.append(seconds)))
+    camera._recover("no picture within 2.1 s")
+    camera.close()
+    assert waits == [0.2, 0.5, 1.0, 2.0, 2.0, 2.0] and all(one.released for one in dead)
+    assert [(event.level, event.text) for event in events] == [
+        ("error", "opencv:0: no picture within 2.1 s; opening it again"),
+        ("info", "opencv:0: opened again; the recording goes on"),
+    ]
+
+
+def test_a_stall_is_told_after_two_seconds() -> None:
+    now = iter((100.0, 101.0, 102.0, 102.1))
+    events: list[Event] = []
+    camera = camera_of(FakeCapture(shots(1)), events=events.append)
+
+    class Nothing:
+        def get(self, timeout: float) -> None:
+            raise queue.Empty
+
+    camera._now = lambda: next(now)
+    camera._drain = SimpleNamespace(shots=Nothing())  # type: ignore[assignment]
+    assert camera._next_shot() is None
+    assert [event.text for event in events] == ["opencv:0: no picture for 2.1 s; still waiting"]
+    camera._drain = None
+    camera.close()

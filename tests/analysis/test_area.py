@@ -149,6 +149,20 @@ def test_unevenness_is_that_of_bending_and_about_one_sigma_of_noise() -> None:
     assert np.sqrt(np.mean(np.square(misfits))) == pytest.approx(1, abs=0.15)
 
 
+@pytest.mark.parametrize(
+    ("rows", "columns", "off", "known"),
+    [(4, 5, 0, True), (4, 5, 1, False), (1, 30, 0, False), (30, 1, 0, False), (2, 10, 0, True)],
+)
+def test_unevenness_needs_twenty_zois_that_are_no_line(
+    rows: int, columns: int, off: int, known: bool
+) -> None:
+    zois = grid(rows, columns).subset(active=np.arange(rows * columns).reshape(rows, columns) >= off)
+    area = AreaStrain.of(affine(zois), np.ones(zois.shape, bool))
+    assert area is not None and np.array_equal(area.area, zois.active)
+    found = area.unevenness()
+    assert np.isfinite([found.exx, found.eyy, found.misfit]).all() == known
+
+
 def test_a_strain_of_the_second_degree_is_uneven() -> None:
     zois = grid()
     _, y = np.meshgrid(zois.x, zois.y)

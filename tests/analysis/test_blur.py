@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
 from analysis.field import blur_maps, mean_blur
-from analysis.field.blur import widths
+from analysis.field.blur import Blur, widths
 from analysis.kernel.images import continue_rim, padded, with_second_differences
 from analysis.picture.spectrum import filtered_pattern
 from tests.accuracy.truth import Speckle, affine, digitise
@@ -96,6 +98,24 @@ def test_a_width_is_the_signed_root_of_a_variance() -> None:
     px, sigma = widths(np.array([0.25, -0.16, 0.0]), np.array([0.05, 0.0, 0.04]))
     assert px == pytest.approx([0.5, -0.4, 0.0])
     assert sigma == pytest.approx([(np.sqrt(0.30) - np.sqrt(0.20)) / 2, 0.0, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("px", "words"),
+    [(0.414, "less sharp by 0.41 ± 0.02 px"), (-0.306, "sharper by 0.31 ± 0.02 px"), (np.nan, "")],
+)
+def test_a_blur_in_words(px: float, words: str) -> None:
+    assert Blur(px, 0.021).text == words
+
+
+def test_the_mean_blur_is_that_of_the_mean_variance_of_valid_zois() -> None:
+    """Four of five ZOIs side by side, each with 0.09 px^2 and a sigma of 0.02 px^2."""
+    grid = ZoiGrid.cover(Roi(0, 0, 160, 32), 32, 32)
+    variance = np.array([[[0.05, 0.07, 0.11, 0.13, 9.0]], [[0.02, 0.02, 0.02, 0.02, 9.0]]], np.float32)
+    field = StrainField.from_values(grid, {}, status=[[0, 0, 0, 0, 5]])
+    found = mean_blur(replace(field, blur=variance))
+    assert found.px == pytest.approx(0.3)
+    assert found.sigma == pytest.approx((np.sqrt(0.10) - np.sqrt(0.08)) / 2, rel=1e-5)
 
 
 def test_a_field_that_was_read_has_no_blur() -> None:

@@ -55,6 +55,19 @@ def test_the_noise_on_a_bent_course() -> None:
     assert noise(values) == pytest.approx(0.01, rel=0.05)
 
 
+def test_noise_needs_five_values() -> None:
+    """Its second differences are 4, 4 and 4; of normal values half are below 0.6745 sigmas, and they add six."""
+    assert noise(np.array([1.0, -1, 1, -1])) == 0.0
+    assert noise(np.array([1.0, -1, math.nan, 1, -1, 1])) == pytest.approx(4 / 0.6745 / math.sqrt(6))
+
+
+def test_a_step_within_the_noise_is_no_break() -> None:
+    """A noise of 1 up and down looks like a standard deviation of 2.4: the limit is 15 of them."""
+    stress = 500 + 2 * (np.arange(60.0) % 2)
+    assert broken_at(np.concatenate([stress, [470, 0, 0]])) == 60
+    assert broken_at(np.concatenate([stress, [460, 0, 0]])) == 59
+
+
 def test_a_reading_between_samples_of_a_parabola() -> None:
     k = np.arange(20.0)
     found = reading(0.5 * k**2 + 2 * k + 1, 7.25, 2, 14, min_sigma=0.1)

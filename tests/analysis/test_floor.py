@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.evaluate.floor import evenly, noise_floor, still_phase
+from analysis.evaluate.floor import MIN_STILL_INSTANTS, evenly, noise_floor, still_phase
 
 UNKNOWN = np.full(6, np.nan)
 MOVES = {"eyy": (np.array([0.0, 4e-6, -4e-6, 2e-4, 0.0, 0.0]), np.full(6, 1e-6))}
@@ -26,6 +26,7 @@ MOVES = {"eyy": (np.array([0.0, 4e-6, -4e-6, 2e-4, 0.0, 0.0]), np.full(6, 1e-6))
 )
 def test_still_until_the_force_leaves_its_first_value(force: list[float], count: int) -> None:
     assert still_phase(np.array(force)) == count
+    assert MIN_STILL_INSTANTS == 2
 
 
 @pytest.mark.parametrize("force", [UNKNOWN, np.full(6, 3.0), np.array([np.nan, 0, 0, 0, 50, 100])])
@@ -46,6 +47,25 @@ def test_the_noise_of_a_load_cell_is_no_load() -> None:
     assert still_phase(force, still) == 600
     force[400:] += np.linspace(0, 500, 200)
     assert still_phase(force, still) == pytest.approx(401, abs=2)
+
+
+@pytest.mark.parametrize(("sigmas", "count"), [(4.9, 6), (5.1, 3)])
+def test_a_mean_strain_moves_beyond_five_sigmas(sigmas: float, count: int) -> None:
+    means = {"exx": (np.array([0.0, 0, 0, -sigmas * 1e-6, 0, 0]), np.full(6, 1e-6))}
+    assert still_phase(UNKNOWN, means) == count
+
+
+@pytest.mark.parametrize(("highest", "count"), [(23.0, 0), (24.5, 1)])
+def test_a_force_ranges_over_ten_times_its_noise(highest: float, count: int) -> None:
+    """One up and down: like a standard deviation of 2.42, by its second differences."""
+    force = (-1.0) ** np.arange(40)
+    force[-1] = highest - 1
+    assert still_phase(force) == count
+
+
+@pytest.mark.parametrize(("force", "count"), [(0.99, 4), (1.01, 2)])
+def test_a_force_differs_beyond_one_percent_of_its_range(force: float, count: int) -> None:
+    assert still_phase(np.array([0.0, 0, -force, 0, 50, 100 - force])) == count
 
 
 def test_evenly() -> None:

@@ -225,6 +225,18 @@ def test_too_few_pictures_and_small_shifts_are_refused() -> None:
     fields = shifted(np.random.default_rng(1), 1e-3)
     with pytest.raises(ValueError, match="1 shifted pictures with 140 ZOIs"):
         lens_of_shifts(fields[:1], WIDTH, HEIGHT)
+    with pytest.raises(ValueError, match="the shifts do not show the lens; shift by a tenth of the picture"):
+        lens_of_shifts([seen(Affine())] * 3, WIDTH, HEIGHT)
+
+
+def test_the_optical_axis_is_taken_in_the_middle_give_or_take_a_hundredth_of_the_width() -> None:
+    """By pictures that are 13 px wider or higher, whose middle is 6.5 px further; a hundredth is 6.4 px."""
+    fields = shifted(np.random.default_rng(1), 1e-5)
+    lens, variance = lens_of_shifts(fields, WIDTH, HEIGHT).lens, 0.0
+    for width, height in ((WIDTH + 13, HEIGHT), (WIDTH, HEIGHT + 13)):
+        off = lens_of_shifts(fields, width, height).lens.parameters
+        variance += ((off[3] * (FOCAL / off[0]) ** 2 - lens.parameters[3]) * 6.4 / 6.5) ** 2
+    assert math.sqrt(lens.covariance[3, 3]) == pytest.approx(math.sqrt(variance), rel=0.02)
 
 
 def test_noise_beyond_what_is_stated_is_in_the_uncertainty_of_the_lens() -> None:

@@ -82,3 +82,56 @@ def test_too_little_motion_is_refused() -> None:
         readout_of_motion(t, (u, v), (du_dy, dv_dy), LINES)
     with pytest.raises(ValueError, match="9 pictures with a value"):
         readout_of_motion(t[:9], (u[:9], v[:9]), (du_dy[:9], dv_dy[:9]), LINES)
+
+
+def swung(count: int, a_line_s: float) -> tuple[np.ndarray, ...]:
+    """t, u, v, du_dy, dv_dy without noise: shear and strain are the velocity times the time of a line."""
+    t = np.arange(count) / 60.0
+    u, v = 9 * np.sin(3 * t), 12 * np.cos(2 * t)
+    return t, u, v, a_line_s * 27 * np.cos(3 * t), -a_line_s * 24 * np.sin(2 * t)
+
+
+def test_the_time_of_a_picture_is_that_of_its_lines_but_one() -> None:
+    t, u, v, du_dy, dv_dy = swung(90, 1e-4)
+    found = readout_of_motion(t, (u, v), (du_dy, dv_dy), 41)
+    assert found.seconds == pytest.approx(40 * 1e-4, rel=1e-3) and found.sigma < 1e-2 * found.seconds
+    for one in (u, dv_dy):
+        one[::9] = np.nan
+    assert readout_of_motion(t, (u, v), (du_dy, dv_dy), 41).seconds == pytest.approx(40 * 1e-4, rel=1e-3)
+    with pytest.raises(ValueError, match="90 pictures with a value, one after the other; it takes 16"):
+        readout_of_motion(t[::-1], *((one, one) for one in (swung(90, 1e-4)[1:3])), 41)  # type: ignore[arg-type]
+
+
+def test_sixteen_velocities_are_needed() -> None:
+    """Two at each end have none."""
+    for count, words in ((19, "too little motion"), (15, "15 pictures with a value")):
+        t, u, v, du_dy, dv_dy = swung(count, 1e-4)
+        with pytest.raises(ValueError, match=words):
+            readout_of_motion(t, (u, v), (du_dy, dv_dy), 41)
+    t, u, v, du_dy, dv_dy = swung(20, 1e-4)
+    assert readout_of_motion(t, (u, v), (du_dy, dv_dy), 41).seconds == pytest.approx(40 * 1e-4, rel=0.02)
+
+
+def banded(bands: float, pictures: int) -> np.ndarray:
+    """Means of lines under a lamp without noise, in another phase of the lamp in each picture."""
+    line, phase = np.linspace(0, 1, LINES), 2.4 * np.arange(pictures)[:, None]
+    return np.asarray(80 * (1 + 0.1 * np.cos(2 * np.pi * bands * line + phase)))
+
+
+@pytest.mark.parametrize(("bands", "kept"), [(3.3, 0.0), (0.7, 0.1 / 96)])
+def test_without_noise_the_mains_are_as_uncertain_as_stated(bands: float, kept: float) -> None:
+    """And below one band, what the scene keeps of it."""
+    found = readout_of_bands(banded(bands, 96), 120.0)
+    assert found.seconds == pytest.approx(bands / 120, rel=1e-3)
+    assert found.sigma == pytest.approx(np.hypot(5e-4, kept) * found.seconds, rel=0.1)
+
+
+@pytest.mark.parametrize(("bands", "found"), [(0.23, False), (0.4, True), (29.5, True), (29.97, False)])
+def test_bands_at_the_end_of_what_is_sought_are_none(bands: float, found: bool) -> None:
+    """From a quarter of a band to one in eight lines."""
+    seen = banded(bands, 96)
+    if found:
+        assert readout_of_bands(seen, 100.0).seconds == pytest.approx(bands / 100, rel=2e-3)
+    else:
+        with pytest.raises(ValueError, match="no bands that move"):
+            readout_of_bands(seen, 100.0)

@@ -9,6 +9,7 @@ import pytest
 
 import analysis
 from analysis import KernelSettings, PatternError, PhaseKernel, Roi, Status, ZoiGrid
+from analysis.kernel import retry
 from analysis.kernel.images import as_model
 from analysis.kernel.prepared import PatternError as Raised
 from analysis.kernel.reference import ReferencePicture
@@ -138,3 +139,25 @@ def test_a_worse_outcome_does_not_replace_what_there_is(wide: ReferencePicture) 
     still = solution.status != Status.OK
     assert still.any()
     assert np.array_equal(solution.found.p[still], before[1][still], equal_nan=True)
+
+
+@pytest.mark.parametrize(("u", "v"), [(5.0, -37.0), (-37.0, 5.0)])
+def test_a_lost_block_is_searched_for_a_hundred_pixels_farther_than_it_had_moved(
+    wide: ReferencePicture, monkeypatch: pytest.MonkeyPatch, u: float, v: float
+) -> None:
+    solution = solved(wide, wide.searched(picture(**MOTION)))
+    before, block = np.zeros_like(solution.guess), np.zeros(WIDE_GRID.shape, bool)
+    before[:, 0], before[:, 3] = u, v
+    block[2:5, 3:6] = True
+    solution.status[block.ravel()] = Status.LOST
+    asked = []
+
+    def near(
+        self: ReferencePicture, image: np.ndarray, which: np.ndarray, reach: float
+    ) -> np.ndarray:  # as it has been
+        asked.append((which.tolist(), reach))
+        return before[which]
+
+    monkeypatch.setattr(ReferencePicture, "searched_near", near)
+    retry._search_again(solution, before)
+    assert asked == [(np.flatnonzero(block).tolist(), 137.0)]

@@ -62,3 +62,41 @@ def test_a_lost_picture_and_a_time_that_stands_change_nothing() -> None:
     assert correction.apply(lost, 0.15) is lost
     again = seen(0.1)
     assert correction.apply(again, 0.1) is again
+
+
+def uniform(u: float, v: float, /, **sigmas: float) -> StrainField:
+    """Moved as a whole and sheared, with gradients of their own."""
+    gradients = {"du_dx": 0.02, "du_dy": 0.03, "dv_dx": 0.01, "dv_dy": -0.04}
+    return StrainField.from_values(GRID, {"u": u, "v": v, **gradients}, sigmas)
+
+
+def test_each_value_loses_what_its_velocity_makes_of_the_time_of_its_line() -> None:
+    """Of 51 lines in 20 ms the middle one is number 25; a line is late by its place in the picture as it is now."""
+    correction, line_s = ShutterCorrection(0.02, 51), 0.02 / 50
+    correction.apply(uniform(0.0, 0.0), 0.5)
+    found = correction.apply(uniform(2.0, -3.0), 1.0)  # 4 px/s and -6 px/s
+    late = line_s * (GRID.y[:, None] - 3.0 - 25.0) + np.zeros(GRID.shape)
+    assert found.u == pytest.approx(2.0 - 4 * late, rel=1e-12)
+    assert found.v == pytest.approx(-3.0 + 6 * late, rel=1e-12)
+    for name, value in (
+        ("du_dx", 0.02 - 4 * line_s * 0.01),
+        ("du_dy", 0.03 - 4 * line_s * (1 - 0.04)),
+        ("dv_dx", 0.01 + 6 * line_s * 0.01),
+        ("dv_dy", -0.04 + 6 * line_s * (1 - 0.04)),
+    ):
+        assert getattr(found, name) == pytest.approx(value, rel=1e-12), name
+    rested = uniform(2.0, -3.0)
+    assert np.array_equal(correction.apply(rested, 1.5).parameters, rested.parameters), (
+        "since the burst before"
+    )
+
+
+def test_the_noise_of_each_velocity_is_in_its_own_gradients() -> None:
+    correction, slope = ShutterCorrection(0.02, 51), 0.02 / 50 * (1 - 0.04)
+    first, second = uniform(0.0, 0.0, u=0.5, v=0.1), uniform(2.0, -3.0, u=0.5, v=0.1)
+    correction.apply(first, 0.5)
+    common = correction.apply(second, 1.0).common
+    assert common is not None
+    for name, value in (("du_dy", "u"), ("dv_dy", "v")):
+        velocity = np.sqrt(2) * first.mean(value)[1] / 0.5
+        assert common.variance(name) == pytest.approx((velocity * slope) ** 2, rel=1e-9), name

@@ -345,7 +345,7 @@ def tracks(
 
 def test_the_slope_of_two_noises_is_that_of_total_least_squares() -> None:
     """In units of the two noises, along the largest eigenvector of the covariance."""
-    for ratio in (0.5, 3.0, 7.0):
+    for ratio in (0.01, 0.5, 3.0, 7.0):
         moments = np.array([[4.0, 9.0], [9.0, 30.0]])
         scaled = moments / np.outer([1.0, ratio], [1.0, ratio])
         across, along = np.linalg.eigh(scaled)[1][:, -1]

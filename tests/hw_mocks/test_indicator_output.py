@@ -8,6 +8,7 @@ import pytest
 from hw_mocks.faults import SERIAL_FAULTS, parse_faults
 from hw_mocks.indicator import AsciiIndicator, IndicatorReading
 from hw_mocks.indicator_output import IndicatorOutput, Sensing
+from hw_mocks.sim_indicators import MtSicsIndicator
 
 RATE = 10.0
 
@@ -111,3 +112,52 @@ def test_beyond_capacity_is_overload() -> None:
     sensing = Sensing(lambda t: t, lambda t: t, noise_N=0.0, capacity_N=100.0)
     output = IndicatorOutput(AsciiIndicator(), sensing, 0.0)
     assert [output.shown(t).status for t in (-101, 99, 101)] == ["underload", "ok", "overload"]
+
+
+@pytest.mark.parametrize(
+    ("force", "status"),
+    [(-10.1, "underload"), (-10.0, "ok"), (-0.1, "ok"), (0.0, "ok"), (10.0, "ok"), (10.1, "overload")],
+)
+def test_the_range_is_the_same_to_both_sides(force: float, status: str) -> None:
+    sensing = Sensing(lambda t: force, lambda t: t, noise_N=0.0, capacity_N=10.0)
+    shown = IndicatorOutput(AsciiIndicator(), sensing, 2.0).shown(5.0)
+    assert (shown.status, shown.force, shown.ms, shown.stable) == (status, force, 3000.0, True)
+    plain = Sensing(lambda t: 0.0, lambda t: t)
+    assert (plain.rate, plain.noise_N, plain.capacity_N) == (80.0, 1.0, 10_000.0)
+
+
+def test_a_backlog_has_each_old_line_once() -> None:
+    (chunk,) = lines("backlog@0.5*0.3")[5]
+    assert [line.partition(b",")[0] for line in chunk.split(b"\r\n")] == [b"200", b"300", b"400", b"500", b""]
+
+
+@pytest.mark.parametrize(("amount", "interval_s"), [("0.5", 0.2), ("0", 100.0), ("2", 0.05)])
+def test_a_rate_that_falls_short_never_stops_altogether(amount: str, interval_s: float) -> None:
+    plan = parse_faults(f"rate@1*{amount}", SERIAL_FAULTS, "test")
+    output = IndicatorOutput(AsciiIndicator(), Sensing(lambda t: 0.0, lambda t: t, RATE), 0.0, faults=plan)
+    assert [output.interval(t) for t in (0.9, 1.0, 2.0)] == pytest.approx([0.1, interval_s, interval_s])
+
+
+def test_a_rate_that_was_commanded_comes_before_its_own() -> None:
+    indicator = AsciiIndicator()
+    output = IndicatorOutput(indicator, Sensing(lambda t: 0.0, lambda t: t, RATE), 0.0)
+    indicator.rate = 50.0
+    assert output.interval(0.0) == pytest.approx(0.02)
+
+
+def test_a_device_that_is_not_sending_is_silent_until_it_is_asked() -> None:
+    output = IndicatorOutput(MtSicsIndicator(), Sensing(lambda t: 7.0, lambda t: t, RATE, 0.0), 0.0)
+    assert output.sample(0.0) == []
+    assert output.answers(b"SI\r\n", 0.1) == b"S S        7.0 N\r\n"
+    output.answers(b"SIR\r\n", 0.2)
+    assert output.sample(0.3) == [b"S S        7.0 N\r\n"]
+
+
+def test_an_unstable_reading_says_so_and_silence_answers_nothing() -> None:
+    plan = parse_faults("unstable@1*1,silence@3*1,cr@5*1", SERIAL_FAULTS, "test")
+    sensing = Sensing(lambda t: 7.0, lambda t: t, RATE, 0.0)
+    output = IndicatorOutput(MtSicsIndicator(), sensing, 0.0, faults=plan)
+    answers = [output.answers(b"SI\r\n", t) for t in (0.5, 1.5, 2.5, 3.5, 5.5)]
+    assert answers == [
+        b"S S        7.0 N\r\n", b"S D        7.0 N\r\n", b"S S        7.0 N\r\n", b"", b"S S        7.0 N\r",
+    ]  # fmt: skip

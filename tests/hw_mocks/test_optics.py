@@ -148,3 +148,55 @@ def test_all_keys_of_an_address() -> None:
         True,
         0.03,
     )
+
+
+def test_lamps_light_each_line_as_it_is_read() -> None:
+    """At 100 Hz and 10 ms of readout one swing stands in the picture, brightest at its middle line."""
+    optics = Optics(flicker=0.1, readout_s=0.01)
+    assert optics.light(0.0, 5)[:, 0] == pytest.approx([0.9, 1.0, 1.1, 1.0, 0.9])
+    assert optics.light(0.0025, 5)[:, 0] == pytest.approx([1.0, 1.1, 1.0, 0.9, 1.0])
+    assert optics.light(0.0, 2)[:, 0] == pytest.approx([0.9, 0.9])
+    quick = Optics(flicker=0.1, readout_s=0.004)
+    ends = 1 + 0.1 * math.cos(0.4 * math.pi)
+    assert quick.light(0.0, 3)[:, 0] == pytest.approx([ends, 1.1, ends])
+    at_once = Optics(flicker=0.2, lamp_Hz=50)
+    assert at_once.light(0.005, 3)[:, 0] == pytest.approx([1.0] * 3)
+    assert at_once.light(0.010, 3)[:, 0] == pytest.approx([0.8] * 3)
+
+
+def test_the_picture_has_the_light_of_its_lamp() -> None:
+    specimen = VirtualSpecimen(width=96, height=80)
+    flickering = Optics(500.0, flicker=0.1, readout_s=0.01)
+    steady = Optics(500.0, readout_s=0.01, flicker=1e-12)
+    ratio = Scene(specimen, optics=flickering).render(8.0) / Scene(specimen, optics=steady).render(8.0)
+    np.testing.assert_allclose(ratio, np.broadcast_to(flickering.light(8.0, 80), ratio.shape), rtol=1e-5)
+
+
+def test_flicker_is_in_percent_and_a_lamp_in_hertz() -> None:
+    options = Options(parse_address("sim:?flicker=8&lamp_hz=120"))
+    assert take_optics(options) == Optics(flicker=0.08, lamp_Hz=120)
+
+
+@pytest.mark.parametrize("plate", ["1,2,3,0", "1,2,0,4", "1,2,-3,4", "1,2,3,4,5", "1,2,3,4;5"])
+def test_a_plate_has_four_numbers_and_an_area(plate: str) -> None:
+    with pytest.raises(ConfigError, match=f"plates={plate} is not possible; allowed: x,y,width,height"):
+        take_optics(Options(parse_address(f"sim:?plates={plate}")))
+
+
+def test_the_edges_of_a_plate_and_what_is_seen_from_behind() -> None:
+    specimen = VirtualSpecimen(width=201, height=161, drift_px=(3.0, -2.0))
+    seen_by = Optics(plates=((10, 20, 30, 40),)).seen(specimen, END)
+    _, v = seen_by.displacement([10.0, 39.9, 40.0, 20.0, 20.0, 9.9], [20.0, 30.0, 30.0, 59.9, 60.0, 30.0])
+    on_plate = np.abs(v + 2.0) < 1e-9
+    assert on_plate.tolist() == [True, True, False, True, False, False]
+    u, v = Optics(behind=True).seen(specimen, END).displacement(X0, Y0)
+    assert (float(u), float(v)) == pytest.approx((-3.0, -2.0), abs=1e-9)
+
+
+def test_motion_that_speeds_up_within_a_readout_is_followed() -> None:
+    """8 t^2 px, read from -0.5 s to 0.5 s: 2 px at either end and none in the middle; and its slope is shear."""
+    rolled = RolledShutter(lambda t: Affine(8.0 * t * t, 0.0), 0.0, 1.0, 101)
+    u, _ = rolled.displacement(0.0, [0.0, 25.0, 50.0, 100.0])
+    assert u == pytest.approx([2.0, 0.5, 0.0, 2.0])
+    _, b, _, _ = rolled.gradient(0.0, [0.0, 50.0, 100.0])
+    assert b == pytest.approx([-0.08, 0.0, 0.08])

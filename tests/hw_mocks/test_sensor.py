@@ -71,3 +71,26 @@ def test_quantiles_are_normal() -> None:
     assert values.size == 65536
     assert values.std() == pytest.approx(1, rel=1e-6)
     assert np.mean(values**4) == pytest.approx(3, abs=0.01)
+
+
+def test_a_sensor_of_a_given_noise_has_four_hundredths_of_its_variance_from_reading() -> None:
+    sensor = Sensor.with_noise(12, 0.01, fixed_pattern=0.02, brightness=1.5)
+    assert (sensor.full_well_e, sensor.read_e) == pytest.approx((0.5 / 0.96e-4, 0.002 * 0.5 / 0.96e-4))
+    assert (sensor.fixed_pattern, sensor.brightness, sensor.black) == (0.02, 1.5, 0.0)
+    assert sensor.gain == pytest.approx(4095 / sensor.full_well_e)
+    assert sensor.read_noise == pytest.approx(0.2 * 40.95)
+    silent = Sensor.with_noise(8, 0.0)
+    assert (silent.gain, silent.read_noise, silent.noise()) == (0, 0, pytest.approx(math.sqrt(1 / 12)))
+
+
+def test_noise_grows_with_the_light() -> None:
+    sensor = Sensor(12, 4095.0, 3.0)  # one grey level an electron
+    assert sensor.noise(0.0) == pytest.approx(math.sqrt(9 + 1 / 12))
+    assert sensor.noise(0.1) == pytest.approx(math.sqrt(409.5 + 9 + 1 / 12))
+
+
+@pytest.mark.parametrize(("light", "level"), [(0.0, 51), (0.2, 102), (0.9, 255)])
+def test_black_is_added_to_the_light(light: float, level: int) -> None:
+    sensor = Sensor(8, math.inf, 0.0, black=0.2)
+    image = Exposer(sensor, (3, 4)).expose(np.full((3, 4), light, np.float32))
+    assert np.abs(image.astype(int) - level).max() <= 1

@@ -260,3 +260,35 @@ def test_automatic_rate_is_what_this_machine_renders(
     address = parse_address("sim:uniform?width=64&height=48&fps=auto")
     with open_sim_camera(address, lambda event: None, specimen_from(address)) as camera:
         assert camera.info.fps == fps
+
+
+def test_a_single_slow_picture_does_not_lower_the_automatic_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, taken = [0.0], iter([9.0, 0.002, 0.002, 5.0, 0.002, 0.002, 0.002, *[0.002] * 9])
+
+    def rendered(self: Scene, t: float) -> np.ndarray:
+        now[0] += next(taken)
+        return np.full((48, 64), 0.5, np.float32)
+
+    monkeypatch.setattr("hw_mocks.sim_camera.time.perf_counter", lambda: now[0])
+    monkeypatch.setattr(Scene, "render", rendered)
+    address = parse_address("sim:uniform?width=64&height=48&fps=auto")
+    with open_sim_camera(address, ignore_event, specimen_from(address)) as camera:
+        assert camera.info.fps == 30.0
+
+
+def test_a_frame_later_than_its_buffers_is_lost_and_no_other() -> None:
+    """130 ms at one frame: the two after it are 90 and 70 ms late, three buffers at 50/s are 60 ms."""
+    time = FakeTime()
+    camera = timed(time, buffers=4)
+    camera._ring = Ring(100)
+    render = camera._scene.render
+
+    def stalled(t: float) -> np.ndarray:
+        time.now += 0.13 if t == 10 / 50 else 0.0
+        return render(t)
+
+    camera._scene.render = stalled
+    with camera:
+        camera._thread.join()
+        indices = [frame.index for frame in camera]
+    assert sorted({*range(51)} - {*indices}) == [11, 12] and camera.dropped == 2

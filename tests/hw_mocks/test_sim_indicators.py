@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hw_mocks.indicator import Indicator, IndicatorReading, decimals
+from hw_mocks.indicator import NEWTONS, Indicator, IndicatorReading, decimals
 from hw_mocks.modbus_indicator import DAT400, PT113, ModbusIndicator, RegisterMap, crc
 from hw_mocks.sim_indicators import (
     INDICATORS,
@@ -283,3 +283,106 @@ def test_any_bytes_are_survived(name: str, pieces: list[bytes]) -> None:
 @pytest.mark.parametrize(("step", "digits"), [(1, 0), (0.1, 1), (0.02, 2), (5, 0), (0.0224, 2), (1e-4, 4)])
 def test_decimals(step: float, digits: int) -> None:
     assert decimals(step) == digits
+
+
+def test_mark10_keeps_the_highest_and_the_lowest() -> None:
+    """Peak tension and peak compression since it was switched on, tension negative as all it shows."""
+    indicator = Mark10Indicator()
+    for force in (5.0, -7.0, 3.0):
+        indicator.render(IndicatorReading(force))
+    talk(indicator, [(b"?PT\r", b"-5.0 N\r\n"), (b"?PC\r", b"7.0 N\r\n")])
+    indicator.restart()
+    talk(indicator, [(b"?PT\r?PC\r", b"0.0 N\r\n0.0 N\r\n"), (b"KG\r?\r", b"-1.25 kgF\r\n")])
+
+
+def test_mark10_tells_its_settings() -> None:
+    indicator = Mark10Indicator()
+    talk(indicator, [(b"LIST\r", b"V1.00;N;CUR;FLTC8;FLTP1;AOUT0;FULL\r\n"), (b"AOUT25\r", b"")])
+    talk(indicator, [(b"LIST\r", b"V1.00;N;CUR;FLTC8;FLTP1;AOUT25;FULL\r\n"), (b"FLTC3\r", b"*12\r\n")])
+
+
+@pytest.mark.parametrize(("said", "lines", "rate"), [(b"AOUT250\r", math.inf, 250.0), (b"AOUT3\r", 0, None)])
+def test_mark10_streams_at_the_rates_that_it_has(said: bytes, lines: float, rate: float | None) -> None:
+    indicator = Mark10Indicator()
+    indicator.receive(said, AT_12)
+    assert (indicator.left, indicator.rate) == (lines, rate)
+
+
+def test_modbus_without_a_sign_shows_nothing_below_zero() -> None:
+    indicator = ModbusIndicator(registers=RegisterMap(value_type="u32"))
+    assert indicator.receive(read(7, 2), IndicatorReading(-12.3))[3:7] == bytes(4)
+
+
+def test_modbus_status_shows_what_was_tared_and_what_is_too_little() -> None:
+    indicator = ModbusIndicator(registers=DAT400)
+    tare = framed(struct.pack(">BBHH", 1, 6, 5, 2))
+    assert indicator.receive(tare, AT_12) == tare
+    status = indicator.receive(read(6, 1), IndicatorReading(0.0, status="underload"))[3:5]
+    assert int.from_bytes(status) == 0b11010
+
+
+@pytest.mark.parametrize(
+    ("shown", "line"),
+    [
+        (IndicatorReading(-1e9, status="underload"), b"-1600000,31,011\r\n"),
+        (IndicatorReading(10_000.0), b" 1000000,31,008\r\n"),
+        (IndicatorReading(-0.04), b" 0000000,31,008\r\n"),
+    ],
+)
+def test_hbm_counts_a_million_at_its_nominal_load(shown: IndicatorReading, line: bytes) -> None:
+    assert HbmAedIndicator().render(shown) == line
+    assert HbmAedIndicator(nominal_N=500.0).render(IndicatorReading(250.0)) == b" 0500000,31,008\r\n"
+
+
+@pytest.mark.parametrize(
+    ("number", "rate"), [(0, 100), (1, 50), (2, 25), (3, 12), (4, 6), (5, 3), (6, 2), (7, 1)]
+)
+def test_hbm_rates_have_their_numbers(number: int, rate: float) -> None:
+    indicator = HbmAedIndicator()
+    talk(indicator, [(b"ICR%d;" % number, b"0\r\n"), (b"ICR8;", b"?\r\n")])
+    assert indicator.rate == rate
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("ascii", (115200, 8, "N")),
+        ("mt-sics", (9600, 8, "N")),
+        ("aed-standard", (2400, 7, "E")),
+        ("mark10", (9600, 8, "N")),
+        ("sauter", (9600, 8, "N")),
+        ("hbm-aed", (9600, 8, "E")),
+        ("modbus", (9600, 8, "N")),
+    ],
+)
+def test_each_has_the_line_it_is_delivered_with(name: str, line: tuple[int, int, str]) -> None:
+    indicator = INDICATORS[name]()
+    assert indicator.line == line
+    assert (indicator.left, indicator.resolution) == (math.inf if indicator.unasked else 0, 0.1)
+    assert indicator.unasked == (name in ("ascii", "aed-standard"))
+
+
+def test_units_of_a_display_in_newtons() -> None:
+    assert (
+        pytest.approx(
+            {"N": 1, "kN": 1000, "lbF": 4.4482216153, "kgF": 9.80665, "kg": 9.80665, "g": 0.00980665}
+        )
+        == NEWTONS
+    )
+    shown = IndicatorReading(1234.5, foreign_unit=True)
+    assert MtSicsIndicator().render(shown) == b"S S     1.2345 kN\r\n"
+
+
+def test_a_display_rounds_to_its_step_after_the_tare() -> None:
+    indicator = MtSicsIndicator(0.5)
+    indicator.tare(IndicatorReading(0.2))
+    assert indicator.net(IndicatorReading(1.2)) == 1.0 and indicator.net(IndicatorReading(1.5)) == 1.5
+
+
+def test_a_second_tare_is_under_the_whole_force() -> None:
+    indicator = MtSicsIndicator()
+    for force in (5.0, 8.0):
+        indicator.tare(IndicatorReading(force))
+    assert indicator.net(IndicatorReading(8.0)) == 0.0 and indicator.net(IndicatorReading(10.0)) == 2.0
+    indicator.restart()
+    assert indicator.net(IndicatorReading(8.0)) == 8.0

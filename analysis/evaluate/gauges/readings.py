@@ -90,7 +90,7 @@ def _missing(chosen: Mask, field: StrainField) -> str:
         )
     status = field.status[chosen]
     lost = Counter(Status(s) for s in status[status != Status.OK].tolist())
-    if total - lost.total() >= max(MIN_SHARE * total, 1):
+    if total - lost.total() >= MIN_SHARE * total:
         return ""
     words = ", ".join(f"{n} {status.name}" for status, n in lost.most_common())
     return f"{lost.total()} of {total} ZOIs have no value ({words})"

@@ -57,10 +57,12 @@ def overlay_cells(
     across, down = (m if math.isfinite(m) else 0.0 for m in moved)
     left, right = (round((x + across) * zoom) for x in (grid.x[0] - half, grid.x[-1] + half))
     top, bottom = (round((y + down) * zoom) for y in (grid.y[0] - half, grid.y[-1] + half))
-    cv2 = load_cv2()
-    large = cv2.resize(cells, (max(right - left, 1), max(bottom - top, 1)), interpolation=cv2.INTER_NEAREST)
     height, width = picture.shape[:2]
     rows, columns = slice(max(top, 0), min(bottom, height)), slice(max(left, 0), min(right, width))
+    if rows.start >= rows.stop or columns.start >= columns.stop:
+        return  # outside the picture
+    cv2 = load_cv2()
+    large = cv2.resize(cells, (right - left, bottom - top), interpolation=cv2.INTER_NEAREST)
     part = large[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
     picture[rows, columns] = _mixed(picture[rows, columns], part[..., 2::-1], part[..., 3:])
 

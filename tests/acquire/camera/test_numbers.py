@@ -29,3 +29,10 @@ def test_a_number_that_goes_back_is_no_gap() -> None:
     counter.count(1000, 1.0, 10.0)
     assert counter.count(990, 1.1, 10.0) == 0
     assert not counter.counts_itself and counter.index == 1001
+
+
+def test_half_the_range_is_no_gap_any_more() -> None:
+    counter = FrameCounter()
+    counter.count(10, 1.0, 10.0)
+    assert counter.count(10 + 2**31, 1.3, 10.0) == 2
+    assert not counter.counts_itself and counter.index == 13

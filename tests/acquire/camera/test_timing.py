@@ -6,8 +6,16 @@ import math
 
 import pytest
 
-from acquire.camera import FrameCounter, StallWatch, longest_pause_s, mid_exposure, missing_at_end
-from acquire.frame import CameraInfo
+from acquire.camera import (
+    FrameCounter,
+    StallWatch,
+    exposure_and_gain,
+    longest_pause_s,
+    mid_exposure,
+    missing_at_end,
+    missing_between,
+)
+from acquire.frame import CameraInfo, CameraSetting
 
 
 def info(**more: object) -> CameraInfo:
@@ -62,3 +70,55 @@ def test_the_middle_of_the_exposure() -> None:
     assert mid_exposure(10.0, 0.2, "start") == pytest.approx(10.1)
     assert mid_exposure(10.0, 0.2, "end") == pytest.approx(9.9)
     assert mid_exposure(10.0, 0.2, "") == mid_exposure(10.0, None, "end") == 10.0
+
+
+@pytest.mark.parametrize(
+    ("fps", "high"),
+    [(None, 50_000), (25.0, 40_000), (10.0, 50_000), (200.0, 8_000)],
+)
+def test_an_exposure_is_changed_within_one_picture(fps: float | None, high: float) -> None:
+    """But is never made impossible by that: 8 ms are in force, whatever the rate is."""
+    (exposure,) = exposure_and_gain((8_000.0, 0.0, 50_000.0), None, fps)
+    assert exposure == CameraSetting("exposure_us", 8_000.0, 1.0, high, log=True)
+
+
+def test_the_bounds_of_a_setting_hold_what_is_in_force() -> None:
+    (exposure, gain) = exposure_and_gain((0.5, 10.0, 100.0), (30.0, 2.0, 24.0), None)
+    assert (exposure.low, exposure.high) == (0.5, 100.0)
+    assert gain == CameraSetting("gain", 30.0, 2.0, 30.0)
+    (gain,) = exposure_and_gain((0.0, 0.0, 100.0), (-5.0, -3.0, 24.0), None)
+    assert gain == CameraSetting("gain", -5.0, -5.0, 24.0), "and an exposure of zero has no ratio"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "fps", "missing"),
+    [
+        (0.1, 10.0, 0),
+        (0.14, 10.0, 0),
+        (0.16, 10.0, 1),
+        (1.0, 10.0, 9),
+        (-1.0, 10.0, 0),
+        (1.0, None, 0),
+        (1.0, 0.0, 0),
+    ],
+)
+def test_frames_missing_between_two_stamps(seconds: float, fps: float | None, missing: int) -> None:
+    assert missing_between(100.0, 100.0 + seconds, fps) == missing
+
+
+def test_after_a_restart_the_time_tells_what_was_lost() -> None:
+    counter = FrameCounter()
+    assert (counter.index, counter.t) == (-1, float("-inf"))
+    assert counter.count(40, 10.0, 10.0) == 0 and counter.index == 40
+    counter.restart()
+    assert counter.count(0, 10.5, 10.0) == 4 and counter.index == 45
+    assert counter.count(1, 10.4, 10.0) == 0 and (counter.index, counter.t) == (46, 10.5)
+
+
+def test_a_pause_as_long_as_allowed_is_none() -> None:
+    reports: list[str] = []
+    watch = StallWatch(lambda text, level: reports.append(text))
+    watch.restart(100.0)
+    assert watch.waited(100.5, 0.5) == 0.5 and not watch.stalled
+    watch.came(100.5)
+    assert watch.waited(101.0, 0.5) == 0.5 and reports == []

@@ -163,3 +163,114 @@ def test_irregular_messages_are_not_all_late() -> None:
         t += rng.expovariate(10.0)
         late += pace.late([t])
     assert sum(late) < 0.5 * len(late)
+
+
+def test_no_byte_is_older_than_the_read_before_its_own_less_a_byte() -> None:
+    times = ArrivalTimes(0.01)
+    times.received(1, 1.0)
+    times.received(10, 1.02)  # on the wire for 0.1 s, but 20 ms ago there was nothing
+    assert times.began(1) == pytest.approx(0.99)
+    assert times.began(10) == pytest.approx(1.01)
+
+
+def period_after(*times: float) -> float:
+    pace = ArrivalRate()
+    for t in times:
+        pace.late([t])
+    return pace.period
+
+
+def test_a_pace_is_known_from_two_groups_of_a_quarter_of_a_second_on() -> None:
+    one = (0.0, 0.1, 0.2, 0.3)
+    assert math.isnan(period_after(*one))
+    assert period_after(*one, 0.4, 0.5, 0.6) == pytest.approx(0.1)
+    assert period_after(*one, 0.4, 0.5, 0.6, 0.9, 1.2) == pytest.approx(0.2), "the median of four groups"
+
+
+def test_groups_that_differ_by_half_keep_no_pace() -> None:
+    """Of the quarter that is slowest and the quarter that is fastest, once there are eight."""
+    fast, slow = [0.25 * k for k in range(5)], [0.25 * 4 + 0.4 * k for k in range(1, 5)]
+    assert math.isnan(period_after(*fast, *slow))
+    slow = [0.25 * 4 + 0.37 * k for k in range(1, 5)]
+    assert period_after(*fast, *slow) == pytest.approx(0.31)
+
+
+def slow_device() -> ArrivalRate:
+    """It has sent twice a second for ten seconds."""
+    pace = ArrivalRate()
+    for k in range(21):
+        pace.late([0.5 * k])
+    return pace
+
+
+@pytest.mark.parametrize(("delay_s", "late"), [(0.06, False), (0.45, False), (0.55, True)])
+def test_a_slow_device_may_be_late_by_its_period(delay_s: float, late: bool) -> None:
+    assert slow_device().late([10.5 + delay_s]) == [late]
+
+
+def test_a_slow_device_that_paused_is_believed_after_more_than_its_period() -> None:
+    pace = slow_device()
+    assert [pace.late([t])[0] for t in (13.0, 13.5, 14.0, 14.5)] == [True, True, False, False]
+
+
+def test_of_an_unknown_pace_only_the_last_message_of_a_read_is_not_late() -> None:
+    pace = ArrivalRate()
+    assert pace.late([0.0, 0.0, 0.0]) == [True, True, False] and pace.late([0.1]) == [False]
+
+
+def test_the_clock_of_a_device_is_let_go_slow_by_so_much_a_second() -> None:
+    """0.3 ms: a device clock that is 1 s slow in an hour; what comes later than that was delayed."""
+    clock = DeviceClock()
+    clock.stamp(0.0, 100.0)
+    assert clock.stamp(1000.0, 101.1).t == pytest.approx(101 + 0.00033, abs=1e-9)
+    assert clock.stamp(2000.0, 101.9).t == pytest.approx(101.9), "and at once where it comes earlier"
+    assert clock.jitter_s == pytest.approx(0.09967 / math.sqrt(3))
+
+
+def test_the_drift_counts_from_the_end_of_the_first_five_seconds() -> None:
+    clock = DeviceClock()
+    for k in range(16):
+        clock.stamp(1000.0 * k * (1 + 1e-4), 100.0 + k)
+    assert math.isnan(clock.drift), "15 s"
+    for k in range(16, 21):
+        clock.stamp(1000.0 * k * (1 + 1e-4), 100.0 + k)
+    assert clock.drift == pytest.approx(16e-4 / 15)
+
+
+@pytest.mark.parametrize(("late_s", "doubtful"), [(0.49, False), (3.0, False), (-0.49, False), (-0.51, True)])
+def test_a_message_half_a_second_early_is_an_old_one(late_s: float, doubtful: bool) -> None:
+    clock = DeviceClock()
+    for k in range(10):
+        clock.stamp(100.0 * k, 100.0 + 0.1 * k)
+    assert clock.stamp(1000.0, 101.0 + late_s).doubtful == doubtful
+
+
+def test_a_stamp_that_goes_back_is_doubted_however_little() -> None:
+    clock = DeviceClock()
+    clock.stamp(1000.0, 100.0)
+    assert clock.stamp(999.0, 100.0).doubtful and clock.jumps == 0
+    assert not clock.stamp(1001.0, 100.001).doubtful
+
+
+def test_a_clock_is_tied_to_the_least_delayed_of_the_first_messages() -> None:
+    clock = DeviceClock()
+    clock.begin([(1000.0, 51.0), (1100.0, 51.01), (1200.0, 51.5)])
+    assert clock.stamp(1000.0, 51.0).t == pytest.approx(50.91)
+
+
+def test_a_new_pace_is_one_that_is_kept_to_a_tenth_of_a_second() -> None:
+    for wobble_s, jumps in ((0.05, 1), (0.15, 0)):
+        clock = DeviceClock()
+        clock.stamp(50_000.0, 100.0)
+        for k in range(20):
+            clock.stamp(100.0 * k, 200.0 + 0.1 * k + wobble_s * (k % 2))
+        assert clock.jumps == jumps
+
+
+def test_messages_that_stay_late_are_believed_for_five_seconds() -> None:
+    clock = DeviceClock()
+    for k in range(10):
+        clock.stamp(100.0 * k, 100.0 + 0.1 * k)
+    doubtful = [clock.stamp(100.0 * k, 102.0 + 0.1 * k).doubtful for k in range(10, 70)]
+    assert doubtful.index(True) == pytest.approx(50, abs=1)
+    assert doubtful[-1] is False and clock.jumps == 1

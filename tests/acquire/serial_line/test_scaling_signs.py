@@ -87,3 +87,111 @@ def test_where_zero_moved_the_next_force_is_no_step() -> None:
     assert [steps(50.0), steps(59.0), steps(70.0)] == [False, False, True]
     scaling.tared()
     assert [steps(300.0), steps(311.0)] == [False, True]
+
+
+def scaling(address: str) -> tuple[Scaling, list[tuple[str, str]]]:
+    told: list[tuple[str, str]] = []
+    settings = read_settings(parse_address(f"/dev/fake?{address}"))
+    return Scaling(settings, lambda level, text: told.append((level, text))), told
+
+
+def test_a_last_digit_has_no_sign() -> None:
+    made, _ = scaling("gain=-2")
+    made.sample(Reading(12.34, None, b"", 0), 0.0)
+    assert made.zero.step_N == pytest.approx(0.02)
+
+
+def test_the_tares_of_a_test_are_undone_one_by_one_each_by_what_it_took() -> None:
+    zero = TareZero()
+    taken = []
+    for k, gross in enumerate((10.0, 25.0, 5.0)):
+        zero.saw(10.0 * k, gross)
+        taken.append(zero.take())
+    assert (taken, zero.offset) == ([10.0, 15.0, -20.0], 5.0)
+    assert [zero.undo() for _ in range(4)] == [20.0, -15.0, -10.0, None]
+    assert zero.offset == 0.0
+
+
+def test_a_tare_in_the_device_counts_from_the_offset_that_was_there() -> None:
+    """10 N were taken off here; then the device is tared under 25 N, of which 15 N are shown."""
+    zero = TareZero()
+    zero.saw(0.0, 10.0)
+    zero.take()
+    zero.saw(10.0, 25.0)
+    assert zero.moved_in_device() == 15.0 and zero.offset == 0.0
+    assert math.isnan(zero.load()), "what was seen before is void"
+    assert zero.undo() == -15.0 and zero.offset == -15.0
+    assert zero.undo() == -10.0 and zero.offset == -25.0
+    assert zero.undo() is None
+
+
+def test_a_tare_in_the_device_under_an_unknown_load_cannot_be_undone() -> None:
+    zero = TareZero()
+    zero.saw(0.0, 10.0)
+    zero.take()
+    zero.saw(10.0, math.nan)
+    zero._seen.popleft()
+    assert math.isnan(zero.moved_in_device()) and zero.undo() is None
+
+
+def test_sixteen_tares_can_be_undone_and_4096_samples_are_kept() -> None:
+    zero = TareZero()
+    for k in range(5000):
+        zero.saw(0.001 * k, float(k))
+    assert len(zero._seen) == 4096
+    for _ in range(20):
+        zero.take()
+    assert sum(zero.undo() is not None for _ in range(20)) == 16
+
+
+def test_a_second_tare_looks_at_the_gross_load() -> None:
+    made, _ = scaling("unit=N")
+    made.zero.offset = 100.0
+    for k in range(3):
+        made.sample(Reading(130.0, None, b"", 0), 0.1 * k)
+    assert made.zero.load() == 130.0
+    assert made.sample(Reading(130.0, None, b"", 0), 0.4).force == 30.0
+
+
+def test_a_reading_that_waited_is_none_to_tare_on() -> None:
+    made, _ = scaling("unit=N")
+    made.sample(Reading(500.0, None, b"", 0), 0.0, LoadFlag.STALE)
+    made.sample(Reading(math.nan, None, b"", 0, flags=LoadFlag.ERROR), 0.0)
+    assert math.isnan(made.zero.load())
+    made.sample(Reading(7.0, None, b"", 0), 0.1)
+    assert made.zero.load() == 7.0
+
+
+def test_beyond_the_range_is_told_once_and_its_end_too() -> None:
+    """Of a device that marks its own overload the force beyond the capacity stays."""
+    made, told = scaling("protocol=mt-sics&capacity=100")
+    values = (99.0, 100.0, -100.5, 120.0, math.nan, 99.0)
+    flags = [made.sample(Reading(value, "N", b"", 0), 0.0).flags for value in values]
+    assert [LoadFlag.OUT_OF_RANGE in one for one in flags] == [False, False, True, True, False, False]
+    assert told == [
+        ("error", "load alarm: out of range; last valid sample -100.5 N"),
+        ("info", "the load is within its range again"),
+    ]
+
+
+def test_an_alarm_before_any_force_says_so() -> None:
+    made, told = scaling("unit=N&capacity=100")
+    made.sample(Reading(-200.0, None, b"", 0), 0.0)
+    assert told == [("error", "load alarm: underload, out of range; no valid sample before")]
+
+
+@pytest.mark.parametrize(("step", "flagged"), [(10.0, False), (10.001, True), (-10.001, True)])
+def test_a_step_is_one_beyond_the_greatest(step: float, flagged: bool) -> None:
+    made, _ = scaling("unit=N&max_step=10")
+    made.sample(Reading(50.0, None, b"", 0), 0.0)
+    assert (LoadFlag.STEP in made.sample(Reading(50.0 + step, None, b"", 0), 0.1).flags) == flagged
+
+
+def test_a_unit_that_changes_is_told_each_time() -> None:
+    made, told = scaling("")
+    for unit in ("N", "N", "kN", "kN", "N"):
+        made.sample(Reading(1.0, unit, b"", 0), 0.0)
+    assert told == [
+        ("warning", "the unit on the line changed from N to kN"),
+        ("warning", "the unit on the line changed from kN to N"),
+    ]

@@ -24,6 +24,7 @@ from live.results.figures import (
     elastic_lines,
     evaluate,
     figure_lines,
+    figure_text,
     lag_line,
     sharpness_line,
     tensile_options,
@@ -137,6 +138,17 @@ def test_the_budget_names_the_shutter() -> None:
     for readout, words in ((None, "not stated: camera.readout_ms"), (0.0, "none"), (33.0, "removed")):
         rows = budget_rows({"scatter": 0.1}, 1e-3, 1.0, CameraView(readout_ms=readout), stresses=False)
         assert next(row.words for row in rows if row.cause == "rolling shutter") == words
+
+
+def test_a_figure_is_told_with_the_larger_half_of_its_interval() -> None:
+    figure = Figure(2000.0, 1900.0, 2020.0)
+    assert figure_text(figure) == "2000 ± 100"
+    assert figure_text(figure, 1e3, "kN") == "2.00 ± 0.10 kN"
+
+
+def test_without_a_force_there_is_no_line() -> None:
+    history, _ = kept(ramberg_osgood())
+    assert figure_lines(evaluate(history, LoadLog(), FLAT), FLAT) == []
 
 
 def test_a_laminate_has_no_proof_strength() -> None:

@@ -1,0 +1,138 @@
+"""The settings of a serial load cell: what they are unsaid, what they may be, and what is stored of them."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from acquire.addresses import parse_address
+from acquire.errors import ConfigError
+from acquire.load_cell import open_load_cell
+from acquire.load_cell.calibration import Point, fit, save
+from acquire.serial_line.settings import describe, read_settings
+
+ALLOWED = {
+    "mode": "one of listen, stream, poll",
+    "gain": "a number",
+    "wire": "yes or no",
+    "tare": "one of auto, device, software",
+    "rate": "a number from 0.01 to 1000",
+    "capacity": "a number from 1e-09",
+    "max_step": "a number from 1e-09",
+    "zero": "a number",
+    "timeout": "a number from 0.05 to 3600",
+    "wait": "a number from 0 to 3600",
+    "mass_reads_force": "yes or no",
+    "baud": "a whole number from 50 to 12000000",
+    "bytesize": "a whole number from 5 to 8",
+    "parity": "one of N, E, O",
+    "stopbits": "one of 1, 1.5, 2",
+}
+
+
+@pytest.mark.parametrize("key", ALLOWED)
+def test_an_impossible_value_is_refused_with_what_is_allowed(key: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        read_settings(parse_address(f"/dev/fake?unit=N&{key}=nonsense"))
+    assert str(caught.value).partition(" is not possible; allowed: ")[2] == ALLOWED[key]
+
+
+def test_what_is_not_said() -> None:
+    s = read_settings(parse_address("/dev/fake"))
+    assert (s.protocol.name, s.mode, s.unit, s.sign, s.gain, s.zero) == (
+        "ascii",
+        "listen",
+        None,
+        1,
+        None,
+        0.0,
+    )
+    assert (s.capacity_N, s.max_step_N, s.mass_reads_force, s.calibration) == (None, None, False, None)
+    assert (s.timeout_s, s.wait_s, s.rate, s.tare) == (2.0, 5.0, 10.0, "auto")
+    assert s.byte_time_s == pytest.approx(10 / 9600)
+    assert (s.line.url, s.line.baud, s.line.bytesize, s.line.parity, s.line.stopbits) == (
+        "/dev/fake", 9600, 8, "N", 1.0,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("protocol", "read_timeout_s"), [("ascii", 0.1), ("sauter&unit=N", 0.05)])
+def test_a_read_lasts_as_long_as_the_silence_that_ends_a_message(
+    protocol: str, read_timeout_s: float
+) -> None:
+    assert (
+        read_settings(parse_address(f"/dev/fake?protocol={protocol}")).line.read_timeout_s == read_timeout_s
+    )
+
+
+def test_capacity_and_step_are_not_mixed_up_and_a_line_may_have_no_wire() -> None:
+    s = read_settings(
+        parse_address("/dev/fake?unit=N&capacity=500&max_step=20&wire=no&timeout=7&wait=3&rate=4")
+    )
+    assert (s.capacity_N, s.max_step_N, s.byte_time_s) == (500.0, 20.0, 0.0)
+    assert (s.timeout_s, s.wait_s, s.rate) == (7.0, 3.0, 4.0)
+
+
+@pytest.mark.parametrize(("sign", "taken"), [("1", 1), ("+1", 1), ("-1", -1)])
+def test_a_sign_is_one_or_minus_one(sign: str, taken: int) -> None:
+    assert read_settings(parse_address(f"/dev/fake?unit=N&sign={sign}")).sign == taken
+
+
+@pytest.mark.parametrize("sign", ["11", "-", "0", "1.0", "--1"])
+def test_no_other_sign_is_taken(sign: str) -> None:
+    with pytest.raises(ConfigError, match="allowed: 1 or -1"):
+        read_settings(parse_address(f"/dev/fake?unit=N&sign={sign}"))
+
+
+def calibrated(folder: Path, settings: str = "") -> str:
+    """An address with a calibration: 2 N a count from 100 counts on."""
+    points = [Point(0.0, 100.0, 0.1, 50), Point(50.0, 125.0, 0.1, 50)]
+    save(fit(points, datetime(2026, 5, 9, tzinfo=UTC)), folder / "cal.toml", "")
+    return f"/dev/fake?calibration={folder}/cal.toml{settings}"
+
+
+@pytest.mark.parametrize(
+    ("settings", "gain", "zero"),
+    [("", 2.0, 100.0), ("&gain=3", 3.0, 100.0), ("&zero=90", 2.0, 90.0), ("&gain=3&zero=0", 3.0, 0.0)],
+)
+def test_gain_and_zero_of_the_address_come_before_those_of_a_calibration(
+    tmp_path: Path, settings: str, gain: float, zero: float
+) -> None:
+    s = read_settings(parse_address(calibrated(tmp_path, settings)))
+    assert (s.gain, s.zero) == (pytest.approx(gain), pytest.approx(zero))
+
+
+def test_what_is_stored_of_a_load_cell() -> None:
+    address = (
+        "/dev/fake?protocol=aed-standard&unit=kN&sign=-1&capacity=500&max_step=20&zero=3"
+        "&mass_reads_force=yes&wire=no&stopbits=1.5"
+    )
+    info = describe(read_settings(parse_address(address)), "0403:6001:A1")
+    assert (info.address, info.name, info.protocol) == (address, "aed-standard on /dev/fake", "aed-standard")
+    assert (info.clock, info.sign, info.capacity_N) == ("host", -1, 500.0)
+    assert info.settings == {
+        "port": "/dev/fake", "line": "2400 7E1.5", "mode": "listen", "unit": "kN", "gain": None, "zero": 3.0,
+        "calibration": None, "mass_reads_force": True, "max_step_N": 20.0, "byte_time_s": 0.0,
+        "usb": "0403:6001:A1",
+    }  # fmt: skip
+    assert info.warnings == ("no check digit: a changed digit reads as another value",)
+
+
+def test_an_address_opens_a_serial_load_cell() -> None:
+    with open_load_cell("loop://?unit=N&wait=0&sign=-1") as cell:
+        assert (cell.info.name, cell.info.sign, cell.info.settings["port"]) == (
+            "ascii on loop://",
+            -1,
+            "loop://",
+        )
+
+
+@pytest.mark.parametrize(
+    ("mode", "rate", "start"),
+    [("stream", "12", b"ICR3;MSV?0;"), ("stream", "0.5", b"ICR7;MSV?0;"), ("poll", "12", b"MSV?0;")],
+)
+def test_the_rate_of_a_stream_is_commanded(mode: str, rate: str, start: bytes) -> None:
+    """Of a device that is polled the reader keeps the rate."""
+    address = f"/dev/fake?protocol=hbm-aed&unit=N&mode={mode}&rate={rate}"
+    assert read_settings(parse_address(address)).commands["start"] == start

@@ -1,0 +1,308 @@
+"""Commands by value: terminal and environment, ports and readings, scales, studies, and both sides."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import math
+import threading
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquire.errors import ConfigError
+from acquire.load_sample import LoadFlag, LoadSample
+from analysis.evaluate import TwoSides
+from live.cli import main
+from live.commands import devices, environment, identify, recover, streams
+from live.commands.batch import _chunk_s
+from live.commands.init import _stable
+from live.commands.load_calibrate import _raw, _unfit
+from live.commands.map import _warn_of_motion
+from live.commands.options import add_options
+from live.commands.scale import _check as check_scale
+from live.commands.scale import _print_false_strain
+from live.commands.sides import _strains as side_lines
+from live.commands.streams import NonBlockingStream
+from live.commands.study import _curve, _figures, _section
+from live.config.loading import load_config
+from live.pipeline.screen import Screen
+from live.replay.study import StudySetting
+from live.results.run_folder import open_run
+from tests.live.made_run import make_run
+
+
+class Said(Screen):
+    """Keeps the lines."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def print(self, text: str = "") -> None:
+        self.lines.append(text)
+
+
+# -- terminal and machine -------------------------------------------------------------------------
+
+
+class Slow(io.StringIO):
+    """A terminal that is stopped until it is let go."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.began, self.go = threading.Event(), threading.Event()
+
+    def write(self, text: str) -> int:
+        self.began.set()
+        self.go.wait()
+        return super().write(text)
+
+    def fileno(self) -> int:
+        raise OSError
+
+
+def test_a_stopped_terminal_loses_writes_and_says_how_many() -> None:
+    slow = Slow()
+    stream = NonBlockingStream(slow, 3)
+    stream.write("first")
+    assert slow.began.wait(10)
+    for k in range(5):
+        assert stream.write(str(k)) == 1
+    assert not stream.drain(0.001) and not stream.isatty()
+    slow.go.set()
+    assert stream.drain(10)
+    stream.write("last")
+    assert stream.drain(10) and slow.getvalue() == "first012(2 writes left out: nobody read them)\nlast"
+    with pytest.raises(OSError):
+        stream.fileno()
+
+
+def test_streams_are_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    out = io.StringIO()
+    monkeypatch.setattr(streams.sys, "stdout", out)
+    with streams.nonblocking_streams():
+        print("a line")
+        assert streams.sys.stdout is not out
+    assert streams.sys.stdout is out and out.getvalue() == "a line\n"
+
+
+@pytest.mark.parametrize(("name", "value", "well"), [
+    ("NUMBA_NUM_THREADS", "1", True), ("NUMBA_NUM_THREADS", "0", False), ("NUMBA_NUM_THREADS", "2.5", False),
+    ("SOURCE_DATE_EPOCH", "0", True), ("SOURCE_DATE_EPOCH", "-1", False), ("NUMBA_NUM_THREADS", "²", False),
+])  # fmt: skip
+def test_whole_numbers_of_the_environment(
+    monkeypatch: pytest.MonkeyPatch, name: str, value: str, well: bool
+) -> None:
+    monkeypatch.setenv(name, value)
+    if well:
+        environment.check_environment()
+    else:
+        with pytest.raises(ConfigError, match=f"{name}=.* is not possible; give a whole number from"):
+            environment.check_environment()
+
+
+def test_a_threading_layer_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails() -> str:
+        raise ValueError("No threading layer could be loaded.\nmore")
+
+    monkeypatch.setattr("analysis.threading_library", fails)
+    monkeypatch.setenv("NUMBA_THREADING_LAYER", "tbb")
+    with pytest.raises(
+        ConfigError,
+        match=r"NUMBA_THREADING_LAYER=tbb is not possible \(No threading layer could be loaded\); ",
+    ):
+        environment.check_environment()
+
+
+def test_one_thread_of_openblas_unless_the_user_says_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    environment.limit_threads()
+    assert environment.os.environ["OPENBLAS_NUM_THREADS"] == "1"
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
+    environment.limit_threads()
+    assert environment.os.environ["OPENBLAS_NUM_THREADS"] == "3"
+
+
+def test_a_port_is_asked_question_after_question(monkeypatch: pytest.MonkeyPatch) -> None:
+    line = SimpleNamespace(baud=9600, bytesize=8, parity="N")
+    questions = [SimpleNamespace(data=b"a", line=line, protocol=name) for name in ("one", "two", "three")]
+    monkeypatch.setattr(identify.identify, "questions", lambda device: questions)
+    finding = SimpleNamespace(address="/dev/x?protocol=two", remark="look")
+    monkeypatch.setattr(identify.identify, "ask", lambda q: finding if q.protocol == "two" else None)
+    said: list[str] = []
+    assert identify._ask_all("/dev/x", said.append) == 0
+    assert said[1] == "  b'a'  at 9600 8N1 (one)"
+    assert said[4:] == [
+        "  one: no answer",
+        "  two: answers",
+        "use  --load '/dev/x?protocol=two'",
+        "note look",
+    ]
+    monkeypatch.setattr(identify.identify, "ask", lambda q: None)
+    assert identify._ask_all("/dev/x", said.append) == 6 and said[-1].startswith("no answer; check cable")
+
+
+@pytest.mark.parametrize(("unreadable", "code"), [(0, 0), (3, 5), (12, 5)])
+def test_ten_losses_of_a_recovery_are_named(
+    monkeypatch: pytest.MonkeyPatch, unreadable: int, code: int
+) -> None:
+    sentences = [f"loss {k}" for k in range(unreadable)]
+    done = SimpleNamespace(unreadable=sentences, line=lambda: "12 frames")
+    monkeypatch.setattr("acquire.session.recover", lambda session, out: done)
+    said: list[str] = []
+    assert recover.command(argparse.Namespace(session="a.h5", out=None), said.append) == code
+    assert said == ["12 frames", *(f"  {one}" for one in sentences[:10])]
+
+
+def test_the_devices_are_listed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    camera = SimpleNamespace(text=lambda: "a camera\n  its format")
+    for cameras, ports, heads in (([camera], [SimpleNamespace(text=lambda: "a port")], ("cameras:", "serial ports:")),
+                                  ([], [], ("cameras: none found", "serial ports: none found"))):  # fmt: skip
+        monkeypatch.setattr("acquire.camera.list_cameras", lambda found=cameras: found)
+        monkeypatch.setattr("acquire.serial_line.ports.list_serial_ports", lambda found=ports: found)
+        monkeypatch.setattr("analysis.threads", lambda: 7)
+        assert devices.command(argparse.Namespace()) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[0].startswith(heads[0]) and any(line.startswith(heads[1]) for line in lines)
+        assert lines[-1] == "threads that measure: 7" and ("  its format" in lines) == (
+            "a port" in lines
+        ) == bool(cameras)
+
+
+# -- readings, scales, studies --------------------------------------------------------------------
+
+
+def test_readings_that_give_no_point_of_a_calibration() -> None:
+    still = [LoadSample(k / 10, 5.0) for k in range(10)]
+    assert _unfit(still) == "" and _unfit(still[:2]) == ""
+    assert _unfit([LoadSample(0.0, math.nan)]) == _unfit([]) == "no reading had a value"
+    for flag in (LoadFlag.OVERLOAD, LoadFlag.UNDERLOAD):
+        assert _unfit([*still, replace(still[0], flags=flag)]) == "the cell was in overload or saturated"
+    assert _unfit([LoadSample(k / 10, 5.0 * k) for k in range(10)]) == "the load moved, by 45 on the line"
+
+
+def test_a_cell_is_calibrated_as_it_sends() -> None:
+    assert _raw("/dev/x?unit=g&baud=9600&gain=3&sign=-1&capacity=5") == "/dev/x?baud=9600&gain=1&sign=1"
+    assert _raw("/dev/x") == "/dev/x?gain=1&sign=1"
+
+
+@pytest.mark.parametrize(("address", "stable", "found"), [
+    ("/dev/video0?fps=5", "/dev/v4l/by-id/x", "/dev/v4l/by-id/x?fps=5"), ("/dev/video0?fps=5", "", "/dev/video0?fps=5"),
+    ("/dev/video0?fps=5", "aravis:x?fps=5", "aravis:x?fps=5"), ("/dev/video0", "/dev/v4l/by-id/x", "/dev/v4l/by-id/x"),
+])  # fmt: skip
+def test_the_address_that_stays(address: str, stable: str, found: str) -> None:
+    assert _stable(address, stable) == found
+
+
+def scale_arguments(**given: Any) -> argparse.Namespace:
+    names = ("points", "checkerboard", "charuco", "width", "length", "square", "marker", "stand_off", "sigma")
+    return argparse.Namespace(**{**dict.fromkeys(names), "sigma": 0.0, **given})
+
+
+def test_a_scale_is_taken_one_way_and_in_mm_above_zero() -> None:
+    check_scale(scale_arguments(width=5.0, sigma=0.0, stand_off=1.0))
+    for given in (
+        {}, {"points": "1,2,3,4", "width": 5.0}, {"width": 5.0, "sigma": -0.1}, {"width": 5.0, "length": 0.0},
+        {"width": 5.0, "square": math.inf}, {"width": 5.0, "stand_off": -1.0}, {"width": 5.0, "marker": 0.0},
+    ):  # fmt: skip
+        with pytest.raises(ConfigError):
+            check_scale(scale_arguments(**given))
+    screen = Said()
+    _print_false_strain(None, screen)
+    _print_false_strain(500.0, screen)
+    assert screen.lines[0].startswith("give --stand-off MM")
+    assert (
+        screen.lines[1]
+        == "0.1 mm toward the camera at a stand-off of 500 mm gives a false strain of 200 µm/m (exx and eyy)"
+    )
+
+
+def studied(vsg: float, order: int = 1, **more: Any) -> Any:
+    values = {"noise": 1e-4 / vsg, "seen": 2e-3, "sigma": 3e-5} | more
+    return SimpleNamespace(setting=StudySetting(32, 8, order, "gaussian"), vsg=vsg, **values)
+
+
+def test_the_figures_of_a_study_are_in_um_m() -> None:
+    noise, strain = _figures([studied(40.0), studied(20.0), studied(30.0, 2)])
+    assert [line.label for line in noise.curves] == ["order 1, gaussian", "order 2, gaussian"]
+    assert noise.curves[0].x.tolist() == [20, 40] and noise.curves[0].y.tolist() == pytest.approx([5.0, 2.5])
+    assert noise.curves[0].sigma is None and [line.colour for line in noise.curves] == [0, 1]
+    assert strain.curves[0].y.tolist() == pytest.approx([2000, 2000])
+    assert strain.curves[0].sigma is not None and strain.curves[0].sigma.tolist() == pytest.approx([30, 30])
+    assert _curve("a", [studied(1.0)], "seen", 4).colour == 4
+    text = _section(SimpleNamespace(found=studied(20.0)))  # type: ignore[arg-type]
+    assert text == '[measure]\nzoi = 32\nstep = 8\norder = 1\nwindow = "gaussian"\n'
+
+
+def test_the_strains_of_both_sides_at_the_end() -> None:
+    one = TwoSides(np.arange(3.0), np.array([0.0, 2e-3, math.nan]), np.array([0.0, -1e-4, math.nan]),
+                   np.array([1e-6, 2e-6, math.nan]))  # fmt: skip
+    nothing = replace(one, mean=np.full(3, math.nan))
+    head, line = side_lines(SimpleNamespace(courses={"axial": one, "lost": nothing}))  # type: ignore[arg-type]
+    assert line.split() == ["axial", "+2,000", "±", "2.0", "-100", "±", "2.0"] and "front minus mean" in head
+
+
+def test_a_map_over_a_later_picture_is_misplaced_by_the_motion(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with open_run(make_run(tmp_path, [0.0, 0.01, 0.1], session=False)) as run:
+        _warn_of_motion(run.strain, 1)
+        assert capsys.readouterr().out == ""
+        _warn_of_motion(run.strain, 2)
+    assert "moved by up to 8 px" in capsys.readouterr().out
+
+
+def test_the_help_names_the_defaults_there_are() -> None:
+    parser = argparse.ArgumentParser()
+    add_options(parser, "group", "zoi", "mask", "no-view", "order")
+    helps = {action.dest: str(action.help) for action in parser._actions}
+    defaults = load_config(None, {}).measure
+    assert helps["measure.zoi"].endswith(f"(default {defaults.zoi})")
+    assert helps["measure.order"].endswith(f"(default {defaults.order})")
+    assert "default" not in helps["measure.mask"] and helps["view.enabled"].startswith("do not ")
+    found = parser.parse_args(["--zoi", "40", "--no-view"])
+    assert getattr(found, "measure.zoi") == 40 and getattr(found, "view.enabled") is False
+    assert getattr(found, "measure.mask") is None
+
+
+def test_the_short_help_has_all_options_but_those_for_experts(capsys: pytest.CaptureFixture[str]) -> None:
+    shown = {}
+    for option in ("--help", "--help-all"):
+        with pytest.raises(SystemExit) as ended:
+            main(["replay", option])
+        assert ended.value.code == 0
+        shown[option] = capsys.readouterr().out
+    for words in (
+        "--zoi PX",
+        "--out DIR",
+        "width,thickness of the section in mm",
+        "metadata, stored in every file",
+    ):
+        assert words in shown["--help"] and words in shown["--help-all"], words
+    assert "--bending" in shown["--help-all"] and "--bending" not in shown["--help"]
+
+
+@pytest.mark.parametrize(
+    ("chunk", "as_measured", "words"),
+    [
+        (None, False, ""),
+        (None, True, ""),
+        (0.5, False, ""),
+        (0.5, True, "--as-measured is bit-identical"),
+        (0.0, False, "seconds above 0"),
+        (-1.0, False, "seconds above 0"),
+        (math.inf, False, "seconds above 0"),
+        (math.nan, False, "seconds above 0"),
+    ],
+)
+def test_chunks_of_a_batch(chunk: float | None, as_measured: bool, words: str) -> None:
+    arguments = argparse.Namespace(chunk_s=chunk, as_measured=as_measured)
+    if words:
+        with pytest.raises(ConfigError, match=words):
+            _chunk_s(arguments)
+    else:
+        assert _chunk_s(arguments) == chunk

@@ -1,0 +1,380 @@
+"""The tasks on a cluster and on a worker without Dask: what is submitted, taken, given up and told."""
+
+from __future__ import annotations
+
+import io
+import json
+import queue
+import socket
+import sys
+from concurrent.futures import CancelledError
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from acquire.errors import ConfigError, DataError
+from live.pipeline.screen import Screen
+from live.replay.batch import cluster, worker
+from live.replay.batch.cluster import Cluster, advice, check, check_scheduler
+from live.replay.batch.keys import deciding_versions
+from live.replay.batch.row import BatchRow
+from live.replay.batch.task import ROW_FILE, Task, TaskProgress
+from live.replay.batch.worker import NEEDED, ONE_THREAD, describe_worker
+
+
+class Future:
+    """One task of the fake client."""
+
+    def __init__(self, key: str, line: str) -> None:
+        self.key, self.task, self.status = key, Task.from_json(line), "pending"
+        self.error: Exception | None = None
+        self._done: list[Any] = []
+
+    def add_done_callback(self, call: Any) -> None:
+        self._done.append(call)
+
+    def exception(self) -> Exception | None:
+        return self.error
+
+    def end(self, status: str = "finished", error: Exception | None = None) -> None:
+        self.status, self.error = status, error
+        for call in self._done:
+            call(self)
+
+
+class Client:
+    """In place of Dask's client; ``answers`` are of its workers."""
+
+    def __init__(self, answers: dict[str, Any]) -> None:
+        self.answers, self.status, self.futures = answers, "running", list[Future]()
+        self.compiled, self.cancelled, self.closed, self.lost = list[Any](), list[Any](), 0, False
+        self.threads: dict[str, int] = {"w": 1}
+
+    def run(self, function: Any, token: str) -> dict[str, Any]:
+        assert Path(token).exists(), "the token is there while the workers are asked"
+        if isinstance(self.answers, Exception):
+            raise self.answers
+        return self.answers
+
+    def submit(self, function: Any, *, workers: list[str], pure: bool) -> str:
+        self.compiled.append((workers, pure))
+        return workers[0]
+
+    def gather(self, futures: list[Any], errors: str = "raise") -> list[Any]:
+        if self.lost:
+            raise OSError("lost")
+        if errors == "skip":
+            return futures
+        return [{"test": one.task.name, "outcome": "done", "exit_code": 0} for one in futures]
+
+    def subscribe_topic(self, topic: str, call: Any) -> None:
+        self.event = call
+
+    def map(self, function: Any, lines: list[str], *, key: list[str], **more: Any) -> list[Future]:
+        self.more = more
+        made = [Future(name, line) for name, line in zip(key, lines, strict=True)]
+        self.futures += made
+        return made
+
+    def nthreads(self) -> dict[str, int]:
+        return self.threads
+
+    def cancel(self, futures: list[Any], *, force: bool) -> None:
+        self.cancelled += [(one.key, force) for one in futures]
+
+    def close(self, timeout: float = 0.0) -> None:
+        self.closed += 1
+
+
+def answer(host: str = "a", **more: Any) -> dict[str, Any]:
+    return {
+        "host": host, "versions": dict(deciding_versions()), "slots": 1, "has_token": True,
+        "threads": dict.fromkeys(NEEDED, "1"), **more,
+    }  # fmt: skip
+
+
+class Lines(Screen):
+    """Keeps what is printed."""
+
+    def __init__(self) -> None:
+        self.printed: list[str] = []
+
+    def print(self, text: str = "") -> None:
+        self.printed.append(text)
+
+
+class Running:
+    """A cluster with these tasks and workers."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, out: Path, names: str, **answers: Any) -> None:
+        self.client = Client(answers or {"one": answer()})
+        self.rows: dict[str, BatchRow] = {}
+        self.screen, self.progress, self.then = (
+            Lines(),
+            list[tuple[str, TaskProgress]](),
+            dict[str, list[Task]](),
+        )
+        monkeypatch.setattr(cluster, "_connected", lambda address: self.client)
+        self.tasks = [Task(name, str(out), f"/data/{name}.h5", key=f"key-{name}") for name in names]
+        self.cluster = Cluster(
+            self.tasks, "tcp://here:1", lambda task, progress: self.progress.append((task.name, progress)),
+            self._done, self.screen,
+        )  # fmt: skip
+
+    def _done(self, task: Task, row: BatchRow) -> list[Task]:
+        self.rows[task.name] = row
+        return self.then.get(task.name, [])
+
+    def names(self) -> str:
+        return "".join(one.task.name for one in self.client.futures)
+
+
+def test_tasks_are_submitted_with_their_keys_and_their_rows_taken(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    bench = Running(monkeypatch, tmp_path, "ab")
+    assert list(tmp_path.iterdir()) == [], "the token is gone"
+    assert [one.key for one in bench.client.futures] == [f"{tmp_path}/a-key-a", f"{tmp_path}/b-key-b"]
+    assert bench.client.more["retries"] == 2 and bench.client.more["pure"] is False
+    assert bench.client.more["folder"] == str(Path.cwd())
+    assert not bench.cluster.wait(0)
+    bench.client.futures[1].end()
+    assert not bench.cluster.wait(0) and list(bench.rows) == ["b"] and bench.rows["b"].is_well
+    bench.client.event((0.0, ["a", 3, 9, 30]))
+    bench.client.event((0.0, ["unknown", 3, 9, 30]))
+    assert bench.progress == [("a", TaskProgress(3, 9, 30))]
+    bench.client.futures[0].end()
+    assert bench.cluster.wait(0)
+    bench.cluster.close()
+    assert bench.client.cancelled == [] and bench.client.closed == 1
+
+
+def test_what_follows_a_task_is_submitted_before_what_waits(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(cluster, "_MIN_QUEUED", 2)
+    monkeypatch.setattr(cluster, "_PER_WORKER", 1)
+    bench = Running(monkeypatch, tmp_path, "abcdef")
+    assert bench.names() == "ab", "no more than two at once"
+    bench.then["a"] = [Task("z", str(tmp_path), "/data/z.h5")]
+    bench.client.futures[0].end()
+    assert not bench.cluster.wait(0)
+    assert bench.names() == "abz"
+    bench.client.futures[1].end()
+    bench.client.futures[2].end()
+    bench.cluster.wait(0)
+    assert bench.names() == "abzcd"
+
+
+@pytest.mark.parametrize(("workers", "queued"), [(1, 200), (50, 200), (51, 204)])
+def test_four_tasks_a_worker_are_queued_and_two_hundred_at_least(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, workers: int, queued: int
+) -> None:
+    answers = {f"w{k}": answer("a") for k in range(workers)}
+    bench = Running(monkeypatch, tmp_path, "a", **answers)
+    assert bench.cluster._max_queued == queued
+    assert bench.client.compiled == [([f"w{workers - 1}"], False)], "once on each machine"
+
+
+def test_a_task_that_is_given_up_fails_with_why(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    bench = Running(monkeypatch, tmp_path, "abc")
+    bench.client.futures[0].end("error", CancelledError("killed"))
+    bench.client.futures[1].end("cancelled")
+    (tmp_path / "c").mkdir()
+    row = {"test": "c", "outcome": "done", "exit_code": 0}
+    (tmp_path / "c" / ROW_FILE).write_text(json.dumps({"key": "key-c", "row": row}), encoding="utf-8")
+    bench.client.futures[2].end("error", CancelledError("killed"))
+    assert bench.cluster.wait(0)
+    assert [bench.rows[name].values["error"] for name in "abc"] == [
+        "the cluster gave it up: CancelledError: killed",
+        "the cluster gave it up: no result arrived (cancelled)",
+        "",
+    ]
+    assert [bench.rows[name].values["exit_code"] for name in "abc"] == [1, 1, 0], "the last is on the disk"
+
+
+def test_rows_that_do_not_come_are_read_from_the_disk(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    bench = Running(monkeypatch, tmp_path, "a")
+    (tmp_path / "a").mkdir()
+    row = {"test": "a", "outcome": "done", "exit_code": 0}
+    (tmp_path / "a" / ROW_FILE).write_text(json.dumps({"key": "key-a", "row": row}), encoding="utf-8")
+    bench.client.lost = True
+    bench.client.futures[0].end()
+    assert bench.cluster.wait(0) and bench.rows["a"].is_well
+
+
+class Quick(queue.SimpleQueue):  # type: ignore[type-arg]
+    """Waits for nothing."""
+
+    def get(self, block: bool = True, timeout: float | None = None) -> Any:
+        return super().get_nowait()
+
+
+def test_a_scheduler_that_is_away_for_five_seconds_has_ended(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    bench = Running(monkeypatch, tmp_path, "ab")
+    bench.cluster._ended = Quick()
+    bench.client.status = "connecting"
+    bench.client.futures[0].end("error", CancelledError("killed"))
+    for _ in range(5):
+        assert not bench.cluster.wait(1.0)
+    assert bench.rows == {}, "what is lost with the connection is no failure of a task"
+    bench.client.status = "running"
+    bench.cluster.wait(1.0)
+    bench.client.status = "connecting"
+    for _ in range(5):
+        bench.cluster.wait(1.0)
+    with pytest.raises(DataError, match="the scheduler has ended; complete tests are kept"):
+        bench.cluster.wait(0.1)
+    bench.cluster.close()
+    assert bench.client.cancelled == []
+
+
+def test_where_nothing_ends_and_there_are_no_workers_a_note_comes_every_fifteen_seconds(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    bench = Running(monkeypatch, tmp_path, "ab")
+    bench.cluster._ended = Quick()
+    bench.client.threads = {}
+    for _ in range(3):
+        bench.cluster.wait(5.0)
+    assert bench.screen.printed == []
+    bench.client.futures[0].end()
+    bench.cluster.wait(5.0)
+    for _ in range(3):
+        bench.cluster.wait(5.0)
+    assert bench.screen.printed == [], "counted anew since a task has ended"
+    bench.cluster.wait(0.1)
+    note = "note: tcp://here:1 has no workers any more; waiting for some"
+    assert bench.screen.printed == [note]
+    for _ in range(4):
+        bench.cluster.wait(5.0)
+    assert bench.screen.printed == [note] * 2
+    bench.client.threads = {"w": 1}
+    for _ in range(4):
+        bench.cluster.wait(5.0)
+    assert len(bench.screen.printed) == 2
+    bench.cluster.close()
+    assert bench.client.cancelled == [(f"{tmp_path}/b-key-b", True)] and bench.client.closed == 1
+
+
+def test_workers_that_do_not_fit_end_it_before_any_task(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    clients: list[Client] = []
+
+    def connected(address: str) -> Client:
+        clients.append(Client({"w": answer(slots=2)}))
+        return clients[-1]
+
+    task = Task("a", str(tmp_path), "a.h5")
+    monkeypatch.setattr(cluster, "_connected", connected)
+    with pytest.raises(ConfigError, match="does 2 tasks at once"):
+        Cluster([task], "tcp://here:1", print, print, Lines())  # type: ignore[arg-type]
+    assert clients[0].closed == 1 and clients[0].futures == [] and list(tmp_path.iterdir()) == []
+    monkeypatch.setattr(cluster, "_connected", lambda address: Client(ValueError("x")))  # type: ignore[arg-type]
+    with pytest.raises(ConfigError, match=r"a worker cannot run phasedic \(ValueError: x\)"):
+        Cluster([task], "tcp://here:1", print, print, Lines())  # type: ignore[arg-type]
+
+
+def test_what_is_asked_of_workers() -> None:
+    with pytest.raises(ConfigError, match="has no workers"):
+        check("tcp://here:1", {})
+    check("tcp://here:1", {"w": answer()})
+    with pytest.raises(ConfigError, match="does not find --out"):
+        check("tcp://here:1", {"w": answer(), "v": answer(has_token=False)})
+    older = answer()
+    older["versions"]["numpy"] = "1.0"
+    with pytest.raises(ConfigError, match=r"worker w has numpy 1\.0, here it is"):
+        check("tcp://here:1", {"w": older})
+    del older["versions"]["numpy"]
+    with pytest.raises(ConfigError, match="worker w has numpy not known"):
+        check("tcp://here:1", {"w": older})
+    many = answer(threads={**dict.fromkeys(NEEDED, "1"), NEEDED[1]: "4", NEEDED[2]: ""})
+    (note,) = advice({"v": answer(), "w": many})
+    assert note.startswith(
+        f"note: 1 of 2 workers, such as w, were started without {NEEDED[1]}=1 {NEEDED[2]}=1;"
+    )
+    assert list(advice({"v": answer()})) == []
+
+
+@pytest.mark.parametrize(
+    "address", ["here:1", "http://here:1", "tcp://here", "tcp://here:123456", "tcp://a/b:1", " tcp://here:1", "tcp://:1"]
+)  # fmt: skip
+def test_what_is_no_address_of_a_scheduler(address: str) -> None:
+    with pytest.raises(ConfigError, match="give tcp://HOST:PORT"):
+        check_scheduler(address)
+
+
+def test_a_scheduler_is_looked_for_where_no_certificate_is_needed() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        check_scheduler(f"tcp://127.0.0.1:{server.getsockname()[1]}")
+        port = server.getsockname()[1]
+    with pytest.raises(ConfigError, match="nothing answers there"):
+        check_scheduler(f"tcp://127.0.0.1:{port}")
+    check_scheduler(f"tls://127.0.0.1:{port}")
+
+
+def test_a_worker_describes_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in NEEDED:
+        monkeypatch.setenv(name, "1")
+    monkeypatch.delenv(NEEDED[0])
+    of_dask = SimpleNamespace(state=SimpleNamespace(nthreads=3))
+    found = describe_worker(str(tmp_path / "none"), of_dask)
+    assert (found["slots"], found["has_token"]) == (3, False)
+    assert list(found["threads"].values()) == ["", "1", "1"]
+    (tmp_path / "token").touch()
+    assert describe_worker(str(tmp_path / "token"))["slots"] == 1
+    assert describe_worker(str(tmp_path / "token"))["has_token"]
+    assert NEEDED == ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS") and len(ONE_THREAD) == 5
+
+
+def test_a_worker_of_this_machine_answers_in_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = io.StringIO()
+    worker._put_progress(answers, TaskProgress(3, None, 30))
+    worker._put(answers, {"row": {"test": "a"}})
+    assert [json.loads(line) for line in answers.getvalue().splitlines()] == [
+        {"progress": {"done": 3, "expected": None, "zois": 30}}, {"row": {"test": "a"}},
+    ]  # fmt: skip
+    ended: list[tuple[int, int]] = []
+    monkeypatch.setattr(sys, "stdin", io.StringIO("one\ntwo\n"))
+    monkeypatch.setattr(
+        worker, "os", SimpleNamespace(kill=lambda *given: ended.append(given), getpid=lambda: 7)
+    )
+    tasks: queue.Queue[str] = queue.Queue()
+    worker._listen(tasks)
+    assert [tasks.get_nowait(), tasks.get_nowait()] == ["one\n", "two\n"] and ended == [(7, 15)]
+
+
+def test_a_worker_of_a_cluster_reports_its_progress_every_two_seconds(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    sent: list[Any] = []
+    now = [100.0]
+    me = SimpleNamespace(
+        loop=SimpleNamespace(add_callback=lambda call, *given: sent.append(given)), log_event=None
+    )
+    monkeypatch.setitem(sys.modules, "distributed", SimpleNamespace(get_worker=lambda: me))
+    monkeypatch.setattr(worker, "time", SimpleNamespace(monotonic=lambda: now[0]))
+
+    def perform(task: Task, on_progress: Any) -> BatchRow:
+        assert Path.cwd() == tmp_path
+        for k in range(6):
+            now[0] = 100.0 + k
+            on_progress(TaskProgress(k, 9, 10 * k))
+        me.loop = None
+        now[0] = 200.0
+        on_progress(TaskProgress(8, 9, 80))
+        return BatchRow.of({"test": task.name, "exit_code": 0})
+
+    monkeypatch.setattr(worker, "perform", perform)
+    before = Path.cwd()
+    line = Task("0001", str(tmp_path), "a.h5", of="a").to_json()
+    found = worker.perform_on_worker(line, str(tmp_path), "topic")
+    assert found["test"] == "0001" and Path.cwd() == before
+    assert sent == [("topic", ["a#0001", k, 9, 10 * k]) for k in (0, 2, 4)]

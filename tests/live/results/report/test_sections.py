@@ -1,0 +1,361 @@
+"""Sections of a report, by value: rig, gauges, times, events, noise, lens, statuses, maps, comparison."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import io
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from acquire.errors import DataError
+from acquire.events import Event, EventKind
+from acquire.frame import CameraInfo
+from analysis.evaluate import Figure, NoiseFloor
+from live.pipeline.screen import Screen
+from live.results.maps.colours import diverging_table
+from live.results.maps.scale import ColourScale
+from live.results.report import comparison, record, report
+from live.results.report.evaluation import EvaluatedCurve
+from live.results.report.maps import _bar, map_pictures, maps, statuses
+from live.results.report.noise_floor import still_phase_of
+from live.results.report.practice import PracticeValues, reporting_table
+from live.results.report.record import events, gauges, hashes, times, version_table
+from live.results.report.report import Report, ReportRequest, make_report, tensile
+from live.results.run_folder import RunFolder, open_run
+from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
+
+N = len(PULLED)
+
+
+@pytest.fixture
+def run(run_dir: Path) -> Iterator[RunFolder]:
+    with open_run(run_dir) as opened:
+        yield opened
+
+
+def plain(text: str) -> str:
+    """Without markup; cells apart by bars."""
+    return html.unescape(re.sub(r"\|+", "|", re.sub("<[^>]*>", "|", text)))
+
+
+# -- from the record ------------------------------------------------------------------------------
+
+
+def test_gauges_have_their_largest_and_last_strain_and_how_often_they_were_lost(tmp_path: Path) -> None:
+    with open_run(make_run(tmp_path, PULLED[:12], config={**CONFIG, "gauges": GAUGES})) as run:
+        values = run.strain.values
+        values["gauge_axial"][:], values["sigma_gauge_axial"][:] = 1e-4, 2e-6
+        values["gauge_axial"][[2, 3, 5]] = -3e-3, math.nan, math.nan
+        values["gauge_shear"][:], values["sigma_gauge_shear"][:] = math.nan, math.nan
+        found = plain(gauges(run))
+    assert "|axial|kind line; start 64, 20; end 64, 76|3000 µm/m|100.0 ± 2.0 µm/m|2|" in found
+    assert "value exy|not known|not known|12|" in found
+
+
+def test_times_of_the_load_and_of_the_results(run: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(record, "lag_of", lambda _: Figure(0.0123, 0.0103, 0.0143))
+    run.strain.values["latency_s"] = np.array([*np.arange(101) * 1e-3, math.nan])
+    run.strain.config["load"] = {"lag_s": 0.025}
+    found = plain(times(run))
+    assert "|12.3 ± 2.0 ms (95% interval; positive: the load is late)|" in found
+    assert "|lag corrected in the force|0.025 s|" in found
+    assert "|from the last frame of a burst to its result|p50 50 ms, p95 95 ms|" in found
+    run.strain.config["load"], run.strain.values["latency_s"] = {"lag_s": 0.0}, np.full(3, math.nan)
+    found = plain(times(run))
+    assert "|lag corrected in the force|none|" in found and "p95" not in found
+
+
+def test_events_count_from_the_start_and_are_bounded(run: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(record, "_MAX_EVENTS", 2)
+    start = run.start_monotonic
+    happened = [Event(start + t, EventKind.NOTE, "operator", f"at {t:g}", "error") for t in (0.5, 1.25, 2.0)]
+    run.__dict__["events"] = happened
+    found = plain(events(run))
+    assert "|0.500|error|note|operator|at 0.5|" in found and "|1.250|" in found and "at 2" not in found
+    assert "1 more events are in session.h5." in found
+    run.__dict__["events"] = happened[:2]
+    assert "more events" not in plain(events(run))
+    run.__dict__["events"] = []
+    assert "No events were recorded." in plain(events(run))
+
+
+def test_versions_then_and_now(run: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(record, "versions", lambda: {"phasedic": "9.9", "numpy": "2"})
+    found = plain(version_table(run))
+    assert "|phasedic|0.1.0|9.9|" in found and "|numpy|2|" in found and "|python|3.11|" in found
+
+
+def test_the_files_with_size_and_hash(run: RunFolder, tmp_path: Path) -> None:
+    copied = tmp_path / "session.h5"
+    copied.write_bytes(bytes(1_234_567))
+    run.path = tmp_path
+    (tmp_path / "notes.txt").write_text("not of the run")
+    shown: list[str] = []
+
+    class Shown(Screen):
+        def status(self, text: str) -> None:
+            shown.append(text)
+
+    found = plain(hashes(run, Shown()))
+    digest = hashlib.sha256(copied.read_bytes()).hexdigest()
+    assert f"|session.h5|1\u202f234\u202f567|{digest}|" in found and "notes" not in found
+    assert shown == ["reading session.h5 for its hash"]
+    assert record._sha256(tmp_path / "gone.h5").startswith("cannot be read: No such file")
+
+
+# -- from the results -----------------------------------------------------------------------------
+
+
+def test_the_rig_in_words(run: RunFolder) -> None:
+    camera = CameraInfo("v4l2:", "a camera", 1280, 960, 12, True, "device", fps=25.0, warnings=("it is hot",))
+    found = report._rig(run, SimpleNamespace(camera=camera))  # type: ignore[arg-type]
+    assert found["section"] == "10 mm x 2 mm" and found["load along"] == "y of the picture"
+    assert found["camera"] == "a camera: 1280 x 960 px, 12 bits, 25 frames/s, clock: device"
+    assert found["load cell"] == "made-up cell, capacity 5000 N"
+    assert found["warnings of the devices"] == "it is hot" and found["lens"] == "50 mm"
+    assert found["ZOIs"] == "34 of 32 px, 16 px apart, region x,y,w,h = 0,0,128,96 px"
+    assert found["camera address"] == "sim:made-up"
+
+
+def test_the_head_of_the_report(run: RunFolder) -> None:
+    curve = EvaluatedCurve.of(run)
+    extent = report._extent(run, replace(curve, axial=np.array([0.0, -0.03, 0.01, math.nan])))
+    assert extent["ZOIs with a value, last"] == "33 of 34"
+    assert extent[f"largest {curve.figures.strain}"] == "-3 %"
+    head = plain(report._head(run, curve))
+    assert f"Test of 2030-01-02T03:04:05+00:00: {N} measurements in 9.5 s." in head
+    assert "not closed" not in head
+    run.strain.unfinished = True
+    assert "The results were not closed by their writer" in report._head(run, curve)
+
+
+def test_the_words_under_the_curves(run: RunFolder) -> None:
+    curve = EvaluatedCurve.of(run)
+    span = curve.figures.span
+    assert span is not None
+    low, high = (100 * strain for strain in span.strain)
+    words = plain(report._about_curves(curve))
+    assert (
+        f"The elastic line has {span.n} instants between the strains {low:.3g} and {high:.3g} % (iso6892,"
+        in words
+    )
+    assert "E is not known" not in words
+    unknown = replace(curve, figures=replace(curve.figures, E=Figure.none("too short"), span=None))
+    assert plain(report._about_curves(unknown)).endswith("on either side. E is not known: too short.|")
+    assert not report.figure_table(run, replace(curve, load=np.full(N, math.nan)))
+
+
+def test_the_noise_floor_by_map(run: RunFolder) -> None:
+    floors = {"u": NoiseFloor(0.004, 0.005), "exx": NoiseFloor(42e-6, 40e-6), "exy": NoiseFloor(1e-6, 0.0)}
+    content: Any = SimpleNamespace(run=run, still=SimpleNamespace(time_steps=8, floors=floors))
+    found = plain("".join(report._noise_section(content)))
+    assert "|u|0.004|0.005|px|0.80|" in found and "|exx|42|40|µm/m|1.05|" in found
+    assert "|exy|1|0|µm/m|not known|" in found
+    assert "in the first 8 instants (to 0.7 s)" in found
+
+
+def test_the_still_phase_is_measured(run: RunFolder) -> None:
+    """Eight instants at rest, with a noise of 1e-5 in each gradient."""
+    still = still_phase_of(run.strain)
+    assert still.time_steps == 8 and set(still.floors) == {"u", "v", "exx", "eyy", "exy"}
+    for name, sigma in (("u", 1e-5), ("exx", 1e-5), ("exy", 1e-5 / math.sqrt(2))):
+        assert still.floors[name].measured == pytest.approx(sigma, rel=0.15), name
+        assert still.floors[name].predicted == pytest.approx(sigma, rel=0.02), name
+    assert set(still_phase_of(run.strain, ("eyy",)).floors) == {"eyy"}
+
+
+def test_what_a_lens_made_is_told(run: RunFolder) -> None:
+    assert report._lens_section(run) == []
+    columns = {"lens_exx": [-30e-6, 5e-6], "lens_eyy": [math.nan, 20e-6], "sigma_lens_exx": [2e-6, 1e-6],
+               "sigma_lens_eyy": [math.nan, 3e-6]}  # fmt: skip
+    run.strain.values.update({name: np.array(values) for name, values in columns.items()})
+    run.strain.config["lens"] = {"date": "2030-01-01", "method": "a board"}
+    (found,) = map(plain, report._lens_section(run))
+    assert "Calibrated 2030-01-01: a board. Up to 30 µm/m of exx and 20 of eyy" in found
+    assert "known to 2 and 3;" in found
+
+
+def test_the_sharpness_is_told_where_it_is_known(run: RunFolder) -> None:
+    run.strain.values["blur_px"], run.strain.values["sigma_blur_px"] = (
+        np.array([0.1, -0.4]),
+        np.array([0.02, 0.03]),
+    )
+    (found,) = map(plain, report._sharpness_section(run))
+    assert "sharper by 0.40 ± 0.03 px at most, sharper by 0.40 ± 0.03 px in the last picture" in found
+    run.strain.values["blur_px"] = np.full(2, math.nan)
+    assert report._sharpness_section(run) == []
+    del run.strain.values["blur_px"]
+    assert report._sharpness_section(run) == []
+
+
+def test_the_reporting_table_has_what_was_measured_with(run: RunFolder) -> None:
+    run.strain.config["measure"] = {"order": 2, "window": "uniform"}
+    run.strain.config["camera"] = {"dark": "d.png", "flat": "f.png"}
+    run.strain.metadata |= {"Field-of-view": "30 mm", "exposure": "8 ms"}
+    found = plain(reporting_table(PracticeValues(run, None, None, {}, None)))
+    for words in (
+        "|Subset shape function|quadratic (12 parameters)|", "|Subset size (ZOI)|32 px, uniform weight|",
+        "|Step size|16 px|", "spectrum; dark and flat frame|", "|Frames averaged|8; reference 8|",
+        "|Virtual strain gauge size|32 px, one ZOI|", "|Strain formulation|small|", "|Field of view|30 mm|",
+        "|Exposure time|8 ms|", "|Image resolution|not recorded|", "|DIC software|phasedic 0.1.0, phase-DIC|",
+        "|Camera|not recorded (phasedic run --meta camera=...)|", "|Strain noise floor|not recorded|",
+    ):  # fmt: skip
+        assert words in found, words
+    del run.strain.config["measure"]["order"]
+    assert "|affine (6 parameters)|" in plain(reporting_table(PracticeValues(run, None, None, {}, None)))
+
+
+# -- maps -----------------------------------------------------------------------------------------
+
+
+def pictures_in(text: str) -> list[np.ndarray]:
+    return [
+        cv2.imdecode(np.frombuffer(base64.b64decode(one), np.uint8), cv2.IMREAD_COLOR)
+        for one in re.findall(r"base64,([^\"]+)", text)
+    ]
+
+
+def test_each_map_lies_beside_the_picture_of_its_instant(run: RunFolder) -> None:
+    rows = {0: "first", N - 1: "last"}
+    pictures = map_pictures(run, list(rows))
+    assert pictures.size == (128, 96) and pictures.camera is not None
+    for row, image in pictures.images.items():
+        assert image is not None and int(image[0, 0]) in (100 + 8 * row + 3, 100 + 8 * row + 4)
+    text = maps(run, "eyy", rows, pictures, 320)
+    drawn = pictures_in(text)
+    assert [one.shape for one in drawn] == [(240, 320, 3)] * 4
+    # Grey beside colours; red at the end, and blue nowhere.
+    grey, _, _, strained = (one.astype(int) for one in drawn)
+    assert np.ptp(grey[120, 160]) < 8
+    assert strained[120, 160, 2] - strained[120, 160, 0] > 80
+    assert re.findall(r'alt="([^"]+)"', text) == [
+        "picture, first",
+        "eyy, first",
+        "picture, last",
+        "eyy, last",
+    ]
+    shown = plain(text)
+    assert "first: t = 0.000 s   F = 0.0 N" in shown and "last: t = 9.500 s   F = 4210.0 N" in shown
+    run.__dict__["pictures"] = None
+    without = map_pictures(run, [3])
+    assert (without.images, without.levels, without.size) == ({3: None}, None, (128, 96))
+    assert len(pictures_in(maps(run, "eyy", {3: "a"}, without, 320))) == 1
+
+
+def test_the_bar_of_a_map_has_its_colours_and_numbers() -> None:
+    bar = _bar("eyy", ColourScale(-2.0, 2.0, "%", 100.0))
+    boxes = re.findall(r'<rect x="([\d.]+)"[^>]*fill="rgb\((\d+),(\d+),(\d+)\)"', bar)
+    assert len(boxes) == 16 and boxes[0][0] == "10.0" and boxes[-1][0] == "460.0"
+    table = diverging_table()
+    assert [int(v) for v in boxes[0][1:]] == table[0].tolist()
+    assert [int(v) for v in boxes[-1][1:]] == table[-1].tolist()
+    words = {text: float(x) for x, text in re.findall(r'x="([\d.]+)" y="34">([^<]+)<', bar)}
+    assert words["−2"] == 10.0 and words["0"] == 250.0 and words["2"] == 490.0
+    assert 'aria-label="colours of eyy from -2 to 2 %"' in bar
+
+
+def test_the_statuses_are_counted(run: RunFolder) -> None:
+    text = statuses(run, 0, map_pictures(run, [0]), 320)
+    assert "|33 OK: " in plain(text) and "|1 POOR_MATCH: " in plain(text) and "NOT_MEASURED" not in text
+    assert "t = 0.000 s" in plain(text) and len(pictures_in(text)) == 1
+
+
+# -- several tests --------------------------------------------------------------------------------
+
+
+def compared(tmp_path: Path) -> list[comparison.ComparedTest]:
+    config = {**CONFIG, "specimen": {"axis": "y"}}
+    folders = [make_run(tmp_path / str(k), PULLED, config=config, session=False) for k in range(2)]
+    found = []
+    for k, folder in enumerate(folders):
+        with open_run(folder) as one:
+            test = comparison.tests_of([one, one])[0]
+        found.append(
+            replace(
+                test,
+                curve=replace(
+                    test.curve, load=test.curve.load * (1 - 0.6 * k), axial=test.curve.axial * (1 + 9 * k)
+                ),
+            )
+        )
+    return found
+
+
+def test_all_tests_are_drawn_in_one_unit(tmp_path: Path) -> None:
+    """In kN for the strongest, in % for the longest."""
+    tests = compared(tmp_path)
+    made = comparison.compare(tests)
+    assert isinstance(made, Report)
+    (plot,) = made.figures
+    assert (plot.x_label, plot.y_label) == ("axial strain, %", "force, kN")
+    assert [line.label for line in plot.curves] == ["S1", "S1"] and [line.colour for line in plot.curves] == [
+        0,
+        1,
+    ]
+    for line, test in zip(plot.curves, tests, strict=True):
+        np.testing.assert_allclose(line.x, 100 * test.curve.axial)
+        np.testing.assert_allclose(line.y, 1e-3 * test.curve.load)
+    long = [replace(test, title="a name of more than 25 letters") for test in tests]
+    assert [line.label for line in comparison.compare(long).figures[0].curves] == ["1", "2"]
+    fits = [replace(test, title="a name of just 25 letters") for test in tests]
+    assert comparison.compare(fits).figures[0].curves[0].label == "a name of just 25 letters"
+
+
+def test_mean_and_scatter_stand_in_their_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tests = compared(tmp_path)
+    for k, test in enumerate(tests):
+        figures = replace(test.curve.figures, E=Figure(1e6 + 2e6 * k, 0.9e6 + 2e6 * k, 1.2e6 + 2e6 * k),
+                          nu=Figure.none("no"))  # fmt: skip
+        tests[k] = replace(test, curve=replace(test.curve, figures=figures))
+    shown = plain(comparison.compare(tests).html)
+    assert "|1 S1|1000 ± 200|not known|" in shown and "|2 S1|3000 ± 200|" in shown
+    assert (
+        "|mean|2000|not known|" in shown
+        and "|standard deviation|1414|not known|" in shown
+        and "|n|2|0|" in shown
+    )
+    file = io.StringIO()
+    comparison.write_table(tests, file)
+    heads, first, _, mean, deviation, n = (line.split(",") for line in file.getvalue().splitlines())
+    assert heads[:6] == ["test", "path", "EA_kN", "half_EA_kN", "nu", "half_nu"]
+    assert (first[2:4], mean[2:4], deviation[2], n[2:5]) == (
+        ["1000", "200"],
+        ["2000", ""],
+        "1414.2136",
+        ["2", "", "0"],
+    )
+
+
+def test_what_holds_nothing_is_not_compared(tmp_path: Path, run: RunFolder) -> None:
+    with (
+        open_run(make_run(tmp_path, [], session=False)) as empty,
+        pytest.raises(DataError, match="to compare"),
+    ):
+        comparison.tests_of([run, empty])
+
+
+def test_a_report_shows_the_fields_and_instants_asked_for(run: RunFolder) -> None:
+    made = make_report(run, ReportRequest(("exx",), (2.04,)), Screen())
+    shown = plain(made.html)
+    assert "chosen: t = 2.000 s" in shown and "|exx, µm/m|" in shown and "|eyy, µm/m|" not in shown
+    assert list(tensile(EvaluatedCurve.of(run))) == ["E", "nu", "Rp0.2", "Rm", "strain of E, nu"]
+
+
+@pytest.mark.parametrize(("known", "told"), [("E", True), ("nu", False)])
+def test_the_strain_is_that_of_e(run: RunFolder, known: str, told: bool) -> None:
+    curve = EvaluatedCurve.of(run)
+    other = "nu" if known == "E" else "E"
+    figures = replace(curve.figures, **{other: Figure.none("no")})
+    found = tensile(replace(curve, figures=figures))
+    assert known in found and other not in found and ("strain of E, nu" in found) is told

@@ -1,0 +1,322 @@
+"""A live run that is not started: its state in words, its exit code, its commands, and when it ends by itself."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from acquire.errors import ConfigError, DataError, DeviceError
+from acquire.events import EventKind
+from acquire.frame import CameraInfo
+from acquire.load_cell.contract import NoLoadCell
+from acquire.load_sample import LoadSample
+from live.config.loading import load_config
+from live.pipeline.consumer_thread import Outputs
+from live.pipeline.run_state import RunState
+from live.pipeline.screen import Screen
+from live.run import live_run as module
+from live.run.burst_queue import TAKING
+from live.run.control import ControlRefused
+from live.run.grabber import GrabPlan, _bytes_a_pixel, _held, _held_at_first
+from live.run.live_run import INTERRUPTED, TIME_IS_OVER, LiveRun
+from live.run.outcome import StopSignal
+from live.run.prepared_run import _burst_lengths, _device_names, new_run_state
+from tests.live.fakes import ListCamera, frame
+from tests.live.made_up import make_measurement
+
+
+class Words(Screen):
+    """Keeps what is shown."""
+
+    is_due = True
+
+    def __init__(self) -> None:
+        self.shown: list[tuple[str, str]] = []
+
+    def snapshot(self, snapshot: Any, words: str = "") -> None:
+        self.shown.append((snapshot.state, words))
+
+
+class Recording:
+    """In place of the pre-trigger buffer."""
+
+    def __init__(self, *, on: bool = True) -> None:
+        self.on, self.failed, self.takes_bursts, self.backlog = on, None, False, 0.0
+        self.given: list[tuple[int, bool]] = []
+
+    def frame(self, one: Any, *, is_reference: bool) -> None:
+        self.given.append((one.index, is_reference))
+
+    def command(self, what: str) -> str:
+        self.on = what == "start"
+        return what
+
+
+def run(recording: Any = None, *, live: bool = True, seconds: float | None = None, measured: int = 0) -> Any:
+    """A run of a reference of 4 and bursts of 2, that has ``measured`` so many bursts."""
+    run_state, screen, stop = RunState.new(0.5), Words(), StopSignal()
+    prepared: Any = SimpleNamespace(
+        rig=SimpleNamespace(camera=ListCamera([], live=live), load=NoLoadCell()),
+        config=load_config(None, {} if seconds is None else {"output.seconds": seconds}),
+        bursts=(4, 2),
+        folder=Path("run"),
+    )
+    for k in range(measured):
+        run_state.history.add(make_measurement(k).time_step)
+    outputs = Outputs([], run_state.loads, run_state.event_log, run_state.history)
+    found = LiveRun(prepared, run_state, outputs, recording, screen, stop)
+    return SimpleNamespace(run=found, state=run_state, screen=screen, stop=stop, outputs=outputs)
+
+
+def test_the_state_is_what_is_done_with_the_frames() -> None:
+    assert run().run.state == "not recorded" and not run().run.recording
+    recording = Recording()
+    bench = run(recording)
+    assert bench.run.state == "REC" and bench.run.recording
+    bench.run.command(EventKind.PAUSE)
+    assert bench.run.state == "REC, PAUSED" and bench.run.paused
+    recording.failed = "the disk is full"  # type: ignore[assignment]
+    assert bench.run.state == "NOT RECORDING, PAUSED"
+    armed = run(Recording(on=False))
+    assert armed.run.state == "ARMED"
+    assert armed.run.command(EventKind.RECORD, "start") == "start" and armed.run.state == "REC"
+    armed.run.command(EventKind.RECORD, "stop")
+    assert armed.run.state == "NOT RECORDING"
+    with pytest.raises(ControlRefused, match="records nothing"):
+        run().run.command(EventKind.RECORD, "start")
+
+
+def test_commands_that_change_nothing_are_refused_and_others_are_events() -> None:
+    bench = run()
+    with pytest.raises(ControlRefused, match="measuring is not paused"):
+        bench.run.command(EventKind.RESUME)
+    bench.run.command(EventKind.PAUSE)
+    with pytest.raises(ControlRefused, match="measuring is paused already"):
+        bench.run.command(EventKind.PAUSE)
+    bench.run.command(EventKind.RESUME)
+    bench.run.command(EventKind.NOTE, "slipped")
+    bench.run.command(EventKind.NEW_REFERENCE)
+    bench.state.alarms.set("a", "a: high")
+    bench.run.command(EventKind.ALARM)
+    with pytest.raises(ControlRefused, match="no alarm is on"):
+        bench.run.command(EventKind.ALARM)
+    assert [(event.kind, event.text) for event in bench.state.event_log.events()] == [
+        (EventKind.PAUSE, "measuring is paused"), (EventKind.RESUME, "measuring goes on"),
+        (EventKind.NOTE, "slipped"), (EventKind.NEW_REFERENCE, "a new reference is taken from the next frames"),
+        (EventKind.ALARM, "silenced: a"),
+    ]  # fmt: skip
+    assert bench.run.grabber.taking_reference
+
+
+def test_a_frame_is_of_a_reference_until_that_is_complete() -> None:
+    recording = Recording()
+    bench = run(recording)
+    for k in range(6):
+        bench.run.grabber._take(frame(k))
+    assert recording.given == [(k, k < 4) for k in range(6)]
+    assert bench.state.health.fps == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(
+    ("what", "code"),
+    [
+        ("", 0), ("DataError", 4), ("DeviceError", 3), ("a defect", 1), ("load", 3), ("measuring", 1),
+        ("interrupted", 130), ("lost", 5), ("unrecorded", 5), ("load_lost", 5), ("not counted", 5),
+        ("disk", 5), ("results", 5), ("no values", 5), ("skipped", 0),
+    ],
+)  # fmt: skip
+def test_the_exit_code_says_what_was_lost(what: str, code: int) -> None:
+    recording: Any = Recording()
+    bench = run(recording, measured=0 if what == "no values" else 1)
+    errors = {"DataError": DataError("x"), "DeviceError": DeviceError("x"), "a defect": ValueError("x")}
+    bench.run.grabber.error = errors.get(what)
+    bench.run._load.failure = 3 if what == "load" else 0
+    bench.run._measure_thread.failure = int(what == "measuring")
+    bench.stop.request(INTERRUPTED if what == "interrupted" else "the time is over")
+    counts = {"lost": {"lost": 1}, "load_lost": {"load_lost": 1}, "not counted": {"grabbed": 1},
+              "unrecorded": {"unrecorded": 1, "grabbed": 1, "measured": 1},
+              "skipped": {"grabbed": 5, "recorded": 5, "skipped": 5}}  # fmt: skip
+    bench.state.frame_counts.add(**counts.get(what, {}))
+    recording.failed = "the disk is full" if what == "disk" else None
+    if what == "results":
+        bench.outputs._threads.append(SimpleNamespace(failed="stuck", critical=True))
+    assert bench.run.exit_code == code
+
+
+@pytest.mark.parametrize(
+    ("live", "begun_s", "silent_s", "ends"),
+    [
+        (True, 10.1, 1.0, True), (True, 10.1, 0.9, False), (True, 10.0, 5.0, False), (False, 10.1, 5.0, False),
+        (True, 10.1, float("nan"), True),
+    ],
+)  # fmt: skip
+def test_a_timed_run_ends_where_a_live_camera_has_gone_silent(
+    monkeypatch: pytest.MonkeyPatch, live: bool, begun_s: float, silent_s: float, ends: bool
+) -> None:
+    bench = run(live=live, seconds=10.0)
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: 100.0))
+    bench.run.grabber.begun_t, bench.state.health.frame_t = 100.0 - begun_s, 100.0 - silent_s
+    bench.run._idle("")
+    assert (bench.stop.requested, bench.stop.reason) == (ends, TIME_IS_OVER if ends else "")
+
+
+def test_what_it_waits_for_is_shown_while_nothing_comes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: 100.0))
+
+    def shown(words: str, silent_s: float, measured: int, *, paused: bool = False) -> list[tuple[str, str]]:
+        bench = run(measured=measured)
+        bench.state.health.frame_t = 100.0 - silent_s
+        bench.run._burst_queue.paused = paused
+        bench.run._idle(words)
+        return list(bench.screen.shown)
+
+    assert shown("waiting for frames", 2.0, 1) == [("not recorded", "waiting for frames")]
+    assert shown("waiting for frames", 0.5, 1) == [("not recorded", "")]
+    assert shown("waiting for frames", 0.5, 0) == [("not recorded", "waiting for frames")]
+    assert shown("", 2.0, 1) == []
+    assert shown("", 0.5, 1, paused=True) == [("not recorded, PAUSED", "")]
+
+
+@pytest.mark.parametrize(
+    ("grabbed", "lost", "measured", "hints"), [(12, 1, 0, 1), (11, 1, 0, 0), (12, 0, 0, 0), (12, 1, 1, 0)]
+)
+def test_a_hint_where_frames_are_lost_again_and_again_in_the_reference(
+    grabbed: int, lost: int, measured: int, hints: int
+) -> None:
+    bench = run(measured=measured)
+    bench.state.frame_counts.add(grabbed=grabbed, lost=lost)
+    for _ in range(2):
+        bench.run._idle(TAKING)
+    assert len(bench.state.event_log.events("warning")) == hints
+
+
+def camera(width: int = 1000, height: int = 500, bits: int = 8, fps: float | None = 50.0) -> CameraInfo:
+    return CameraInfo("a:", "a", width, height, bits, True, "device", fps=fps)
+
+
+@pytest.mark.parametrize(
+    ("info", "burst", "at_first", "later"),
+    [
+        (camera(), 4, 13, 4),  # 1 s and 0.25 s of 12.5 bursts a second
+        (camera(fps=None), 4, 1, 1),
+        (camera(fps=1.0), 1, 1, 1),
+        (camera(4000, 3000), 1, 42, 13),  # 3 s, bounded by 512 MB of 12 MB
+        (camera(4000, 3000, fps=10.0), 1, 30, 3),
+        (camera(4000, 3000, bits=12), 1, 21, 13),
+        (camera(4000, 3000, bits=12), 4, 20, 4),  # 16 bits hold the sum of four; with a bit of clipping
+    ],
+)
+def test_so_many_bursts_may_wait_for_the_first_measurement_and_later(
+    info: CameraInfo, burst: int, at_first: int, later: int
+) -> None:
+    plan = GrabPlan(burst, 32)
+    assert (_held_at_first(info, plan), _held(info, plan, 0.25)) == (at_first, later)
+
+
+def test_the_bytes_of_a_burst_that_waits() -> None:
+    assert [_bytes_a_pixel(camera(bits=bits), GrabPlan(1, 4)) for bits in (8, 9, 12)] == [1, 2, 2]
+    assert _bytes_a_pixel(camera(bits=12), GrabPlan(16, 4)) == 2.125
+    assert _bytes_a_pixel(camera(bits=12), GrabPlan(17, 4)) == 4.125
+
+
+def test_the_lengths_of_bursts_are_as_given_else_of_the_source() -> None:
+    given = load_config(None, {"measure.burst": 3, "measure.reference_burst": 7})
+    assert (_burst_lengths(given, True), _burst_lengths(given, False)) == ((7, 3), (7, 3))
+    plain = load_config(None, {})
+    assert (_burst_lengths(plain, True), _burst_lengths(plain, False)) == ((32, 4), (1, 1))
+    plan = GrabPlan.of(load_config(None, {"output.seconds": 5.0}), (32, 4))
+    assert (plan.burst, plan.reference_burst, plan.seconds) == (4, 32, 5.0)
+    assert GrabPlan.of(plain, (32, 4)).seconds == float("inf")
+
+
+def test_devices_have_names_where_their_addresses_differ() -> None:
+    two = load_config(None, {"camera.address": "sim:a", "load.address": "sim:b"})
+    assert _device_names(two) == {"sim:a": "camera", "sim:b": "load cell"}
+    assert _device_names(load_config(None, {"camera.address": "sim:", "load.address": "sim:"})) == {}
+
+
+def ending(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, opened: Any) -> list[Any]:
+    """What is done about the outputs of a run whose recording is ``opened``, or cannot be."""
+    bench, done = run(), list[Any]()
+
+    def open_recording(*given: Any) -> Any:
+        if isinstance(opened, Exception):
+            raise opened
+        return opened
+
+    def fails(live: Any) -> None:
+        raise DeviceError("the start failed")
+
+    prepared: Any = bench.run._prepared
+    prepared.folder, outputs = (
+        tmp_path,
+        SimpleNamespace(end=lambda: done.append("outputs"), frame=done.append),
+    )
+    monkeypatch.setattr(module, "open_recording", open_recording)
+    bench.state.event_log.add_listener(lambda event: done.append(event.text))
+    with pytest.raises((DataError, DeviceError)):
+        module._with_outputs(prepared, bench.state, outputs, bench.screen, bench.stop, fails)  # type: ignore[arg-type]
+    assert '"address"' in (tmp_path / "config.json").read_text(encoding="utf-8")
+    return done
+
+
+def test_outputs_are_ended_where_the_recording_cannot_be_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert ending(tmp_path, monkeypatch, DataError("the folder is full")) == ["outputs"]
+
+
+def test_the_recording_is_closed_last_with_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording: Any = Recording()
+    closed: list[Any] = []
+    recording.close = closed.append
+    done = ending(tmp_path, monkeypatch, recording)
+    assert done[0] == "the test begins" and done[-2:] == ["outputs", "the test ends: camera ended"]
+    assert closed == [{"stop_reason": "camera ended"}]
+
+
+def test_a_run_that_is_armed_says_so_when_it_begins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recording: Any = Recording(on=False)
+    recording.close = lambda counts: None
+    done = ending(tmp_path, monkeypatch, recording)
+    assert done[0] == "the test begins; nothing is recorded until the command start"
+
+
+def test_the_state_of_a_test_has_lag_gap_and_section_as_configured() -> None:
+    config = load_config(
+        None,
+        {
+            "camera.address": "sim:a", "load.address": "sim:b", "load.lag_s": 0.25, "load.max_gap_s": 2.0,
+            "specimen.area_mm2": 40.0, "specimen.axis": "x",
+        },
+    )  # fmt: skip
+    screen: Any = SimpleNamespace(print=lambda text: printed.append(text))
+    printed: list[str] = []
+    state = new_run_state(config, screen)
+    assert (state.specimen.area_m2, state.history.current_axis) == (pytest.approx(40e-6), "x")
+    assert state.event_log.names == {"sim:a": "camera", "sim:b": "load cell"} and printed == ["opening sim:a"]
+    for t in (0.0, 1.5, 4.0):
+        state.loads.append(LoadSample(t, 10.0 * t))
+    assert state.loads.force_at(0.5) == pytest.approx(7.5) and state.loads.raw_force_at(0.5) == pytest.approx(
+        5.0
+    )
+    assert math.isnan(state.loads.force_at(3.0)), "between samples 2.5 s apart"
+    with pytest.raises(ConfigError, match="no camera is given"):
+        new_run_state(load_config(None, {}), screen)
+
+
+def test_the_first_reason_to_stop_counts_and_whoever_asks_late_is_told_at_once() -> None:
+    stop, told = StopSignal(), list[str]()
+    stop.on_request(lambda: told.append("early"))
+    assert not stop.requested and stop.reason == "" and told == []
+    stop.request("an alarm")
+    stop.request("the time is over")
+    assert stop.requested and stop.reason == "an alarm" and told == ["early", "early"]
+    stop.on_request(lambda: told.append("late"))
+    assert told[2:] == ["late"]

@@ -1,0 +1,203 @@
+"""The supervisor of the view's process by its own clock: when it starts, restarts and gives up, and what it tells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from live.ui.rerun import supervisor
+from live.ui.rerun.messages import ViewTarget
+from live.ui.rerun.supervisor import RenderProcess, Supervisor
+from live.ui.rerun.wire import Kind, Message
+from tests.clock import Clock
+
+TARGET = ViewTarget(9876, "/a/view.rrd", "id")
+
+
+class Process:
+    """A process that answers what it is told to, and takes what comes while it is not ``stuck``."""
+
+    ends = 1
+
+    def __init__(self, clock: Clock) -> None:
+        self.pid, self.progress_t, self.answers = 7, clock.now_s, list[Message]()
+        self.sent: list[Message] = []
+        self.gone = self.stuck = False
+
+    def replies(self) -> Iterator[Message]:
+        if self.gone:
+            raise EOFError
+        answers, self.answers = self.answers, []
+        yield from answers
+
+    def flush(self) -> bool:
+        return not self.stuck
+
+    def send(self, message: Message) -> None:
+        self.sent.append(message)
+
+    def wait(self, seconds: float, *, to_send: bool) -> None: ...
+
+    def end(self, seconds: float = 0.0) -> int:
+        return self.ends
+
+
+class Watched:
+    """A supervisor without its thread, and what it has started, told and been asked for."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.clock, self.told = Clock(), list[tuple[str, str]]()
+        self.processes: list[Process] = []
+        self.targets: list[ViewTarget] = []
+        self.served = 0
+        outbox: Any = SimpleNamespace(begin=self.targets.append, next=lambda now: None, end=lambda: None)
+        monkeypatch.setattr(supervisor.time, "monotonic", self.clock)
+        monkeypatch.setattr(supervisor, "RenderProcess", self.start)
+        self.one = Supervisor(
+            outbox, TARGET, lambda text, level: self.told.append((level, text)), self.serving
+        )
+        monkeypatch.setattr(self.one._closing, "wait", lambda seconds: None)
+
+    def serving(self) -> None:
+        self.served += 1
+
+    def start(self) -> Process:
+        self.processes.append(Process(self.clock))
+        return self.processes[-1]
+
+    def step(self, seconds: float = 0.0, *answers: Message) -> None:
+        self.clock.now_s += seconds
+        if answers:
+            self.processes[-1].answers += answers
+        self.one._guarded(self.one._step)
+
+    def lose(self, seconds: float = 0.0) -> None:
+        self.processes[-1].gone = True
+        self.step(seconds)
+
+
+@pytest.fixture
+def watched(monkeypatch: pytest.MonkeyPatch) -> Watched:
+    return Watched(monkeypatch)
+
+
+def serving(port: int | None = 9877, rrd: str | None = "/a/view.rrd") -> Message:
+    return Message(Kind.SERVING, {"port": port, "rrd": rrd})
+
+
+def test_it_serves_once_the_process_says_so(watched: Watched) -> None:
+    one = watched.one
+    watched.step()
+    assert (one.served.port, one.served.rrd, one.pid, watched.served) == (None, None, 7, 0)
+    watched.step(0.1, serving())
+    assert (one.served, watched.served) == (replace(TARGET, port=9877), 1)
+    watched.step(0.1, Message(Kind.TROUBLE, {"text": "a word", "lasting": False}))
+    assert watched.told == [("warning", "a word")] and one.failed == ""
+    watched.step(0.1, Message(Kind.TROUBLE, {"text": "no place", "lasting": True}))
+    assert one.failed == "no place"
+
+
+def test_it_is_restarted_on_its_port_with_a_new_file(watched: Watched) -> None:
+    watched.step()
+    watched.step(0.1, serving())
+    watched.lose(1.0)
+    assert watched.told == [("warning", "the view's process ended with 1 and is restarted")]
+    assert watched.one.pid is None
+    watched.step(0.9)
+    assert len(watched.processes) == 1, "a second later"
+    watched.step(0.2)
+    assert len(watched.processes) == 2
+    assert watched.targets == [TARGET, ViewTarget(9877, "/a/view-2.rrd", "id")]
+    watched.step(0.1, serving(9900, "/a/view-2.rrd"))
+    assert watched.told[1:] == [("warning", "the view is now on port 9900")] and watched.served == 2
+
+
+def test_each_failure_in_a_row_waits_twice_as_long(watched: Watched) -> None:
+    watched.step()
+    watched.step(0.0, serving())
+    for delay in (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 60.0, 60.0):
+        count = len(watched.processes)
+        watched.lose()
+        watched.step(0.99 * delay)
+        assert len(watched.processes) == count, delay
+        watched.step(0.02 * delay)
+        assert len(watched.processes) == count + 1, delay
+        watched.step(0.0, serving())
+    assert [level for level, _ in watched.told] == ["warning"] * 3, "three are reported"
+    assert watched.told[-1][1].endswith("is restarted; further restarts are not reported")
+    watched.lose(61.0)
+    assert watched.one._restart_t - watched.clock.now_s == 1.0, "it had run for a minute"
+
+
+def test_one_that_never_starts_is_given_up(watched: Watched) -> None:
+    for _ in range(5):
+        assert watched.one.failed == ""
+        watched.step(100.0)
+        watched.lose()
+    assert watched.one.failed == "its process does not start (ended with 1)" and watched.one.starts == 5
+
+
+@pytest.mark.parametrize(("up", "limit"), [(False, 90.0), (True, 15.0)])
+def test_one_that_takes_nothing_is_replaced(watched: Watched, up: bool, limit: float) -> None:
+    watched.step(1000.0)
+    if up:
+        watched.step(0.0, serving())
+    watched.processes[-1].stuck = True
+    watched.step(limit - 0.1)
+    assert watched.told == []
+    watched.step(0.2)
+    assert watched.told == [
+        ("warning", f"the view's process took nothing for {limit:.0f} s (stopped?) and is restarted")
+    ]
+
+
+def test_one_that_has_grown_is_restarted_at_once(watched: Watched) -> None:
+    watched.step()
+    watched.step(0.0, serving())
+    watched.step(0.0, Message(Kind.FULL, {"memory_MiB": 650}))
+    watched.lose()
+    assert watched.told == [("info", "the view's process had grown to 650 MiB and is restarted")]
+    watched.step()
+    assert len(watched.processes) == 2
+
+
+def test_a_signal_is_named(watched: Watched, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Process, "ends", -9)
+    watched.step()
+    watched.lose()
+    assert watched.told == [("warning", "the view's process was ended by SIGKILL and is restarted")]
+
+
+def test_at_its_end_it_is_done_or_told(watched: Watched) -> None:
+    watched.step()
+    watched.step(0.0, serving(), Message(Kind.ENDED))
+    watched.one._finish(5.0)
+    assert watched.told == [] and watched.one.pid is None
+
+
+def test_one_that_ends_early_may_lack_seconds(watched: Watched) -> None:
+    watched.step()
+    watched.processes[-1].gone = True
+    watched.one._finish(5.0)
+    assert watched.told == [
+        ("warning", "the view's process ended early (1); its file may lack the last seconds")
+    ]
+    watched.told.clear()
+    watched.one._is_done, watched.one._cause = False, ""
+    watched.one._finish(0.0)
+    assert watched.told[0][1].startswith("the view's process did not finish in time and was ended (1)")
+
+
+def test_what_was_sent_in_part_goes_on_where_it_ended() -> None:
+    process: Any = RenderProcess.__new__(RenderProcess)
+    process._pending = supervisor.deque(memoryview(text) for text in (b"abc", b"defgh", b"ij"))
+    process._discard(5)
+    assert [bytes(piece) for piece in process._pending] == [b"fgh", b"ij"]
+    process._discard(3)
+    assert [bytes(piece) for piece in process._pending] == [b"ij"]
+    process._discard(2)
+    assert not process._pending

@@ -1,0 +1,365 @@
+"""What a page shows of a run, by value: figures and their units, requests by camera, lines over the curve."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from acquire.events import Event, EventKind
+from acquire.load_sample import LoadSample
+from analysis import StrainField
+from analysis.evaluate import GaugeValue
+from analysis.field import Status
+from live.config.loading import Config, load_config
+from live.config.sections import SpecimenConfig
+from live.pipeline.measurement import Measurement
+from live.pipeline.run_state import RunState
+from live.ui.web.authorization import HttpError
+from live.ui.web.broadcaster import Broadcaster, plain
+from live.ui.web.curve_history import CurveHistory
+from live.ui.web.map_view import MapView
+from live.ui.web.page_consumer import PageConsumer
+from live.ui.web.page_consumers import PageConsumers
+from live.ui.web.run_result import peaks, run_result
+from tests.live.made_run import E_PA, PULLED, THICKNESS_MM, WIDTH_MM, YIELD, force_of
+from tests.live.made_up import START, make_frame, make_grid, make_measurement
+
+LINE = {"gauges.long": {"kind": "line", "start": [64, 20], "end": [64, 70]}}
+STRIPS = {"gauges.axial": {"kind": "line", "start": [64, 20], "end": [64, 70]}}
+
+
+class Run:
+    """A run with a state."""
+
+    paused, recording, live, folder = False, True, True, Path("run")
+
+    def __init__(self, config: Config, **more: Any) -> None:
+        self.run_state = RunState.new(1.0, specimen=config.specimen)
+        self.run_state.health.began_t = START
+        for name, value in more.items():
+            setattr(self.run_state.health, name, value)
+
+
+def pictured(number: int = 0, strain: float = 1e-3, **more: Any) -> Measurement:
+    m = make_measurement(number, strain)
+    return replace(
+        m, burst=replace(m.burst, mean=make_frame(0, 0.0).image), time_step=replace(m.time_step, **more)
+    )
+
+
+def watched(
+    config: Config, now: float = START + 7.5, run: Run | None = None, **more: Any
+) -> tuple[PageConsumer, Run]:
+    run, broadcaster = run or Run(config), Broadcaster()
+    broadcaster.open()
+    consumer = PageConsumer(broadcaster, config, lambda: now, **more)
+    consumer.attach(run)
+    return consumer, run
+
+
+def test_the_state_counts_from_the_start_in_the_units_of_the_page() -> None:
+    config = load_config(None, {"specimen.area_mm2": 40.0})
+    consumer, run = watched(config, run=Run(config, disk_s=90 * 60.0, fps=29.5))
+    run.run_state.frame_counts.add(grabbed=9, lost=2)
+    run.run_state.alarms.set("limit", "limit: \x1b too much")
+    consumer.event(Event(0.0, EventKind.MEASURED, "measurement", "a burst"))
+    consumer.event(Event(0.0, EventKind.NOTE, "operator", "a note"))
+    state = consumer.state()
+    assert (state["elapsed_s"], state["state"], state["recording"]) == (7.5, "reference", True)
+    assert (state["disk_min"], state["fps"]) == (90.0, 29.5)
+    assert (state["ledger"]["grabbed"], state["ledger"]["lost"]) == (9, 2)
+    assert len(state["alarms"]) == 1 and "\x1b" not in state["alarms"][0]
+    assert state["events"] == [{"s": 7.5, "level": "info", "kind": "note", "text": "operator: a note"}]
+    assert "axial" not in state, "nothing is measured yet"
+
+
+@pytest.mark.parametrize(("paused", "name"), [(False, "measuring"), (True, "paused")])
+def test_what_is_measured(paused: bool, name: str) -> None:
+    config = load_config(None, {"specimen.area_mm2": 40.0, "specimen.axis": "y"})
+    consumer, run = watched(config)
+    assert PageConsumer(Broadcaster(), config).state()["state"] == "opening"
+    run.paused = paused  # type: ignore[misc]
+    step = pictured(strain=2e-3, measure_s=0.012, area_share=0.5).time_step
+    run.run_state.history.add(step)
+    state = consumer.state()
+    assert state["state"] == name
+    axial = state["axial"]
+    assert (axial["name"], axial["value"], axial["assumed"]) == ("eyy", pytest.approx(step.eyy), "")
+    assert axial["sigma"] == pytest.approx(step.sigma_eyy)
+    assert (state["valid"], state["zois"], state["kernel_s"]) == (33, 34, pytest.approx(0.012))
+    assert state["part"] == "of 50 % of the area" and state["refused"] == step.refused
+
+
+@pytest.mark.parametrize(
+    ("gauges", "found", "mm"),
+    [
+        (STRIPS | {"scale.mm_per_px": 0.1}, {"axial": GaugeValue(4e-3, 1e-6)}, 50 * 0.1 * 4e-3),
+        (STRIPS | {"scale.mm_per_px": 0.1}, {}, 50 * 0.1 * 1e-3),  # lost: the axial strain
+        ({"specimen.gauge_length_mm": 80.0}, {}, 80 * 1e-3),
+        (LINE | {"scale.mm_per_px": 0.1}, {"long": GaugeValue(4e-3, 1e-6)}, None),
+    ],
+)
+def test_the_elongation_in_mm(gauges: dict[str, Any], found: dict[str, Any], mm: float | None) -> None:
+    config = load_config(None, {**gauges, "specimen.axis": "y"})
+    consumer, run = watched(config)
+    run.run_state.history.add(replace(pictured().time_step, gauges=found))
+    shown = consumer.state()["elongation_mm"]
+    assert shown is None if mm is None else shown == pytest.approx(mm)
+
+
+def test_a_frame_is_shown_until_something_is_measured() -> None:
+    config = load_config(None, STRIPS)
+    consumer, _ = watched(config)
+    consumer.frame(replace(make_frame(0, START), damaged="a fault"))
+    consumer.idle()
+    assert consumer.picture == b""
+    consumer.frame(make_frame(1, START, (48, 64)))
+    consumer.idle()
+    shown = consumer.state()["picture"]
+    assert (shown["n"], shown["width"], shown["height"]) == (1, 64, 48) and set(shown["gauges"]) == {"axial"}
+    picture = cv2.imdecode(np.frombuffer(consumer.picture, np.uint8), cv2.IMREAD_COLOR)
+    assert picture.shape[:2] == (48, 64) and picture[0, 0].max() < 10 and picture[-1, -1].min() > 245
+    consumer.measurement(pictured())
+    consumer.frame(make_frame(2, START, (48, 64)))
+    consumer._due["picture"] = 0.0
+    consumer.idle()
+    assert (consumer.state()["picture"]["n"], consumer.state()["picture"]["width"]) == (2, 128)
+    assert consumer.end() == "2 pictures shown"
+
+
+def test_states_and_pictures_are_sent_at_their_rates() -> None:
+    now, published, config = [START], list[tuple[float, str]](), load_config(None, {})
+
+    class Watching(Broadcaster):
+        def publish(self, kind: str, value: Any) -> None:
+            published.append((round(now[0] - START, 3), kind))
+
+    broadcaster = Watching()
+    broadcaster.open()
+    consumer, pictures = PageConsumer(broadcaster, config, lambda: now[0], kind="second"), []
+    for k in range(100):
+        now[0] = START + k / 100
+        consumer.measurement(pictured())
+        assert consumer.idle() == 0.1
+        pictures.append(consumer._shown)
+    assert [kind for _, kind in published] == ["second"] * 10
+    assert pictures[-1] == 4
+
+
+def test_a_point_of_the_curves_is_si_and_counts_from_the_first() -> None:
+    config = load_config(None, {**STRIPS, "specimen.area_mm2": 40.0, "specimen.axis": "y"})
+    consumer = PageConsumer(Broadcaster(), config)
+    for k, force in enumerate((80.0, -160.0)):
+        gauges = {"axial": GaugeValue(5e-3 * (k + 1), 1e-6)}
+        consumer.matched(pictured(k, force=force, gauges=gauges, eyy=1e-3))
+    found = consumer.curve.since(0, 0)
+    assert found["names"] == ["t", "stress", "axial", "axial"]
+    assert found["rows"] == [
+        pytest.approx([0, 2e6, 5e-3, 5e-3]), pytest.approx([0.1, -4e6, 1e-2, 1e-2], rel=1e-6),
+    ]  # fmt: skip
+    bare = PageConsumer(Broadcaster(), load_config(None, {"specimen.axis": "x"}))
+    bare.matched(pictured(0, force=80.0, exx=1.0, eyy=2.0, exy=3.0))
+    assert bare.curve.since(0, 0)["names"] == ["t", "force", "axial", "exx", "eyy", "exy"]
+    assert bare.curve.since(0, 0)["rows"] == [[0.0, 80.0, 1.0, 1.0, 2.0, 3.0]]
+
+
+@pytest.mark.parametrize(
+    ("forces", "strain", "words"),
+    [((math.nan, math.nan), 2e-3, "at the end"), ((5.0, 5.0), 2e-3, "at the highest force"),
+     ((5.0, 4.0), 1e-3, "at the highest force"), ((5.0, math.nan), 1e-3, "at the highest force")],
+)  # fmt: skip
+def test_the_map_after_the_test(forces: tuple[float, float], strain: float, words: str) -> None:
+    consumer = PageConsumer(Broadcaster(), load_config(None, {}), side="front")
+    for k, force in enumerate(forces):
+        gauges = {"axial": GaugeValue(1e-3 * (k + 1), 1e-6)}
+        consumer.matched(pictured(k, force=force, gauges=gauges))
+    found = consumer.at_peak()
+    assert found["atpeak"] == words
+    assert [one["value"] for one in found["gauges"]] == [strain]
+    assert found["peak"]["picture"] == "/picture?side=front&after=1"
+
+
+def test_the_map_of_one_camera_or_of_two() -> None:
+    config = load_config(None, {})
+    sides = {name: PageConsumer(Broadcaster(), config, side=name) for name in ("front", "back")}
+    for name, consumer in sides.items():
+        consumer.matched(pictured(gauges={f"of {name}": GaugeValue(1e-3, 1e-6)}))
+    assert peaks({}) == {} and "second" not in peaks({"": sides["front"]})
+    found = peaks(sides)
+    assert [(one["name"], one["side"]) for one in found["gauges"]] == [
+        ("of front", "front"),
+        ("of back", "back"),
+    ]
+    assert (found["side"], found["second"]["side"]) == ("front", "back")
+    assert "side=back" in found["second"]["peak"]["picture"]
+
+
+def consumers() -> PageConsumers:
+    config = load_config(None, {"specimen.axis": "y"})
+    return PageConsumers(Broadcaster(), {"front": config, "back": config}, {"back": b"a picture"})
+
+
+def answered(response: Any) -> Mapping[str, Any]:
+    return dict(json.loads(response.content))
+
+
+def test_requests_name_their_camera() -> None:
+    both = consumers()
+    front, back = both.by_name.values()
+    for consumer, strain in ((front, 1e-3), (back, 2e-3)):
+        consumer.map.draw(pictured(strain=strain))
+        consumer.matched(pictured(strain=strain, force=1.0))
+    assert (both.picture({"side": "front"}), both.picture({"side": "back"})) == (b"", b"a picture")
+    grid = make_grid()
+    place = {"x": str(grid.x[2]), "y": str(grid.y[2])}
+    for side, value in (("front", 1e-3), ("back", 2e-3), ("nothing", 1e-3)):
+        assert answered(both.value({"side": side, **place}))["value"] == pytest.approx(value)
+    rows = answered(both.points({"edition": "0", "count": "0"}))["rows"]
+    assert rows[0][2] == pytest.approx(1e-3) and len(rows) == 1
+    assert answered(both.points({"edition": "0", "count": "1"}))["rows"] == []
+    assert both.select_map({"of": "exx"}) == {"answer": "ok"}
+    assert (front.map.choice.name, back.map.choice.name) == ("exx", "exx")
+    assert both.select_map({"of": "ezz"})["answer"].startswith("no: there is no map")
+    config, states = load_config(None, {}), {}
+    runs = {name: Run(config) for name in both.by_name}
+    states = {name: run.run_state for name, run in runs.items()}
+    both.attach_both(runs["front"], runs)
+    assert back.state()["sides"] is None and front.state()["sides"] is not None
+    states["back"].history.add(pictured(strain=4e-3).time_step)
+    assert back.state()["axial"]["value"] == pytest.approx(4e-3) and "axial" not in front.state()
+
+
+@pytest.mark.parametrize(
+    "query", [{}, {"edition": "0"}, {"edition": "-1", "count": "0"}, {"edition": "0", "count": "1e3"},
+              {"edition": "0", "count": "1" * 10}, {"edition": "²", "count": "0"}]
+)  # fmt: skip
+def test_points_are_asked_for_in_whole_numbers(query: dict[str, str]) -> None:
+    with pytest.raises(HttpError, match="whole numbers") as refused:
+        consumers().points(query)
+    assert refused.value.status == 400
+
+
+@pytest.mark.parametrize("query", [{}, {"x": "1"}, {"x": "a", "y": "1"}, {"x": "nan", "y": "1"},
+                                   {"x": "1e6", "y": "1"}, {"x": "1", "y": "-1e6"}])  # fmt: skip
+def test_a_place_is_two_numbers(query: dict[str, str]) -> None:
+    with pytest.raises(HttpError, match="x and y are numbers") as refused:
+        consumers().value(query)
+    assert refused.value.status == 400
+
+
+def test_without_a_run_there_is_nothing_to_ask_for() -> None:
+    nothing = PageConsumers(Broadcaster(), {}, {})
+    assert nothing.picture({}) == b"" and nothing.select_map({}) == {"answer": "no: nothing is measured"}
+    for ask in (nothing.points, nothing.value):
+        with pytest.raises(HttpError) as refused:
+            ask({})
+        assert refused.value.status == 404
+
+
+def test_a_place_without_a_value_says_why() -> None:
+    m, view = pictured(u=0.0, v=0.0), MapView(load_config(None, {"specimen.axis": "y"}))
+    view.draw(m)
+    grid = make_grid()
+    assert view.value_at(grid.x[-1], grid.y[-1]) == {"value": None, "status": Status(7).text}
+    assert view.value_at(grid.x[0], grid.y[0]) == {"value": None, "status": "no ZOI is here"}
+    view.choose("status", "automatic", None)
+    _, shown = view.draw(m)
+    assert view.value_at(grid.x[2], grid.y[2]) == {"value": None, "status": Status.OK.text}
+    assert {one["text"]: one["count"] for one in shown["legend"]} == {Status.OK.text: 33, Status(7).text: 1}
+    assert all(one["colour"].startswith("rgb(") for one in shown["legend"])
+    view.choose("residual", "automatic", None)
+    _, shown = view.draw(m)
+    assert not shown["strain"] and shown["unit"] == "chi²" and sum(shown["histogram"]) == 33
+    assert (
+        "sigma" in view.value_at(grid.x[2], grid.y[2])
+        and view.value_at(grid.x[2], grid.y[2])["sigma"] is None
+    )
+
+
+def test_strains_reach_the_page_without_a_unit() -> None:
+    """Whether they are drawn in um/m or in %."""
+    view = MapView(load_config(None, {"specimen.axis": "y", "view.strain_range": 0.05}))
+    assert (view.choice.name, view.choice.span, view.choice.limit) == ("eyy", "fixed", 0.05)
+    for limit in (0.05, 0.001):
+        assert view.choose("eyy", "fixed", limit) == ""
+        _, shown = view.draw(pictured(strain=0.3 * limit))
+        assert (shown["low"], shown["high"]) == (pytest.approx(-limit), pytest.approx(limit))
+        assert (shown["strain"], shown["unit"], len(shown["histogram"])) == (True, "", 24)
+        assert np.flatnonzero(shown["histogram"]).tolist() == [15]  # 0.65 of the range, of 24 bars
+
+
+def test_the_map_moves_with_the_specimen() -> None:
+    grid = make_grid()
+    one = np.zeros(grid.shape)
+    one[2, 2] = 0.01
+    m = pictured(u=20.0, v=-10.0)
+    view = MapView(load_config(None, {"specimen.axis": "y", "view.strain_range": 0.01}))
+    content, _ = view.draw(replace(m, field=StrainField.from_values(grid, {"dv_dy": one}, 1e-5)))
+    picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR).astype(float)
+    rows, columns = np.nonzero(picture[..., 2] - picture[..., 0] > 80)
+    assert np.mean(columns) == pytest.approx(grid.x[2] + 20, abs=1.5)
+    assert np.mean(rows) == pytest.approx(grid.y[2] - 10, abs=1.5)
+
+
+def test_the_lines_over_the_curve_are_in_si_units() -> None:
+    specimen = SpecimenConfig(width_mm=WIDTH_MM, thickness_mm=THICKNESS_MM, axis="y")
+    state = RunState.new(1.0, specimen=specimen)
+    for k, strain in enumerate(PULLED):
+        state.loads.append(LoadSample(START + 0.1 * k, force_of(strain)))
+        state.history.add(make_measurement(k, strain).time_step)
+    state.loads.close()
+    result = run_result(state, specimen, Path("runs/a"), "interrupted")
+    assert (result["folder"], result["words"]) == (str(Path("runs/a")), "interrupted")
+    elastic, offset, proof, highest = result["lines"]
+    (x0, y0), (x1, y1) = elastic["points"]
+    assert (y1 - y0) / (x1 - x0) == pytest.approx(E_PA, rel=5e-3)
+    assert offset["points"][0][0] - x0 == pytest.approx(0.002, rel=1e-6)
+    ((strain, stress),) = proof["points"]
+    assert proof["words"] == {"name": "Rp0.2", "value": stress}
+    assert stress == pytest.approx(E_PA * YIELD, rel=5e-3) and strain == pytest.approx(
+        YIELD + 0.002, rel=0.02
+    )
+    assert highest["words"]["name"] == "Rm"
+    assert highest["words"]["value"] == pytest.approx(force_of(PULLED[-1]) / 20e-6, rel=1e-6)
+    (e,) = (one for one in result["figures"] if one["name"] == "E")
+    assert e["text"].endswith(" GPa") and float(e["text"].split()[0]) == pytest.approx(70.0, rel=5e-3)
+
+
+def test_numbers_that_json_has_not_are_none() -> None:
+    assert plain({"a": (math.nan, np.float32(0.5)), 2: [math.inf, True, np.int64(3)]}) == {
+        "a": [None, 0.5], "2": [None, True, 3],
+    }  # fmt: skip
+
+
+def test_pages_are_limited_and_a_closed_broadcaster_takes_none() -> None:
+    broadcaster = Broadcaster()
+    pages = [broadcaster.open() for _ in range(8)]
+    assert all(pages) and broadcaster.open() is None and broadcaster.open_pages == 8
+    broadcaster.publish("a", 1)
+    broadcaster.publish("a", 2)
+    broadcaster.publish("b", 3)
+    assert pages[0] is not None and pages[1] is not None
+    assert pages[0].take(0) == {"a": b"2", "b": b"3"} and pages[0].take(0) == {}
+    broadcaster.remove(pages[0])
+    late = broadcaster.open()
+    assert late is not None and late.take(0) == {"a": b"2", "b": b"3"}
+    broadcaster.close()
+    assert pages[1].take(0) == {"a": b"2", "b": b"3"} and pages[1].take(0) is None
+    broadcaster.remove(pages[1])
+    assert broadcaster.open() is None
+
+
+def test_a_page_of_another_edition_gets_all_rows() -> None:
+    curve = CurveHistory(["t"])
+    for n in range(3):
+        curve.add([n])
+    assert curve.position == (0, 3)
+    assert curve.since(1, 2) == {"names": ["t"], "edition": 0, "first": 0, "rows": [[0], [1], [2]]}
