@@ -79,11 +79,12 @@ def test_a_width_that_grows_or_shrinks_more_than_the_length_grows_has_no_r(narro
 
 
 def test_the_interval_of_r_has_what_the_elastic_strains_leave_open() -> None:
-    """By the change of r with Poisson's ratio and with the modulus, each by its standard uncertainty."""
+    """By the change of r with Poisson's ratio, and with the modulus where it changes that ratio too."""
     test, nu, modulus = pulled(0.2), 0.02, 0.05
     off_nu = anisotropy(test, LINE, Figure(NU + nu, NU, NU)).value - R_VALUE
     off_slope = (
-        anisotropy(test, replace(LINE, slope=E_PA * (1 + modulus)), Figure(NU, NU, NU)).value - R_VALUE
+        anisotropy(test, replace(LINE, slope=E_PA * (1 + modulus)), Figure(*[NU * (1 + modulus)] * 3)).value
+        - R_VALUE
     )
     found = anisotropy(test, replace(LINE, sigma=modulus * E_PA), Figure(NU, NU - 1.96 * nu, NU + 1.96 * nu))
     n = np.count_nonzero(np.linspace(1e-4, math.log1p(0.2), 400)[1:] >= math.log1p(0.02))
