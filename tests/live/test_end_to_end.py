@@ -342,8 +342,8 @@ def test_a_recording_that_has_failed_is_not_shown_as_one(
 @pytest.mark.parametrize(
     "how",
     [
-        {"record.mode": "bursts"},
-        {"camera.crop": (16, 8, 160, 152)},
+        pytest.param({"record.mode": "bursts"}, marks=pytest.mark.slow),
+        pytest.param({"camera.crop": (16, 8, 160, 152)}, marks=pytest.mark.slow),
         {"record.mode": "bursts", "camera.crop": (16, 8, 160, 152)},
     ],
 )

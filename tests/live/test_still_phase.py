@@ -35,6 +35,7 @@ def reported(folder: Path) -> tuple[int, str]:
     return int(time_steps[1]), eyy[1]
 
 
+@pytest.mark.slow
 def test_one_still_phase_and_one_table_in_report_batch_and_study(tmp_path: Path) -> None:
     words = ["--zoi", "32", "--step", "16", "--burst", "2", "--reference-burst", "6", "--no-view", "--no-rrd"]
     assert main(["run", "--camera", CAMERA, "--load", "sim:", *words, "--out", str(tmp_path / "run")]) == 0

@@ -37,11 +37,6 @@ def assert_same_sample(a: LoadSample, b: LoadSample) -> None:
     assert dataclasses.replace(a, force=0.0) == dataclasses.replace(b, force=0.0)
 
 
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "session.h5"
-
-
 def test_frames_come_back_bit_equal(path: Path) -> None:
     frames = [
         frame(0),

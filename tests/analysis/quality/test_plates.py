@@ -10,6 +10,16 @@ from analysis.quality.plates import find_plates
 from analysis.quality.specimen import find_specimen
 from hw_mocks.scene import Scene
 from hw_mocks.specimen import VirtualSpecimen
+import math
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+from analysis.field import Roi, ZoiGrid
+from analysis.picture.pattern import autocorrelation_fwhm, describe_pattern, predicted_sigma
+from analysis.quality.pattern import _half_width, zoi_pattern
+from analysis.quality.plates import _beside, _is_plate
+from analysis.quality.specimen import Specimen, find_specimen
+from analysis.quality.steadiness import Steadiness, mains_of, steadiness
 
 SPECIMEN, LEFT, RIGHT = (240, 20, 160, 440), (50, 110, 110, 260), (480, 110, 110, 260)
 WALL, NOISE = 60.0, 1.0
@@ -64,3 +74,42 @@ def test_a_round_one_is_not_clear() -> None:
     outside = (np.hypot((x - 105) / 55, (y - 240) / 130) > 1) & (x < 200)
     picture[outside] = WALL
     assert found(picture) == ([], 1)
+
+
+UPRIGHT = Roi(100, 50, 30, 200)
+
+
+def turned(box: Roi) -> Roi:
+    return Roi(box.y, box.x, box.height, box.width)
+
+
+@pytest.mark.parametrize(
+    ("box", "beside"),
+    [
+        (Roi(70, 50, 30, 80), True),  # two fifths of the length, side by side
+        (Roi(70, 50, 30, 79), False),
+        (Roi(71, 50, 30, 80), False),  # one pixel within it
+        (Roi(130, 170, 30, 100), True),
+        (Roi(130, 171, 30, 100), False),
+        (Roi(129, 170, 30, 100), False),
+        (Roi(70, 0, 30, 130), True),
+        (Roi(70, 0, 30, 129), False),
+        (Roi(100, 260, 30, 200), False),  # below
+    ],
+)
+def test_a_plate_lies_along_two_fifths_of_the_specimen(box: Roi, beside: bool) -> None:
+    assert _beside(box, UPRIGHT) is beside
+    assert _beside(turned(box), turned(UPRIGHT)) is beside
+
+
+@pytest.mark.parametrize(
+    ("missing", "radius", "plate"),
+    [(20, 2.0, True), (21, 2.0, False), (0, 2.99, True), (0, 3.01, False), (0, 1.34, True), (0, 1.33, False)],
+)
+def test_a_plate_fills_its_box_with_speckle_of_the_specimen(missing: int, radius: float, plate: bool) -> None:
+    """Of 200 pixels, nine in ten; a speckle of 2 px half as large again, or two thirds of it."""
+    mask = np.zeros((20, 40), bool)
+    mask[:, 10:20] = True
+    mask.ravel()[np.flatnonzero(mask)[:missing]] = False
+    specimen = Specimen(np.ones((20, 40), bool), Roi(25, 0, 10, 20), 2.0)
+    assert _is_plate(Specimen(mask, Roi(10, 0, 10, 20), radius), specimen) is plate

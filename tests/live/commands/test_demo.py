@@ -1,4 +1,4 @@
-"""The demo: its exit code is that of what was measured."""
+"""The demo: its truth, its comparison, and its exit code."""
 
 from __future__ import annotations
 
@@ -10,6 +10,27 @@ from acquire.errors import Interrupted
 from analysis import PICTURE_KINDS
 from live.cli import main
 from live.commands import demo
+import argparse
+import math
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+import numpy as np
+import pytest
+from acquire.clock import ClockPair
+from acquire.errors import ConfigError
+from acquire.load_sample import LoadSample
+from acquire.serial_line.ports import LineSettings
+from analysis import Roi, ZoiGrid
+from live.commands import consumers, demo
+from live.commands.consumers import OUTPUT_NAME, signals_of
+from live.commands.demo import MeansCollector, ZoiTruth, middle_of
+from live.config.loading import Config, load_config
+from live.pipeline.run_state import RunState
+from live.pipeline.screen import Screen
+from live.results.sides.channels import JointChannels
+from tests.live.made_run import UTC_START
+from tests.live.made_up import CAMERA, START, make_grid, make_measurement
 
 SHORT = ["--seconds", "2", "--fps", "10", "--reference-burst", "2", "--burst", "2", "--step", "64"]
 
@@ -44,3 +65,140 @@ def test_it_compiles_what_every_kind_of_picture_needs(
     monkeypatch.setattr(demo, "compile_ahead", compile_ahead)
     assert main(["demo", "--out", str(tmp_path / "out")]) == 130
     assert asked == [(PICTURE_KINDS, True)]
+
+
+class Stretched:
+    """A specimen of uniform gradients that grow with time."""
+
+    yield_s, E, nu = 5.0, 70e9, 0.3
+
+    def displacement(self, x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+        return t * (3 + 1e-3 * x + 2e-3 * y), t * (-1 + 4e-3 * x + 5e-3 * y)
+
+    def axial_strain(self, t: np.ndarray) -> np.ndarray:
+        return np.maximum(t - 1.0, 0.0) * 1e-3
+
+    def elapsed(self, t: float) -> float:
+        return t - START
+
+    def force(self, t: np.ndarray) -> np.ndarray:
+        return 100.0 * np.asarray(t)
+
+
+def test_the_truth_of_a_zoi_is_the_plane_through_what_is_prescribed() -> None:
+    grid = ZoiGrid.cover(Roi(10, 20, 80, 64), size=32, step=16)
+    truth = ZoiTruth(Stretched(), grid, (100, 50))  # type: ignore[arg-type]
+    exx, eyy, exy = truth.strains(2.0)
+    assert exx.shape == grid.shape
+    np.testing.assert_allclose(exx, 2e-3)
+    np.testing.assert_allclose(eyy, 10e-3)
+    np.testing.assert_allclose(exy, 6e-3)
+    u, *_, _, _ = truth._parameters(1.0)
+    x, y = np.meshgrid(grid.x + 100, grid.y + 50)
+    np.testing.assert_allclose(u, 3 + 1e-3 * x + 2e-3 * y, rtol=1e-9)
+    some = np.zeros(grid.shape, bool)
+    some[1:, :2] = True
+    assert truth.region(2.0, some) == pytest.approx((2e-3, 10e-3, 6e-3), rel=1e-5)
+    assert all(math.isnan(value) for value in truth.region(2.0, np.zeros(grid.shape, bool)))
+
+
+def test_a_zoi_sees_a_curved_field_by_its_weight() -> None:
+    """The mean of the square of the distance is that of a Gaussian that ends at three sigma."""
+
+    class Curved(Stretched):
+        def displacement(self, x: np.ndarray, y: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
+            return (x - 25.5) ** 2 + 0 * y, 0 * x
+
+    grid = ZoiGrid.cover(Roi(10, 20, 32, 32), size=32, step=16)
+    place = np.arange(32) - 15.5
+    weight = np.exp(-(place**2) / (2 * (32 / 6) ** 2))
+    u, du_dx, *_ = ZoiTruth(Curved(), grid)._parameters(0.0)  # type: ignore[arg-type]
+    assert u[0, 0] == pytest.approx(np.sum(weight * place**2) / weight.sum()) and du_dx[
+        0, 0
+    ] == pytest.approx(0)
+
+
+def test_the_middle_of_a_burst_in_which_the_ramp_begins() -> None:
+    times = np.array([0.0, 1.0, 2.0, 3.0])
+    assert middle_of(Stretched(), times) == pytest.approx(1.75)  # type: ignore[arg-type]
+    assert middle_of(Stretched(), times - 5) == pytest.approx(-3.5)  # type: ignore[arg-type]
+    assert middle_of(Stretched(), times + 5) == pytest.approx(6.5)  # type: ignore[arg-type]
+
+
+def test_what_the_demo_keeps_of_a_measurement() -> None:
+    collector, m = MeansCollector(), make_measurement(3, 2e-3)
+    collector.measurement(m)
+    (kept,) = collector.measurements
+    np.testing.assert_allclose(kept.times, m.t + np.linspace(-0.035, 0.035, 8))
+    assert kept.mean == pytest.approx((-6e-4, 2e-3, 0.0), abs=1e-12)
+    step = m.time_step
+    assert kept.sigma == (step.sigma_exx, step.sigma_eyy, step.sigma_exy) and kept.valid.sum() == 33
+
+
+@pytest.mark.parametrize(
+    ("within", "beyond", "agreed"), [(100, 0, True), (98, 0, True), (96, 0, False), (100, 1, False)]
+)
+def test_ninety_seven_percent_must_agree_and_none_may_be_far_off(
+    within: int, beyond: int, agreed: bool
+) -> None:
+    ratios, lines = np.full((100, 2, 3), 0.5), list[str]()
+    ratios[within:, 0] = 1.01
+    ratios[:beyond, 1, 0] = 1.01
+    errors = np.tile([3e-6, -4e-6, 0.0], (100, 1))
+    assert demo._print_strain(ratios, errors, lines.append) is agreed
+    assert "error 3.00, 4.00, 0.00 µm/m rms in 100 instants" in lines[0]
+    assert (
+        f"{within:.1f}% of these 300 values within 0.05% of the strain + 3 sigma, {beyond} beyond" in lines[1]
+    )
+    ratios[0, 1, 0] = math.nan
+    assert demo._print_strain(ratios, errors, lines.append) is False
+    assert demo._print_strain(np.zeros(0), np.zeros(0), lines.append) is False
+    assert lines[-1].endswith("no instant of the elastic part was measured")
+
+
+def test_the_demo_compares_the_elastic_part_with_its_truth() -> None:
+    state, lines = RunState.new(1.0), list[str]()
+    for t in (1.0, 2.0):
+        state.loads.append(LoadSample(START + t, 100.0 * t + (3.0 if t > 1 else 1.0)))
+    state.loads.append(LoadSample(START + 3.0, math.nan))
+    state.loads.close()
+    grid = make_grid()
+    outcome: Any = SimpleNamespace(
+        rig=SimpleNamespace(specimen=Stretched()), grid=grid, run_state=state, exit_code=0
+    )
+    collector = MeansCollector()
+
+    def measured(t: float, off: float, sigma: float = 1e-6) -> Any:
+        times = START + t + np.array([-0.1, 0.1])
+        truth = np.array([1e-3, 5e-3, 3e-3]) * t
+        return demo.MeasuredMeans(
+            times, None, np.ones(grid.shape, bool), tuple(truth * (1 + off)), (sigma,) * 3
+        )  # type: ignore[arg-type]
+
+    collector.measurements = [measured(2.0, 0.0), measured(4.0, 4e-4), measured(4.95, 5.0)]  # the last yields
+    config = load_config(None, {"specimen.area_mm2": 40.0})
+    code = demo.compare(outcome, collector, config, lines.append)
+    assert code == 5 and any("exit code 5: E was not measured" in line for line in lines)
+    assert any("100.0% of these 6 values" in line for line in lines)
+    assert "  force: mean error +2.00 N, scatter 1.00 N in 2 samples" in lines
+    assert any(line.endswith("true 70 GPa") for line in lines) and any(
+        line.endswith("true 0.3") for line in lines
+    )
+    collector.measurements = [measured(2.0, 0.01)]
+    assert demo.compare(outcome, collector, config, lines.append) == 1
+    collector.measurements, outcome.exit_code = [measured(2.0, 0.0)], 130
+    assert demo.compare(outcome, collector, config, lines.append) == 0
+
+
+def test_the_rig_of_the_demo() -> None:
+    arguments = argparse.Namespace(specimen="hole", fps=None, **{"output.seconds": None})
+    given = demo._defaults(arguments)
+    assert given["camera.address"] == "sim:hole?bits=12&fps=auto&buffers=64&section_mm2=40"
+    assert (given["specimen.width_mm"], given["specimen.thickness_mm"], given["load.address"]) == (
+        20.0,
+        2.0,
+        "sim:",
+    )
+    arguments = argparse.Namespace(specimen="hole", fps=12.5, **{"output.seconds": 7.0})
+    assert "fps=12.5&" in demo._defaults(arguments)["camera.address"]
+    assert demo._defaults(arguments)["camera.address"].endswith("&seconds=7")

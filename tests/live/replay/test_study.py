@@ -42,6 +42,7 @@ def rows(out: Path) -> list[dict[str, float]]:
     return [{k: float(v) for k, v in row.items() if k != "window"} for row in csv.DictReader(lines)]
 
 
+@pytest.mark.slow
 def test_of_a_hole(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "study"
     assert main(["study", str(session), "--zoi", "24,32,64", "--roi", "all", "--out", str(out)]) == 0

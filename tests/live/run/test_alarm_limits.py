@@ -8,6 +8,37 @@ import pytest
 
 from live.config.sections import AlarmConfig
 from live.run.alarms import Alarm
+import io
+import math
+import threading
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+import pytest
+from acquire.burst import SumAccumulator, SummedBurst
+from acquire.clock import ClockPair
+from acquire.events import Event, EventKind
+from acquire.frame import Burst
+from live.config.sections import AlarmConfig
+from live.pipeline.event_log import EventLog
+from live.pipeline.measure import NewReference
+from live.pipeline.queues import LatestQueue
+from live.pipeline.reference import ReferenceBurst, ReferenceTaker
+from live.pipeline.run_state import ActiveAlarms, FrameCounts, RunState
+from live.run import measuring, prepared_run
+from live.run.alarms import Alarm, AlarmWatch, in_words
+from live.run.burst_queue import TAKING, BurstQueue
+from live.run.control import ENDED
+from live.run.grabber import Grabber, GrabPlan
+from live.run.keyboard import HELP, LINES_HELP, Keyboard
+from live.run.measuring import MeasureThread
+from live.run.prepared_run import PreparedRun, _time_zero
+from live.run.tcp_lines import LineServer
+from tests.live.fakes import ListCamera, frame
+from tests.live.made_up import START, make_measurement
+from tests.live.run.test_both_runs import OneRun, both
+from tests.live.run.test_control import FakeLive
+from tests.live.ui.waiting import LONG_S
 
 ABOVE = AlarmConfig(channel="force_N", above=100.0, hysteresis=10.0)
 BELOW = AlarmConfig(channel="force_N", below=-100.0, hysteresis=10.0)
@@ -38,3 +69,42 @@ def test_on_beyond_the_limit_off_within_it_by_the_hysteresis(config: AlarmConfig
 
 def test_its_name_has_the_limit() -> None:
     assert Alarm(ABOVE).name == "force_N above 100" and Alarm(BELOW).name == "force_N below -100"
+
+
+@pytest.mark.parametrize(("clock", "after_s"), [("device", 0.465), ("host", 0.465), ("nominal", None)])
+def test_an_alarm_says_how_long_after_the_last_frame_it_came(clock: Any, after_s: float | None) -> None:
+    events: list[Event] = []
+    values: Any = SimpleNamespace(read=lambda measurement: {"axial": 2e-3})
+    alarm = Alarm(AlarmConfig(channel="axial", above=1e-3))
+    watch = AlarmWatch([alarm], values, lambda now: {}, ActiveAlarms(), events.append, lambda: START + 0.5)
+    m = make_measurement(0)
+    watch.measurement(replace(m, burst=replace(m.burst, clock=clock)))
+    assert events[0].t == START + 0.5
+    assert events[0].data.get("after_s") == (None if after_s is None else pytest.approx(after_s))
+    assert watch.end() == "1 came"
+
+
+@pytest.mark.parametrize(("channel", "idle_s"), [("silent_s", 0.2), ("mean_axial", 0.2), ("axial", math.inf)])
+def test_what_changes_by_itself_is_looked_at_five_times_a_second(channel: str, idle_s: float) -> None:
+    nothing: Any = None
+    alarm = Alarm(AlarmConfig(channel=channel, above=1.0))
+    watch = AlarmWatch([alarm], nothing, lambda now: {}, ActiveAlarms(), [].append, lambda: 0.0)
+    assert watch.idle() == idle_s and watch.end() == "none came"
+
+
+@pytest.mark.parametrize(
+    ("channel", "value", "words"),
+    [
+        ("sigma_axial", 5e-6, "sigma axial 5 µm/m, limit 1000"),
+        ("sigma_mean_axial", 5e-6, "sigma mean axial 5 µm/m, limit 1000"),
+        ("bending_gauge_left", -5e-6, "bending gauge left -5 µm/m, limit 1000"),
+        ("stress_MPa", 12.5, "stress 12.5 MPa, limit 0.001"),
+        ("latency_s", 0.25, "latency 0.25 s, limit 0.001"),
+        ("noise_GL", 2.5, "noise 2.5 GL, limit 0.001"),
+        ("strain_rate", 0.25, "strain rate 0.25, limit 0.001"),
+        ("load_silent_s", 2.0, "no force for 2 s, limit 0.001"),
+        ("largest", 0.25, "largest 250000 µm/m, limit 1000"),
+    ],
+)
+def test_a_channel_is_named_with_its_unit(channel: str, value: float, words: str) -> None:
+    assert in_words(channel, value, 1e-3) == words

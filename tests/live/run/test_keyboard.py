@@ -18,6 +18,53 @@ from live.run.keyboard import Keys, listen
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.run.test_control import FakeLive
 from tests.live.ui.waiting import LONG_S
+import io
+import math
+import threading
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+import pytest
+from acquire.burst import SumAccumulator, SummedBurst
+from acquire.clock import ClockPair
+from acquire.events import Event, EventKind
+from acquire.frame import Burst
+from live.config.sections import AlarmConfig
+from live.pipeline.event_log import EventLog
+from live.pipeline.measure import NewReference
+from live.pipeline.queues import LatestQueue
+from live.pipeline.reference import ReferenceBurst, ReferenceTaker
+from live.pipeline.run_state import ActiveAlarms, FrameCounts, RunState
+from live.run import measuring, prepared_run
+from live.run.alarms import Alarm, AlarmWatch, in_words
+from live.run.burst_queue import TAKING, BurstQueue
+from live.run.control import ENDED
+from live.run.grabber import Grabber, GrabPlan
+from live.run.keyboard import HELP, LINES_HELP, Keyboard
+from live.run.measuring import MeasureThread
+from live.run.prepared_run import PreparedRun, _time_zero
+from live.run.tcp_lines import LineServer
+from tests.live.fakes import ListCamera, frame
+from tests.live.made_up import START, make_measurement
+from tests.live.run.test_both_runs import OneRun, both
+from tests.live.run.test_control import FakeLive
+from tests.live.ui.waiting import LONG_S
+import math
+import socket
+from types import SimpleNamespace
+from typing import Any
+import pytest
+from acquire.events import Event, EventKind
+from live.config.listen_address import ListenAddress
+from live.run import strain_output, tcp_lines
+from live.run.control import QUEUED, TareControl, answer
+from live.run.strain_output import LineFormat, SerialOut, TcpOut, UdpOut, _number, _rounded
+from live.run.tcp_lines import MAX_LINE_BYTES, Client
+from tests.live.made_up import make_measurement
+from tests.live.run.test_control import FakeCell, FakeLive, TareSetup
+from tests.live.run.test_strain_output import readings
+from tests.live.run.test_tcp_lines import Caller, server
+from tests.live.run.test_tokens import connected
 
 
 class Terminal(io.StringIO):
@@ -169,3 +216,86 @@ def wait_for(master: int, words: bytes) -> None:
         assert time.monotonic() < until, got
         if select.select([master], [], [], 0.2)[0]:
             got += os.read(master, 4096)
+
+
+class FakeTerminal:
+    """Gives these texts; for None another program has the terminal, or nothing is typed."""
+
+    def __init__(self, *texts: bytes | None) -> None:
+        self.texts, self.restored = list(texts), 0
+
+    def set_single_keys(self) -> bool:
+        return bool(self.texts) and (self.texts[0] is not None or bool(self.texts.pop(0)))
+
+    def read(self, seconds: float) -> bytes | None:
+        assert seconds == 0.5
+        return self.texts.pop(0)
+
+    def restore(self) -> None:
+        self.restored += 1
+
+
+def keyboard(monkeypatch: pytest.MonkeyPatch, terminal: FakeTerminal | None, lines: str = "") -> Any:
+    monkeypatch.setattr("live.run.keyboard.terminal_of", lambda stream: terminal)
+    live, printed = FakeLive(), list[str]()
+    screen: Any = SimpleNamespace(print=printed.append, prompt=lambda text: None)
+    return SimpleNamespace(board=Keyboard(live, io.StringIO(lines), screen), live=live, printed=printed)
+
+
+def test_keys_are_decoded_across_readings_until_the_terminal_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = FakeTerminal(b"r", b"n\xc3", b"\xa9\r", b"")
+    bench = keyboard(monkeypatch, terminal)
+    bench.board.start()
+    bench.board.join(LONG_S)
+    assert bench.live.calls == [(EventKind.NEW_REFERENCE, ""), (EventKind.NOTE, "é")]
+    assert bench.printed == [HELP]
+    bench.board.close()
+    assert terminal.restored == 1
+
+
+def test_a_keyboard_that_is_closed_takes_no_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = keyboard(monkeypatch, FakeTerminal(b"r"))
+    bench.board._closed.set()
+    bench.board._work()
+    assert bench.live.calls == []
+
+
+def test_without_single_keys_lines_are_taken_and_answers_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = keyboard(monkeypatch, None, "\n r \nhello\nq\n")
+    bench.board.start()
+    bench.board.join(LONG_S)
+    assert bench.live.calls == [(EventKind.NEW_REFERENCE, ""), ("stop", ENDED)]
+    assert bench.printed[0] == LINES_HELP and len(bench.printed) == 2
+    assert bench.printed[1].startswith("no: 'hello' is no command")
+    bench.board.close()
+
+
+@pytest.mark.parametrize(("after_s", "ends"), [(3.0, True), (3.01, False)])
+def test_the_second_q_comes_within_three_seconds(after_s: float, ends: bool) -> None:
+    typed = Typed()
+    typed.type("q")
+    typed.now = after_s
+    assert len(typed.type("q")) == ends
+
+
+def test_each_key_is_its_command() -> None:
+    keys = {
+        "r": (EventKind.NEW_REFERENCE, ""), "t": (EventKind.TARE, ""), "T": (EventKind.TARE, "force"),
+        "u": (EventKind.TARE, "undo"), "p": (EventKind.PAUSE, ""), "s": (EventKind.RECORD, "start"),
+        "a": (EventKind.ALARM, ""),
+    }  # fmt: skip
+    for key, call in keys.items():
+        typed = Typed()
+        assert typed.type(key) == [call] and typed.stream.getvalue() == ""
+    typed = Typed()
+    typed.type("?")
+    assert typed.stream.getvalue().startswith("ok: start, stop, reference")
+
+
+def test_a_line_that_is_typed_is_shown_and_has_no_letters_that_cannot_be() -> None:
+    typed, shown = Typed(), list[str | None]()
+    typed.keys._screen.prompt = shown.append  # type: ignore[method-assign]
+    typed.type("n", "ab", "\x7f", "\x07", "\x1b")
+    assert shown == [": note _", ": note a_", ": note ab_", ": note a_", None]
+    typed.type("\x1b")
+    assert typed.live.calls == []

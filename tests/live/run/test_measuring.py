@@ -17,6 +17,37 @@ from live.pipeline.run_state import RunState
 from live.run import measuring
 from live.run.measuring import MeasureThread, ReferenceSelector, SmearGuard, _measured
 from tests.live.made_up import START, make_measurement
+import io
+import math
+import threading
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+import pytest
+from acquire.burst import SumAccumulator, SummedBurst
+from acquire.clock import ClockPair
+from acquire.events import Event, EventKind
+from acquire.frame import Burst
+from live.config.sections import AlarmConfig
+from live.pipeline.event_log import EventLog
+from live.pipeline.measure import NewReference
+from live.pipeline.queues import LatestQueue
+from live.pipeline.reference import ReferenceBurst, ReferenceTaker
+from live.pipeline.run_state import ActiveAlarms, FrameCounts, RunState
+from live.run import measuring, prepared_run
+from live.run.alarms import Alarm, AlarmWatch, in_words
+from live.run.burst_queue import TAKING, BurstQueue
+from live.run.control import ENDED
+from live.run.grabber import Grabber, GrabPlan
+from live.run.keyboard import HELP, LINES_HELP, Keyboard
+from live.run.measuring import MeasureThread
+from live.run.prepared_run import PreparedRun, _time_zero
+from live.run.tcp_lines import LineServer
+from tests.live.fakes import ListCamera, frame
+from tests.live.made_up import START, make_measurement
+from tests.live.run.test_both_runs import OneRun, both
+from tests.live.run.test_control import FakeLive
+from tests.live.ui.waiting import LONG_S
 
 N = 8  # frames of a reference
 
@@ -266,3 +297,31 @@ def test_the_latency_is_the_95th_percentile_of_five_seconds() -> None:
         monitor.check(LatencySample(k / 10, 9.0 if k < 130 else (k - 130) / 100, 0.0), 100.0)
     # The last look is at 19.1 s or later; it sees what came in the five seconds before, all below 0.7 s.
     assert 0.55 < monitor.p95_s < 0.7
+
+
+class MeasureSetup:
+    """A measuring thread whose reference selector raises, or gives nothing."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, take: Any) -> None:
+        self.state, self.skipped = RunState.new(0.5), 0
+        monkeypatch.setattr(measuring, "lower_priority", lambda nice: None)
+        monkeypatch.setattr(measuring, "ReferenceSelector", lambda *given: SimpleNamespace(take=take))
+        queue: Any = SimpleNamespace(skip_rest=self._skip)
+        nothing: Any = None
+        self.thread = MeasureThread(nothing, self.state, nothing, queue, nothing, lambda: None)
+        self.thread._work()
+
+    def _skip(self) -> None:
+        self.skipped += 1
+
+
+def test_a_defect_ends_the_measurement_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = MeasureSetup(monkeypatch, lambda: 1 / 0)
+    assert (bench.thread.failure, bench.skipped) == (1, 1)
+    (event,) = bench.state.event_log.events("error")
+    assert event.text.startswith("measuring has stopped by a defect, recording goes on: ZeroDivisionError(")
+
+
+def test_without_a_reference_the_rest_is_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = MeasureSetup(monkeypatch, lambda: None)
+    assert (bench.thread.failure, bench.skipped, bench.state.event_log.events()) == (0, 1, [])

@@ -12,6 +12,53 @@ import pytest
 from acquire.errors import ConfigError
 from live.config.listen_address import ListenAddress, read_token
 from live.run.tcp_lines import LineServer
+import io
+import math
+import threading
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+import pytest
+from acquire.burst import SumAccumulator, SummedBurst
+from acquire.clock import ClockPair
+from acquire.events import Event, EventKind
+from acquire.frame import Burst
+from live.config.sections import AlarmConfig
+from live.pipeline.event_log import EventLog
+from live.pipeline.measure import NewReference
+from live.pipeline.queues import LatestQueue
+from live.pipeline.reference import ReferenceBurst, ReferenceTaker
+from live.pipeline.run_state import ActiveAlarms, FrameCounts, RunState
+from live.run import measuring, prepared_run
+from live.run.alarms import Alarm, AlarmWatch, in_words
+from live.run.burst_queue import TAKING, BurstQueue
+from live.run.control import ENDED
+from live.run.grabber import Grabber, GrabPlan
+from live.run.keyboard import HELP, LINES_HELP, Keyboard
+from live.run.measuring import MeasureThread
+from live.run.prepared_run import PreparedRun, _time_zero
+from live.run.tcp_lines import LineServer
+from tests.live.fakes import ListCamera, frame
+from tests.live.made_up import START, make_measurement
+from tests.live.run.test_both_runs import OneRun, both
+from tests.live.run.test_control import FakeLive
+from tests.live.ui.waiting import LONG_S
+import math
+import socket
+from types import SimpleNamespace
+from typing import Any
+import pytest
+from acquire.events import Event, EventKind
+from live.config.listen_address import ListenAddress
+from live.run import strain_output, tcp_lines
+from live.run.control import QUEUED, TareControl, answer
+from live.run.strain_output import LineFormat, SerialOut, TcpOut, UdpOut, _number, _rounded
+from live.run.tcp_lines import MAX_LINE_BYTES, Client
+from tests.live.made_up import make_measurement
+from tests.live.run.test_control import FakeCell, FakeLive, TareSetup
+from tests.live.run.test_keyboard import Typed
+from tests.live.run.test_strain_output import readings
+from tests.live.run.test_tokens import connected
 
 WORD = "a-long-and-secret-word"
 
@@ -166,3 +213,76 @@ def test_beyond_this_machine_only_with_a_token(tmp_path: Path) -> None:
 def test_a_taken_port_is_told() -> None:
     with server() as one, pytest.raises(ConfigError, match="choose another port"):
         ListenAddress.parse(str(one.port)).listen("it")
+
+
+def test_lines_of_clients_are_ignored_where_nobody_answers() -> None:
+    client: Any = SimpleNamespace(authorized=True)
+    server = object.__new__(LineServer)
+    server._answer = None
+    assert server._handle(client, "hello") and not server._handle(client, "GET / HTTP/1.1")
+
+
+def test_at_most_so_many_clients_are_served(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert (tcp_lines.MAX_CLIENTS, MAX_LINE_BYTES) == (32, 4096)
+    monkeypatch.setattr(tcp_lines, "MAX_CLIENTS", 2)
+    with server(greeting="hello") as one:
+        callers = [Caller(one.port) for _ in range(2)]
+        assert [caller.lines.readline() for caller in callers] == ["hello\n"] * 2
+        third = Caller(one.port)
+        assert third.lines.readline() == ""
+        callers[0].close()
+        third.close()
+        # Its place is free once the server has seen that it is gone.
+        while len(one._clients) == 2:
+            pass
+        fourth = Caller(one.port)
+        assert fourth.lines.readline() == "hello\n"
+        fourth.close()
+        callers[1].close()
+    assert one.served == 3
+
+
+@pytest.mark.parametrize(("length", "good"), [(MAX_LINE_BYTES, True), (MAX_LINE_BYTES + 1, False)])
+@pytest.mark.parametrize("end", [b"", b"\n"])
+def test_a_line_of_a_client_has_at_most_so_many_bytes(length: int, good: bool, end: bytes) -> None:
+    here, there = connected()
+    with there:
+        client = Client(here, "a client", "")
+        there.sendall(b"x" * length + end)
+        there.shutdown(socket.SHUT_WR)
+        got: list[str] = []
+        words = "closed by the client" if good else "a line without an end"
+        with pytest.raises(ConnectionError, match=words):
+            while True:
+                got += client.receive()
+        assert got == (["x" * length] if good and end else [])
+        client.close()
+
+
+class Stalling:
+    """A connection that takes so many bytes at each send, then none."""
+
+    def __init__(self, *takes: int) -> None:
+        self.takes, self.sent = list(takes), b""
+
+    def send(self, data: bytes) -> int:
+        take = self.takes.pop(0) if self.takes else 0
+        if not take:
+            raise BlockingIOError
+        self.sent += data[:take]
+        return min(take, len(data))
+
+    def setblocking(self, on: bool) -> None: ...
+
+    def setsockopt(self, *given: int) -> None: ...
+
+
+def test_the_rest_of_a_line_goes_before_the_next_one_and_whole_lines_are_skipped() -> None:
+    connection: Any = Stalling(3, 2, 99, 99, 0, 99)
+    client = Client(connection, "a client", "")
+    assert client.send(b"abcdef\n"), "begun, so it is taken"
+    assert not client.send(b"second\n") and connection.sent == b"abcde"
+    assert client.send(b"third\n") and connection.sent == b"abcdef\nthird\n"
+    assert not client.send(b"fourth\n")
+    assert client.send(b"fifth\n") and connection.sent == b"abcdef\nthird\nfifth\n"
+    assert (client.taken, client.skipped) == (3, 2)

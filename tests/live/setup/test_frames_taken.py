@@ -17,6 +17,42 @@ from live.setup.check.sample import MIN_FRAMES, _inner_halves, take
 from live.setup.lens_calibration import _places
 from live.setup.prepared import MeasurePlan
 from tests.live.fakes import ListCamera, frame
+import math
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+import cv2
+import numpy as np
+import pytest
+from acquire.errors import ConfigError, DataError, DeviceError
+from acquire.frame import CameraInfo
+from acquire.load_cell.zeroed import ZeroedLoadCell
+from analysis import Roi, StrainField, ZoiGrid
+from analysis.optics import Readout
+from live.config.loading import load_config
+from live.setup import devices as devices_module
+from live.setup import prepared as prepared_module
+from live.setup import readout as readout_module
+from live.setup import scale as scale_module
+from live.setup.check.check_list import median
+from live.setup.check.noise_floor import BURSTS, ORDERS, SIZES, StrainNoise, ZoiFloor, _filled, _share
+from live.setup.check.quick_check import QuickCheck, RollingFrames, _same_region
+from live.setup.check.sample import FrameStack, around, moved, temporal_noise
+from live.setup.check.stillness import MAX_ZOIS, covered, middle
+from live.setup.compiling import progress_text
+from live.setup.devices import _open_cropped, at_rest, open_rig
+from live.setup.dry_run import _image, picture_kinds
+from live.setup.lens_calibration import _box
+from live.setup.pictures import correction, mask_picture, read_mask, with_mask
+from live.setup.prepared import MeasurePlan, PreparedKernel, _focal_px
+from live.setup.readout import from_lamp, from_motion
+from live.setup.region import FirstLook, Region, _mean_and_noise, _within
+from live.setup.rig_proposal import Proposal
+from live.setup.scale import Board, _bands, _edge, _sides, _tilt, from_points, from_width, specimen_width
+from tests.live.fakes import ListCamera, frame
+from tests.live.made_up import make_field, make_grid
+from tests.live.setup.test_prepared import CAMERA
 
 
 def taken(monkeypatch: pytest.MonkeyPatch, frames: list[Any], reference: int | None) -> Any:
@@ -89,3 +125,72 @@ def test_the_loops_of_the_phase_estimator_are_compiled_where_it_is_used(
     plan: Any = SimpleNamespace(settings=SimpleNamespace(estimator=estimator))
     assert MeasurePlan.compile(plan, camera, lambda text: None, lambda: False) == 1.5
     assert given == [(("uint16", "float32"), phase)]
+
+
+def test_frames_of_a_check_are_a_burst_with_their_mean_times_and_clipped_pixels() -> None:
+    frames = np.array([[[0, 10]], [[1, 255]], [[5, 20]]], np.uint8)
+    stack = FrameStack(frames, np.array([1.0, 1.5, 3.0]), 0, CAMERA)
+    burst = stack.mean(1, 2)
+    assert (burst.mean.tolist(), burst.clipped.tolist()) == ([[3.0, 137.5]], [[False, True]])
+    assert (burst.n, burst.t, burst.duration, burst.first_index, burst.last_index) == (2, 2.25, 1.5, 1, 2)
+    assert stack.mean().mean.tolist() == [[2.0, 95.0]] and stack.mean(0, 1).mean.tolist() == [[0.0, 10.0]]
+    assert stack.few and stack.noise() is None and stack.count_text == "3 pictures"
+    assert FrameStack(frames[:1], np.zeros(1), 0, CAMERA).count_text == "1 picture"
+
+
+def test_the_noise_in_time_is_that_of_one_frame_without_the_drift_of_the_light() -> None:
+    rng = np.random.default_rng(0)
+    still = rng.normal(100, 2.0, (40, 2000))
+    assert temporal_noise(still) == pytest.approx(2.0, rel=0.02)
+    assert temporal_noise(still + np.arange(40)[:, None] * 5.0) == pytest.approx(2.0, rel=0.02)
+    assert temporal_noise(np.ones((9, 50), np.uint8)) == 0.0
+    many = FrameStack(rng.normal(100, 2.0, (16, 40, 50)), np.arange(16.0), 0, CAMERA)
+    assert many.noise() == pytest.approx(2.0 / 4, rel=0.03) and not many.few
+
+
+def test_some_of_the_pixels_stand_for_all() -> None:
+    frames = np.arange(2 * 300 * 400, dtype=np.uint32).reshape(2, 300, 400)
+    stack = FrameStack(frames, np.zeros(2), 0, CAMERA)
+    inside = np.zeros((300, 400), bool)
+    inside[10:12, 20:23] = True
+    assert stack.pixels(inside).tolist() == [
+        [4020, 4021, 4022, 4420, 4421, 4422],
+        [124020, 124021, 124022, 124420, 124421, 124422],
+    ]
+
+
+def test_a_cut_has_a_margin_within_the_picture_and_the_same_zois() -> None:
+    inside = np.zeros((400, 500), bool)
+    inside[150:200, 220:300] = True
+    rows, columns = around(inside)
+    margin = 150 - rows.start
+    assert margin > 0 and (rows.stop, columns.start, columns.stop) == (
+        200 + margin,
+        220 - margin,
+        300 + margin,
+    )
+    assert around(np.zeros((7, 9), bool)) == (slice(0, 7), slice(0, 9))
+    corner = np.zeros((400, 500), bool)
+    corner[0, 0] = True
+    assert around(corner) == (slice(0, 1 + margin), slice(0, 1 + margin))
+    grid = ZoiGrid.cover(Roi(220, 150, 80, 48), 32, 16)
+    found = moved(grid, (rows, columns))
+    assert (found.first_x + columns.start).tolist() == grid.first_x.tolist()
+    assert (found.first_y + rows.start).tolist() == grid.first_y.tolist()
+    seen = covered(grid, inside.shape)
+    assert seen.sum() == 80 * 48 and seen[150, 220] and seen[197, 299] and not seen[198, 299]
+
+
+def test_the_zois_about_the_middle_do_not_overlap_and_are_few() -> None:
+    grid = ZoiGrid.cover(Roi(0, 0, 800, 400), 32, 8)
+    chosen = middle(grid)
+    assert chosen.n_active == MAX_ZOIS == 64
+    rows, columns = np.nonzero(chosen.active)
+    x, y = np.unique(chosen.first_x[columns]), np.unique(chosen.first_y[rows])
+    assert set(np.diff(x)) == set(np.diff(y)) == {32} and len(x) in (8, 9, 10) and len(y) in (8, 9, 10)
+    assert abs(x.mean() + 15.5 - grid.x.mean()) <= 16 and abs(y.mean() + 15.5 - grid.y.mean()) <= 16
+    roi = chosen.roi
+    assert (roi.x, roi.y) == (int(x[0]), int(y[0])), "no larger than they are"
+    assert (roi.x + roi.width, roi.y + roi.height) == (int(x[-1]) + 32, int(y[-1]) + 32)
+    few = ZoiGrid.cover(Roi(0, 0, 80, 48), 32, 16)
+    assert middle(few).n_active == few.n_active == 8

@@ -30,6 +30,41 @@ from live.setup.check.noise_floor import (
 from live.setup.check.sharpness import NOT_KNOWN, SharpestPicture
 from live.setup.check.stillness import PictureStillness, light
 from tests.live.made_up import make_grid
+import math
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+import cv2
+import numpy as np
+import pytest
+from acquire.errors import ConfigError, DataError, DeviceError
+from acquire.frame import CameraInfo
+from acquire.load_cell.zeroed import ZeroedLoadCell
+from analysis import Roi, StrainField, ZoiGrid
+from analysis.optics import Readout
+from live.config.loading import load_config
+from live.setup import devices as devices_module
+from live.setup import prepared as prepared_module
+from live.setup import readout as readout_module
+from live.setup import scale as scale_module
+from live.setup.check.check_list import median
+from live.setup.check.noise_floor import BURSTS, ORDERS, SIZES, StrainNoise, ZoiFloor, _filled, _share
+from live.setup.check.quick_check import QuickCheck, RollingFrames, _same_region
+from live.setup.check.sample import FrameStack, around, moved, temporal_noise
+from live.setup.check.stillness import MAX_ZOIS, covered, middle
+from live.setup.compiling import progress_text
+from live.setup.devices import _open_cropped, at_rest, open_rig
+from live.setup.dry_run import _image, picture_kinds
+from live.setup.lens_calibration import _box
+from live.setup.pictures import correction, mask_picture, read_mask, with_mask
+from live.setup.prepared import MeasurePlan, PreparedKernel, _focal_px
+from live.setup.readout import from_lamp, from_motion
+from live.setup.region import FirstLook, Region, _mean_and_noise, _within
+from live.setup.rig_proposal import Proposal
+from live.setup.scale import Board, _bands, _edge, _sides, _tilt, from_points, from_width, specimen_width
+from tests.live.fakes import ListCamera, frame
+from tests.live.made_up import make_field, make_grid
 
 
 class Sample:
@@ -273,3 +308,18 @@ def test_a_picture_that_is_sharper_for_certain_is_the_next_reference(
     found = picture.compare(sample, measurable, sharp)
     assert found == blur or math.isnan(found.px)
     assert len(made) == 1 + taken and picture._peak == (sharp if taken else 1.0)
+
+
+def test_bursts_that_are_longer_than_what_was_taken_are_predicted_from_the_longest() -> None:
+    sample: Any = SimpleNamespace(reference=32)
+    noises = [StrainNoise(1, 3e-4, 2e-4), StrainNoise(4, 2e-4, 1e-4), StrainNoise(8, math.nan, math.nan)]
+    found = list(_filled(noises, sample))
+    assert found[:2] == noises[:2]
+    assert found[2].predicted == pytest.approx(2e-4 * math.sqrt((1 / 32 + 1 / 8) / (1 / 32 + 1 / 4)))
+    assert math.isnan(found[2].measured) and found[2].known == found[2].predicted
+    assert list(_filled(noises[2:], sample)) == []
+    assert _share(4, 8) == 0.375 and (SIZES, ORDERS, BURSTS) == ((32, 48, 64, 96), (1, 2), (1, 2, 4, 8, 16))
+    floor = ZoiFloor(32, 1, 1.0, 1.0, 9, tuple(noises), 32)
+    assert floor.of(4) == noises[1] and floor.of(3) is None
+    assert noises[0].known == 2e-4
+    assert math.isnan(median(np.array([np.nan]))) and median(np.array([np.nan, 1.0, 3.0])) == 2.0

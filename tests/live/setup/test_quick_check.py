@@ -28,6 +28,41 @@ from live.setup.check.sample import take
 from live.setup.check.verdict import CheckLine
 from live.setup.region import Region
 from live.ui.terminal.screen import TerminalScreen
+import math
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+import cv2
+import numpy as np
+import pytest
+from acquire.errors import ConfigError, DataError, DeviceError
+from acquire.frame import CameraInfo
+from acquire.load_cell.zeroed import ZeroedLoadCell
+from analysis import Roi, StrainField, ZoiGrid
+from analysis.optics import Readout
+from live.config.loading import load_config
+from live.setup import devices as devices_module
+from live.setup import prepared as prepared_module
+from live.setup import readout as readout_module
+from live.setup import scale as scale_module
+from live.setup.check.check_list import median
+from live.setup.check.noise_floor import BURSTS, ORDERS, SIZES, StrainNoise, ZoiFloor, _filled, _share
+from live.setup.check.quick_check import QuickCheck, RollingFrames, _same_region
+from live.setup.check.sample import FrameStack, around, moved, temporal_noise
+from live.setup.check.stillness import MAX_ZOIS, covered, middle
+from live.setup.compiling import progress_text
+from live.setup.devices import _open_cropped, at_rest, open_rig
+from live.setup.dry_run import _image, picture_kinds
+from live.setup.lens_calibration import _box
+from live.setup.pictures import correction, mask_picture, read_mask, with_mask
+from live.setup.prepared import MeasurePlan, PreparedKernel, _focal_px
+from live.setup.readout import from_lamp, from_motion
+from live.setup.region import FirstLook, Region, _mean_and_noise, _within
+from live.setup.rig_proposal import Proposal
+from live.setup.scale import Board, _bands, _edge, _sides, _tilt, from_points, from_width, specimen_width
+from tests.live.fakes import ListCamera, frame
+from tests.live.made_up import make_field, make_grid
 
 STILL = "sim:uniform?bits=8&fps=50&width=224&height=192"
 SMALL = ["--zoi", "48", "--reference-burst", "8"]
@@ -202,3 +237,44 @@ def test_the_card_is_a_table() -> None:
     text = card(quick, [CheckLine("a|b", "1"), CheckLine("c", "2", False)])
     assert "| a/b | 1 |" in text
     assert "| **LOOK** | c | 2 |" in text
+
+
+def test_the_newest_frames_of_a_camera_without_damaged_ones() -> None:
+    shown = [frame(k, damaged=k == 18, lost=2 if k in (3, 12) else 0) for k in range(20)]
+    frames = RollingFrames(ListCamera(shown, live=True), 10, "list:")  # type: ignore[arg-type]
+    assert frames.frame() is None
+    with frames:
+        frames._thread.join()
+        assert frames.over and frames.received == 19
+        newest = frames.frame()
+        assert newest is not None and newest.index == 19
+        stack = frames.newest(8)
+        assert stack is not None and stack.times.tolist() == pytest.approx(
+            [1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.7, 1.9]
+        )
+        assert stack.lost == 2, "between those that are looked at"
+        seven = frames.newest(7)
+        assert seven is None
+    short = RollingFrames(ListCamera(shown[:4], error=DeviceError("gone")), 1, "list:")  # type: ignore[arg-type]
+    with short:
+        short._thread.join()
+        with pytest.raises(DeviceError, match="gone"):
+            short.newest(8)
+
+
+def test_sharpness_is_a_share_of_its_peak() -> None:
+    def of(sharpness: float, peak: float) -> float:
+        figures: Any = SimpleNamespace(sharpness=sharpness)
+        return QuickCheck(figures, peak, None).of_peak  # type: ignore[arg-type]
+
+    assert of(0.2, 0.25) == 0.8 and math.isnan(of(0.2, 0.0))
+
+
+@pytest.mark.parametrize(("width", "same"), [(100, True), (98, True), (97, False)])
+def test_a_region_is_the_same_up_to_two_hundredths(width: int, same: bool) -> None:
+    where: Any = SimpleNamespace(
+        camera=SimpleNamespace(width=200, height=100), config=load_config(None, {"measure.zoi": 32})
+    )
+    one, other = Region((0, 0, 100, 50), None, "", True), Region((0, 0, width, 50), None, "", True)
+    assert _same_region(one, other, where) == same == _same_region(other, one, where)
+    assert not _same_region(one, replace(one, found=False), where)

@@ -25,6 +25,41 @@ from live.setup.placement import auto_gauges, with_auto_gauges
 from live.setup.region import FirstLook, Region, first_look, located_on, region_of
 from live.setup.rig_proposal import _axis, _size
 from tests.live.made_up import CAMERA, make_field
+import math
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+import cv2
+import numpy as np
+import pytest
+from acquire.errors import ConfigError, DataError, DeviceError
+from acquire.frame import CameraInfo
+from acquire.load_cell.zeroed import ZeroedLoadCell
+from analysis import Roi, StrainField, ZoiGrid
+from analysis.optics import Readout
+from live.config.loading import load_config
+from live.setup import devices as devices_module
+from live.setup import prepared as prepared_module
+from live.setup import readout as readout_module
+from live.setup import scale as scale_module
+from live.setup.check.check_list import median
+from live.setup.check.noise_floor import BURSTS, ORDERS, SIZES, StrainNoise, ZoiFloor, _filled, _share
+from live.setup.check.quick_check import QuickCheck, RollingFrames, _same_region
+from live.setup.check.sample import FrameStack, around, moved, temporal_noise
+from live.setup.check.stillness import MAX_ZOIS, covered, middle
+from live.setup.compiling import progress_text
+from live.setup.devices import _open_cropped, at_rest, open_rig
+from live.setup.dry_run import _image, picture_kinds
+from live.setup.lens_calibration import _box
+from live.setup.pictures import correction, mask_picture, read_mask, with_mask
+from live.setup.prepared import MeasurePlan, PreparedKernel, _focal_px
+from live.setup.readout import from_lamp, from_motion
+from live.setup.region import FirstLook, Region, _mean_and_noise, _within
+from live.setup.rig_proposal import Proposal
+from live.setup.scale import Board, _bands, _edge, _sides, _tilt, from_points, from_width, specimen_width
+from tests.live.fakes import ListCamera, frame
+from tests.live.made_up import make_field, make_grid
 
 SIM = "sim:hole?seconds=2&fps=20&width=320&height=320&hole=40&lockstep=yes"
 QUICK = ["--zoi", "32", "--step", "16", "--no-view", "--no-rrd"]
@@ -304,3 +339,20 @@ def test_a_specimen_that_fills_the_picture_has_no_mask(
         "the specimen fills" if fills else f"the specimen was found: {mask.mean():.0%}"
     )
     assert region.box in (None, (4, 4, 292, min(192, rows - 4)))
+
+
+def test_the_mean_of_a_first_look_and_its_noise() -> None:
+    images = [np.full((4, 4), value, np.uint8) for value in (10, 12, 11, 15)]
+    mean, noise = _mean_and_noise(images)
+    assert float(mean[0, 0]) == 12.0 and noise == pytest.approx(float(np.std([2, -1, 4])) / math.sqrt(2) / 2)
+    alone, unknown = _mean_and_noise(images[:1])
+    assert alone is images[0] and unknown is None
+    assert _mean_and_noise([images[0]] * 3)[1] is None
+
+
+def test_a_found_box_is_cut_by_the_rim() -> None:
+    picture, config = np.zeros((200, 300)), load_config(None, {"measure.zoi": 32})
+    assert _within(0, 0, 300, 200, config, picture) == (4, 4, 292, 192)
+    assert _within(10, 20, 30, 40, config, picture) == (10, 20, 30, 40)
+    assert _within(290, 190, 10, 10, config, picture) == (290, 190, 6, 6)
+    assert _within(298, 198, 2, 2, config, picture) == (298, 198, 1, 1)

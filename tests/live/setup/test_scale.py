@@ -17,6 +17,41 @@ from live.results.run_folder import open_run
 from live.setup.region import Region, region_of
 from live.setup.scale import Board, Corners, false_strain, from_board, from_points, from_width
 from tests.live.made_run import CONFIG, make_run
+import math
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+import cv2
+import numpy as np
+import pytest
+from acquire.errors import ConfigError, DataError, DeviceError
+from acquire.frame import CameraInfo
+from acquire.load_cell.zeroed import ZeroedLoadCell
+from analysis import Roi, StrainField, ZoiGrid
+from analysis.optics import Readout
+from live.config.loading import load_config
+from live.setup import devices as devices_module
+from live.setup import prepared as prepared_module
+from live.setup import readout as readout_module
+from live.setup import scale as scale_module
+from live.setup.check.check_list import median
+from live.setup.check.noise_floor import BURSTS, ORDERS, SIZES, StrainNoise, ZoiFloor, _filled, _share
+from live.setup.check.quick_check import QuickCheck, RollingFrames, _same_region
+from live.setup.check.sample import FrameStack, around, moved, temporal_noise
+from live.setup.check.stillness import MAX_ZOIS, covered, middle
+from live.setup.compiling import progress_text
+from live.setup.devices import _open_cropped, at_rest, open_rig
+from live.setup.dry_run import _image, picture_kinds
+from live.setup.lens_calibration import _box
+from live.setup.pictures import correction, mask_picture, read_mask, with_mask
+from live.setup.prepared import MeasurePlan, PreparedKernel, _focal_px
+from live.setup.readout import from_lamp, from_motion
+from live.setup.region import FirstLook, Region, _mean_and_noise, _within
+from live.setup.rig_proposal import Proposal
+from live.setup.scale import Board, _bands, _edge, _sides, _tilt, from_points, from_width, specimen_width
+from tests.live.fakes import ListCamera, frame
+from tests.live.made_up import make_field, make_grid
 
 CHECKER = Board(9, 6, 5.0)
 CHARUCO = Board(8, 6, 6.0, 4.5)
@@ -195,3 +230,109 @@ def test_the_scale_of_a_board_is_the_mean_of_its_two_directions(monkeypatch: pyt
     assert from_board(np.zeros((9, 9)), CHECKER, sigma_mm=4.0).relative == pytest.approx(
         math.hypot(0.2 / math.sqrt(12), 4.0 / 40.0)
     )
+
+
+def test_a_scale_from_points_needs_a_distance_and_a_length() -> None:
+    assert from_points((0, 0, 1.01, 0), 1.0).mm_per_px == pytest.approx(1 / 1.01)
+    for points, length in (((0, 0, 1.0, 0), 1.0), ((0, 0, 9, 0), 0.0), ((0, 0, 9, 0), math.inf)):
+        with pytest.raises(ConfigError, match="more than 1 px apart and a length above 0 mm"):
+            from_points(points, length)
+    found = from_points((0, 0, 30, 40), 25.0)
+    assert found.method == "two points 50.0 px apart, 25 mm" and found.relative == pytest.approx(
+        math.sqrt(2) / 50
+    )
+    assert found.changes(400.0)["scale.stand_off_mm"] == 400.0 and "scale.stand_off_mm" not in found.changes()
+    assert found.changes()["scale.mm_per_px"] == 0.5 and found.changes()["scale.sigma_mm_per_px"] == 0.014
+
+
+def test_without_a_visible_edge_the_width_is_that_of_the_mask_and_less_certain() -> None:
+    mask = np.zeros((300, 400), bool)
+    mask[20:280, 100:301] = True
+    even = np.random.default_rng(0).normal(100, 20, (300, 400))
+    region = Region((0, 0, 400, 300), mask, "", True)
+    for axis, picture, one in (("y", even, mask), ("x", even.T, mask.T)):
+        scale = from_width(picture, replace(region, mask=one), axis, 20.1)
+        assert scale.mm_per_px == pytest.approx(0.1)
+        assert scale.relative == pytest.approx(math.sqrt(2) * 6 / 201)
+        assert scale.remarks == ("the edges are known to some px only: two points or a board are better",)
+    wide = replace(region, mask=np.ones((300, 400), bool))
+    with pytest.raises(DataError, match="the edges of the specimen leave the picture"):
+        from_width(even, wide, "y", 20.0)
+    with pytest.raises(DataError, match="the edges of the specimen are not visible"):
+        from_width(even, replace(region, found=False), "y", 20.0)
+
+
+def test_the_scatter_of_the_bands_and_the_edges_make_the_uncertainty_of_a_width(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    mask = np.zeros((400, 300), bool)
+    mask[:, 50:150] = True
+    for found, known in (([100.0, 102.0, None, 106.0], True), ([100.0, None, None, None], False)):
+        widths = iter(found)
+        monkeypatch.setattr(scale_module, "_band_width", lambda grey, mask, widths=widths: next(widths))
+        px, sigma = specimen_width(np.zeros((400, 300)), Region(None, mask, "", True), "y")
+        spread = 1.25 * math.sqrt((2.667**2 + 0.667**2 + 3.333**2) / 3) / math.sqrt(3)
+        expected = (102.0, math.hypot(spread, math.sqrt(2))) if known else (100.0, math.sqrt(2) * 6)
+        assert (px, sigma) == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("first", "stop", "sides"), [(1, 299, (1.0, 299.0)), (0, 299, None), (1, 300, None), (9, 9, None)]
+)
+def test_a_mask_that_reaches_the_edge_of_the_picture_has_no_sides(
+    first: int, stop: int, sides: tuple[float, float] | None
+) -> None:
+    mask = np.zeros((10, 300), bool)
+    mask[:6, first:stop] = True
+    assert _sides(mask) == sides
+    mask[5] = False
+    assert _sides(mask) is None, "of half of the rows it is no side"
+
+
+def test_the_width_is_looked_for_in_the_middle_half_by_bands() -> None:
+    def bands(first: int, last: int) -> list[tuple[int, int]]:
+        mask = np.zeros((500, 10), bool)
+        mask[first:last] = True
+        return [(band.start, band.stop) for band in _bands(mask)]
+
+    assert bands(100, 300) == [(150, 198), (198, 246)]
+    assert bands(100, 140) == [(110, 130)]
+    assert bands(100, 110) == [(102, 114)]
+
+
+def test_an_edge_is_where_the_scatter_falls_to_the_middle() -> None:
+    scatter = np.full(200, 1.0, np.float32)
+    scatter[:101] = 21.0
+    scatter[101] = 16.0
+    assert _edge(scatter, 100, 21.0) == pytest.approx(101.5 + 5 / 15)
+    scatter[123] = 21.0
+    assert _edge(scatter, 100, 21.0) is None, "it falls no more where the search ends"
+    assert _edge(scatter, 100, 2.0) is None, "the background scatters as much"
+    assert _edge(scatter, 100, math.nan) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "uneven", "told"), [(0.005, 0.005, False), (0.0051, 0.0, True), (0.0, 0.0051, True)]
+)
+def test_a_tilt_is_told_from_half_a_percent_on(change: float, uneven: float, told: bool) -> None:
+    assert len(list(_tilt(change, uneven, 50.0, None))) == told
+
+
+def test_the_tilt_in_degrees_is_from_the_distance_or_from_the_shortening() -> None:
+    (words,) = _tilt(0.025, 0.0152, 50.0, 400.0)  # sin of 11.5 degrees is 0.2
+    assert "about 12 degrees: the scale changes by 2.5% over it and by 1.5% between its directions" in words
+    (words,) = _tilt(0.025, 0.0152, 50.0, None)  # cos of 10 degrees is 0.9848
+    assert "about 10 degrees" in words
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows", "square", "marker", "good"),
+    [(3, 60, 0.1, 0.0, True), (2, 60, 1, 0, False), (3, 61, 1, 0, False), (3, 3, 0, 0, False),
+     (3, 3, 1, 1, False), (3, 3, 1, 0.9, True), (3, 3, 1, -0.1, False)],
+)  # fmt: skip
+def test_the_limits_of_a_board(columns: int, rows: int, square: float, marker: float, good: bool) -> None:
+    if good:
+        assert Board(columns, rows, square, marker).dictionary == "4X4_50"
+    else:
+        with pytest.raises(ConfigError, match=r"a board has 3 to 60|smaller than its squares"):
+            Board(columns, rows, square, marker)

@@ -19,6 +19,24 @@ from live.replay.batch.worker_processes import Pool, WorkerProcess, WorkerProces
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.replay.batch.running import is_gone
 from tests.live.ui.waiting import LONG_S
+import io
+import json
+import queue
+import socket
+import sys
+from concurrent.futures import CancelledError
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+import pytest
+from acquire.errors import ConfigError, DataError
+from live.pipeline.screen import Screen
+from live.replay.batch import cluster, worker
+from live.replay.batch.cluster import Cluster, advice, check, check_scheduler
+from live.replay.batch.keys import deciding_versions
+from live.replay.batch.row import BatchRow
+from live.replay.batch.task import ROW_FILE, Task, TaskProgress
+from live.replay.batch.worker import NEEDED, ONE_THREAD, describe_worker
 
 
 class Counted(WorkerProcesses):
@@ -162,3 +180,63 @@ def test_the_longest_first(tmp_path: Path) -> None:
     tasks = [Task(source.parent.name, "", str(source)) for source in sources]
     tasks.insert(0, Task("pictures", "", f"files:{tmp_path / 'pictures'}/*.tif"))
     assert [task.name for task in longest_first(tasks)] == ["cut", "long", "short", "pictures", "gone"]
+
+
+def test_a_worker_describes_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in NEEDED:
+        monkeypatch.setenv(name, "1")
+    monkeypatch.delenv(NEEDED[0])
+    of_dask = SimpleNamespace(state=SimpleNamespace(nthreads=3))
+    found = describe_worker(str(tmp_path / "none"), of_dask)
+    assert (found["slots"], found["has_token"]) == (3, False)
+    assert list(found["threads"].values()) == ["", "1", "1"]
+    (tmp_path / "token").touch()
+    assert describe_worker(str(tmp_path / "token"))["slots"] == 1
+    assert describe_worker(str(tmp_path / "token"))["has_token"]
+    assert NEEDED == ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS") and len(ONE_THREAD) == 5
+
+
+def test_a_worker_of_this_machine_answers_in_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = io.StringIO()
+    worker._put_progress(answers, TaskProgress(3, None, 30))
+    worker._put(answers, {"row": {"test": "a"}})
+    assert [json.loads(line) for line in answers.getvalue().splitlines()] == [
+        {"progress": {"done": 3, "expected": None, "zois": 30}}, {"row": {"test": "a"}},
+    ]  # fmt: skip
+    ended: list[tuple[int, int]] = []
+    monkeypatch.setattr(sys, "stdin", io.StringIO("one\ntwo\n"))
+    monkeypatch.setattr(
+        worker, "os", SimpleNamespace(kill=lambda *given: ended.append(given), getpid=lambda: 7)
+    )
+    tasks: queue.Queue[str] = queue.Queue()
+    worker._listen(tasks)
+    assert [tasks.get_nowait(), tasks.get_nowait()] == ["one\n", "two\n"] and ended == [(7, 15)]
+
+
+def test_a_worker_of_a_cluster_reports_its_progress_every_two_seconds(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    sent: list[Any] = []
+    now = [100.0]
+    me = SimpleNamespace(
+        loop=SimpleNamespace(add_callback=lambda call, *given: sent.append(given)), log_event=None
+    )
+    monkeypatch.setitem(sys.modules, "distributed", SimpleNamespace(get_worker=lambda: me))
+    monkeypatch.setattr(worker, "time", SimpleNamespace(monotonic=lambda: now[0]))
+
+    def perform(task: Task, on_progress: Any) -> BatchRow:
+        assert Path.cwd() == tmp_path
+        for k in range(6):
+            now[0] = 100.0 + k
+            on_progress(TaskProgress(k, 9, 10 * k))
+        me.loop = None
+        now[0] = 200.0
+        on_progress(TaskProgress(8, 9, 80))
+        return BatchRow.of({"test": task.name, "exit_code": 0})
+
+    monkeypatch.setattr(worker, "perform", perform)
+    before = Path.cwd()
+    line = Task("0001", str(tmp_path), "a.h5", of="a").to_json()
+    found = worker.perform_on_worker(line, str(tmp_path), "topic")
+    assert found["test"] == "0001" and Path.cwd() == before
+    assert sent == [("topic", ["a#0001", k, 9, 10 * k]) for k in (0, 2, 4)]
