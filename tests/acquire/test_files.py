@@ -1,3 +1,5 @@
+"""Picture files that are damaged, odd or large, and the folder of a run."""
+
 from __future__ import annotations
 
 import os

@@ -1,3 +1,5 @@
+"""Pictures of a folder, a pattern or a TIFF as a camera."""
+
 from __future__ import annotations
 
 import struct

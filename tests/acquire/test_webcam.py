@@ -1,3 +1,5 @@
+"""Webcams and videos by OpenCV: times, settings, losses, and the end."""
+
 from __future__ import annotations
 
 import queue

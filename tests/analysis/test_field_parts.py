@@ -1,4 +1,4 @@
-"""Grids, covariances and parts of fields by value: what is covered, stretched, missing, and left of a whole."""
+"""Grids, covariances and parts of fields by value."""
 
 from __future__ import annotations
 

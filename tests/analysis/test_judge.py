@@ -1,4 +1,4 @@
-"""A verdict by value: slow fits, nothing to fit, noise in place of a pattern, noise that nobody gave; patterns."""
+"""A verdict by value: slow fits, nothing to fit, noise, and patterns."""
 
 from __future__ import annotations
 

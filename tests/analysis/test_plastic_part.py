@@ -1,4 +1,4 @@
-"""r, n, and rates by value on loadings without noise: which part of a curve they are of, and their intervals."""
+"""r, n and rates by value, on loadings without noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What of plates is rigid, and what each model of their motion leaves in the strain of the specimen, by value."""
+"""What of plates is rigid, and what each model of their motion leaves."""
 
 from __future__ import annotations
 

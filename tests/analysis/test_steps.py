@@ -1,4 +1,4 @@
-"""Steps by value: of whole pixels uphill, of the prediction for the next frame, and when the iteration ends."""
+"""Steps by value: uphill, predicted for the next frame, and the end of the iteration."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Strengths and extensions by value, on loadings whose noise is given: what counts as a yield point, and intervals."""
+"""Strengths and extensions by value, on loadings whose noise is given."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The entry point without a command: exit codes of what is raised, streams that are closed, and messages."""
+"""The entry point without a command: exit codes, closed streams, messages."""
 
 from __future__ import annotations
 

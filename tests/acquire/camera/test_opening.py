@@ -1,4 +1,4 @@
-"""What is shared by cameras: addresses without a scheme, guards against hidden faults, parts of a picture, lists."""
+"""What cameras share: addresses without a scheme, guards, parts of a picture, lists."""
 
 from __future__ import annotations
 

@@ -1,21 +1,16 @@
 """Settings of a made-up GenICam camera: bounds, triggers, packets, and regions."""
 
 from __future__ import annotations
-import threading
+
 from typing import Any
-import numpy as np
+
 import pytest
+
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError, DeviceError
-from acquire.genicam import device as device_module
-from acquire.genicam import listing
-from acquire.genicam.device import STATUS, GenicamDevice
-from acquire.genicam.finding import FoundCamera
-from acquire.genicam.library import GenicamError
 from acquire.genicam.settings import GenicamSettings, genicam_settings
 from tests.acquire.genicam.test_setup import MadeUpCamera, asked, made
 from tests.acquire.genicam.test_without_a_camera import named
-
 
 ALLOWED = {
     "x": "a whole number from 0",

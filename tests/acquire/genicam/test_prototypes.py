@@ -1,4 +1,4 @@
-"""The functions of Aravis 0.8 as its header declares them: a wrong width of a number reads as another one."""
+"""The functions of Aravis are declared as its header has them."""
 
 from __future__ import annotations
 

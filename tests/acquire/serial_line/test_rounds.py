@@ -1,4 +1,4 @@
-"""Rounds of a serial cell by value: polls, times of samples, tares in time, floods, and what is told at the end."""
+"""Rounds of a serial cell by value: polls, times, tares, floods, and the end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ports as bytes: limits of a read, and the conversation with a terminal server by RFC 854 and RFC 2217."""
+"""Ports as bytes: limits of a read, and terminal servers by RFC 854 and 2217."""
 
 from __future__ import annotations
 

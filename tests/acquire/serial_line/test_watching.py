@@ -1,4 +1,4 @@
-"""What a link and its watches do in time: when a port is tried again, and when silence and floods are told."""
+"""When a port is tried again, and when silence and floods are told."""
 
 from __future__ import annotations
 

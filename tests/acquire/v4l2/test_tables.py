@@ -1,4 +1,4 @@
-"""What V4L2 says in numbers: formats, controls and their units, settings and their bounds, faults in words."""
+"""What V4L2 says in numbers: formats, controls, settings, and faults in words."""
 
 from __future__ import annotations
 

@@ -6,20 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.quality.plates import find_plates
-from analysis.quality.specimen import find_specimen
+from analysis.field import Roi
+from analysis.quality.plates import _beside, _is_plate, find_plates
+from analysis.quality.specimen import Specimen, find_specimen
 from hw_mocks.scene import Scene
 from hw_mocks.specimen import VirtualSpecimen
-import math
-import numpy as np
-import pytest
-from scipy.ndimage import gaussian_filter
-from analysis.field import Roi, ZoiGrid
-from analysis.picture.pattern import autocorrelation_fwhm, describe_pattern, predicted_sigma
-from analysis.quality.pattern import _half_width, zoi_pattern
-from analysis.quality.plates import _beside, _is_plate
-from analysis.quality.specimen import Specimen, find_specimen
-from analysis.quality.steadiness import Steadiness, mains_of, steadiness
 
 SPECIMEN, LEFT, RIGHT = (240, 20, 160, 440), (50, 110, 110, 260), (480, 110, 110, 260)
 WALL, NOISE = 60.0, 1.0

@@ -2,35 +2,24 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import pytest
-
-from acquire.errors import Interrupted
-from analysis import PICTURE_KINDS
-from live.cli import main
-from live.commands import demo
 import argparse
 import math
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+
 import numpy as np
 import pytest
-from acquire.clock import ClockPair
-from acquire.errors import ConfigError
+
+from acquire.errors import Interrupted
 from acquire.load_sample import LoadSample
-from acquire.serial_line.ports import LineSettings
-from analysis import Roi, ZoiGrid
-from live.commands import consumers, demo
-from live.commands.consumers import OUTPUT_NAME, signals_of
+from analysis import PICTURE_KINDS, Roi, ZoiGrid
+from live.cli import main
+from live.commands import demo
 from live.commands.demo import MeansCollector, ZoiTruth, middle_of
-from live.config.loading import Config, load_config
+from live.config.loading import load_config
 from live.pipeline.run_state import RunState
-from live.pipeline.screen import Screen
-from live.results.sides.channels import JointChannels
-from tests.live.made_run import UTC_START
-from tests.live.made_up import CAMERA, START, make_grid, make_measurement
+from tests.live.made_up import START, make_grid, make_measurement
 
 SHORT = ["--seconds", "2", "--fps", "10", "--reference-burst", "2", "--burst", "2", "--step", "64"]
 

@@ -1,11 +1,9 @@
-"""Commands by value: terminal and environment, ports and readings, scales, studies, and both sides."""
+"""Readings by value: ports, devices, calibrations, scales, studies, and both sides."""
 
 from __future__ import annotations
 
 import argparse
-import io
 import math
-import threading
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,19 +15,14 @@ import pytest
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag, LoadSample
 from analysis.evaluate import TwoSides
-from live.cli import main
-from live.commands import devices, environment, identify, recover, streams
-from live.commands.batch import _chunk_s
+from live.commands import devices, identify
 from live.commands.init import _stable
 from live.commands.load_calibrate import _raw, _unfit
 from live.commands.map import _warn_of_motion
-from live.commands.options import add_options
 from live.commands.scale import _check as check_scale
 from live.commands.scale import _print_false_strain
 from live.commands.sides import _strains as side_lines
-from live.commands.streams import NonBlockingStream
 from live.commands.study import _curve, _figures, _section
-from live.config.loading import load_config
 from live.pipeline.screen import Screen
 from live.replay.study import StudySetting
 from live.results.run_folder import open_run
@@ -44,87 +37,6 @@ class Said(Screen):
 
     def print(self, text: str = "") -> None:
         self.lines.append(text)
-
-
-# -- terminal and machine -------------------------------------------------------------------------
-
-
-class Slow(io.StringIO):
-    """A terminal that is stopped until it is let go."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.began, self.go = threading.Event(), threading.Event()
-
-    def write(self, text: str) -> int:
-        self.began.set()
-        self.go.wait()
-        return super().write(text)
-
-    def fileno(self) -> int:
-        raise OSError
-
-
-def test_a_stopped_terminal_loses_writes_and_says_how_many() -> None:
-    slow = Slow()
-    stream = NonBlockingStream(slow, 3)
-    stream.write("first")
-    assert slow.began.wait(10)
-    for k in range(5):
-        assert stream.write(str(k)) == 1
-    assert not stream.drain(0.001) and not stream.isatty()
-    slow.go.set()
-    assert stream.drain(10)
-    stream.write("last")
-    assert stream.drain(10) and slow.getvalue() == "first012(2 writes left out: nobody read them)\nlast"
-    with pytest.raises(OSError):
-        stream.fileno()
-
-
-def test_streams_are_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    out = io.StringIO()
-    monkeypatch.setattr(streams.sys, "stdout", out)
-    with streams.nonblocking_streams():
-        print("a line")
-        assert streams.sys.stdout is not out
-    assert streams.sys.stdout is out and out.getvalue() == "a line\n"
-
-
-@pytest.mark.parametrize(("name", "value", "well"), [
-    ("NUMBA_NUM_THREADS", "1", True), ("NUMBA_NUM_THREADS", "0", False), ("NUMBA_NUM_THREADS", "2.5", False),
-    ("SOURCE_DATE_EPOCH", "0", True), ("SOURCE_DATE_EPOCH", "-1", False), ("NUMBA_NUM_THREADS", "²", False),
-])  # fmt: skip
-def test_whole_numbers_of_the_environment(
-    monkeypatch: pytest.MonkeyPatch, name: str, value: str, well: bool
-) -> None:
-    monkeypatch.setenv(name, value)
-    if well:
-        environment.check_environment()
-    else:
-        with pytest.raises(ConfigError, match=f"{name}=.* is not possible; give a whole number from"):
-            environment.check_environment()
-
-
-def test_a_threading_layer_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails() -> str:
-        raise ValueError("No threading layer could be loaded.\nmore")
-
-    monkeypatch.setattr("analysis.threading_library", fails)
-    monkeypatch.setenv("NUMBA_THREADING_LAYER", "tbb")
-    with pytest.raises(
-        ConfigError,
-        match=r"NUMBA_THREADING_LAYER=tbb is not possible \(No threading layer could be loaded\); ",
-    ):
-        environment.check_environment()
-
-
-def test_one_thread_of_openblas_unless_the_user_says_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
-    environment.limit_threads()
-    assert environment.os.environ["OPENBLAS_NUM_THREADS"] == "1"
-    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
-    environment.limit_threads()
-    assert environment.os.environ["OPENBLAS_NUM_THREADS"] == "3"
 
 
 def test_a_port_is_asked_question_after_question(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -146,18 +58,6 @@ def test_a_port_is_asked_question_after_question(monkeypatch: pytest.MonkeyPatch
     assert identify._ask_all("/dev/x", said.append) == 6 and said[-1].startswith("no answer; check cable")
 
 
-@pytest.mark.parametrize(("unreadable", "code"), [(0, 0), (3, 5), (12, 5)])
-def test_ten_losses_of_a_recovery_are_named(
-    monkeypatch: pytest.MonkeyPatch, unreadable: int, code: int
-) -> None:
-    sentences = [f"loss {k}" for k in range(unreadable)]
-    done = SimpleNamespace(unreadable=sentences, line=lambda: "12 frames")
-    monkeypatch.setattr("acquire.session.recover", lambda session, out: done)
-    said: list[str] = []
-    assert recover.command(argparse.Namespace(session="a.h5", out=None), said.append) == code
-    assert said == ["12 frames", *(f"  {one}" for one in sentences[:10])]
-
-
 def test_the_devices_are_listed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     camera = SimpleNamespace(text=lambda: "a camera\n  its format")
     for cameras, ports, heads in (([camera], [SimpleNamespace(text=lambda: "a port")], ("cameras:", "serial ports:")),
@@ -171,9 +71,6 @@ def test_the_devices_are_listed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
         assert lines[-1] == "threads that measure: 7" and ("  its format" in lines) == (
             "a port" in lines
         ) == bool(cameras)
-
-
-# -- readings, scales, studies --------------------------------------------------------------------
 
 
 def test_readings_that_give_no_point_of_a_calibration() -> None:
@@ -254,55 +151,3 @@ def test_a_map_over_a_later_picture_is_misplaced_by_the_motion(
         assert capsys.readouterr().out == ""
         _warn_of_motion(run.strain, 2)
     assert "moved by up to 8 px" in capsys.readouterr().out
-
-
-def test_the_help_names_the_defaults_there_are() -> None:
-    parser = argparse.ArgumentParser()
-    add_options(parser, "group", "zoi", "mask", "no-view", "order")
-    helps = {action.dest: str(action.help) for action in parser._actions}
-    defaults = load_config(None, {}).measure
-    assert helps["measure.zoi"].endswith(f"(default {defaults.zoi})")
-    assert helps["measure.order"].endswith(f"(default {defaults.order})")
-    assert "default" not in helps["measure.mask"] and helps["view.enabled"].startswith("do not ")
-    found = parser.parse_args(["--zoi", "40", "--no-view"])
-    assert getattr(found, "measure.zoi") == 40 and getattr(found, "view.enabled") is False
-    assert getattr(found, "measure.mask") is None
-
-
-def test_the_short_help_has_all_options_but_those_for_experts(capsys: pytest.CaptureFixture[str]) -> None:
-    shown = {}
-    for option in ("--help", "--help-all"):
-        with pytest.raises(SystemExit) as ended:
-            main(["replay", option])
-        assert ended.value.code == 0
-        shown[option] = capsys.readouterr().out
-    for words in (
-        "--zoi PX",
-        "--out DIR",
-        "width,thickness of the section in mm",
-        "metadata, stored in every file",
-    ):
-        assert words in shown["--help"] and words in shown["--help-all"], words
-    assert "--bending" in shown["--help-all"] and "--bending" not in shown["--help"]
-
-
-@pytest.mark.parametrize(
-    ("chunk", "as_measured", "words"),
-    [
-        (None, False, ""),
-        (None, True, ""),
-        (0.5, False, ""),
-        (0.5, True, "--as-measured is bit-identical"),
-        (0.0, False, "seconds above 0"),
-        (-1.0, False, "seconds above 0"),
-        (math.inf, False, "seconds above 0"),
-        (math.nan, False, "seconds above 0"),
-    ],
-)
-def test_chunks_of_a_batch(chunk: float | None, as_measured: bool, words: str) -> None:
-    arguments = argparse.Namespace(chunk_s=chunk, as_measured=as_measured)
-    if words:
-        with pytest.raises(ConfigError, match=words):
-            _chunk_s(arguments)
-    else:
-        assert _chunk_s(arguments) == chunk

@@ -1,4 +1,4 @@
-"""The corrections in their order, the plates when one is lost or loaded, and the path of a burst to its measurement."""
+"""The corrections in their order, lost plates, and the path of a burst."""
 
 from __future__ import annotations
 

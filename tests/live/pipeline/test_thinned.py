@@ -7,37 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from live.pipeline.queues import Thinned
-import math
-from dataclasses import replace
-from typing import Any
-import numpy as np
-import pytest
-from acquire.events import Event, EventKind
-from acquire.load_cell.load_log import LoadLog
-from acquire.load_sample import LoadSample
-from analysis import Roi, Status, StrainField, ZoiGrid
-from analysis.evaluate import GaugeValue
-from analysis.field.picture_error import PictureError
-from live.pipeline import columns
-from live.pipeline.columns import BlockFile, NumberColumn, TextColumn
-from live.pipeline.event_log import EventLog, sentence
-from live.pipeline.guards import (
-    BlurGuard,
-    DilatationGuard,
-    PictureGuard,
-    StrainGuard,
-    TiltGuard,
-    _usual_sigma,
-    picture_words,
-)
-from live.pipeline.history import History
-from live.pipeline.measure import Tracker, _share
-from live.pipeline.measurement import AXIAL, TRANSVERSE, extension_along, strains_along, time_step_of
-from live.pipeline.queues import Thinned
-from live.pipeline.reference import averaged, motion_between, repetition_text
-from live.pipeline.run_state import ActiveAlarms, FrameCounts, Health
-from live.pipeline.snapshot import Snapshot, peak_force
-from tests.live.made_up import START, make_field, make_grid, make_measurement
 
 
 @given(size=st.integers(2, 30), count=st.integers(0, 500))

@@ -1,4 +1,4 @@
-"""Painted maps by value: where cells, ticks, bar and legend lie, filters, and the limits of a request."""
+"""Painted maps by value: cells, ticks, bar, legend, filters, and limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two cameras put together: the mean curve, the table, the report, the channels and the clocks, by value."""
+"""Two cameras put together: curve, table, report, channels and clocks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""strain.h5 by value: attributes, units and links; rows in each measure; what the reader gives, and refuses."""
+"""strain.h5 by value: attributes, units, links, rows, and what is refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The measuring thread without a thread: which reference is used, what is told of it, and the period of the bursts."""
+"""The measuring thread without a thread: its reference, its words, its period."""
 
 from __future__ import annotations
 
@@ -17,37 +17,6 @@ from live.pipeline.run_state import RunState
 from live.run import measuring
 from live.run.measuring import MeasureThread, ReferenceSelector, SmearGuard, _measured
 from tests.live.made_up import START, make_measurement
-import io
-import math
-import threading
-from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
-import pytest
-from acquire.burst import SumAccumulator, SummedBurst
-from acquire.clock import ClockPair
-from acquire.events import Event, EventKind
-from acquire.frame import Burst
-from live.config.sections import AlarmConfig
-from live.pipeline.event_log import EventLog
-from live.pipeline.measure import NewReference
-from live.pipeline.queues import LatestQueue
-from live.pipeline.reference import ReferenceBurst, ReferenceTaker
-from live.pipeline.run_state import ActiveAlarms, FrameCounts, RunState
-from live.run import measuring, prepared_run
-from live.run.alarms import Alarm, AlarmWatch, in_words
-from live.run.burst_queue import TAKING, BurstQueue
-from live.run.control import ENDED
-from live.run.grabber import Grabber, GrabPlan
-from live.run.keyboard import HELP, LINES_HELP, Keyboard
-from live.run.measuring import MeasureThread
-from live.run.prepared_run import PreparedRun, _time_zero
-from live.run.tcp_lines import LineServer
-from tests.live.fakes import ListCamera, frame
-from tests.live.made_up import START, make_measurement
-from tests.live.run.test_both_runs import OneRun, both
-from tests.live.run.test_control import FakeLive
-from tests.live.ui.waiting import LONG_S
 
 N = 8  # frames of a reference
 

@@ -6,58 +6,15 @@ import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from acquire.errors import ConfigError
 from live.config.listen_address import ListenAddress, read_token
-from live.run.tcp_lines import LineServer
-import io
-import math
-import threading
-from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
-import pytest
-from acquire.burst import SumAccumulator, SummedBurst
-from acquire.clock import ClockPair
-from acquire.events import Event, EventKind
-from acquire.frame import Burst
-from live.config.sections import AlarmConfig
-from live.pipeline.event_log import EventLog
-from live.pipeline.measure import NewReference
-from live.pipeline.queues import LatestQueue
-from live.pipeline.reference import ReferenceBurst, ReferenceTaker
-from live.pipeline.run_state import ActiveAlarms, FrameCounts, RunState
-from live.run import measuring, prepared_run
-from live.run.alarms import Alarm, AlarmWatch, in_words
-from live.run.burst_queue import TAKING, BurstQueue
-from live.run.control import ENDED
-from live.run.grabber import Grabber, GrabPlan
-from live.run.keyboard import HELP, LINES_HELP, Keyboard
-from live.run.measuring import MeasureThread
-from live.run.prepared_run import PreparedRun, _time_zero
-from live.run.tcp_lines import LineServer
-from tests.live.fakes import ListCamera, frame
-from tests.live.made_up import START, make_measurement
-from tests.live.run.test_both_runs import OneRun, both
-from tests.live.run.test_control import FakeLive
-from tests.live.ui.waiting import LONG_S
-import math
-import socket
-from types import SimpleNamespace
-from typing import Any
-import pytest
-from acquire.events import Event, EventKind
-from live.config.listen_address import ListenAddress
-from live.run import strain_output, tcp_lines
-from live.run.control import QUEUED, TareControl, answer
-from live.run.strain_output import LineFormat, SerialOut, TcpOut, UdpOut, _number, _rounded
-from live.run.tcp_lines import MAX_LINE_BYTES, Client
-from tests.live.made_up import make_measurement
-from tests.live.run.test_control import FakeCell, FakeLive, TareSetup
-from tests.live.run.test_keyboard import Typed
-from tests.live.run.test_strain_output import readings
+from live.run import tcp_lines
+from live.run.tcp_lines import MAX_LINE_BYTES, Client, LineServer
 from tests.live.run.test_tokens import connected
 
 WORD = "a-long-and-secret-word"

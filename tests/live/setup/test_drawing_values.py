@@ -1,4 +1,4 @@
-"""The drawing of a set-up and the radius of a check: what is dark, where marks stand, what is looked at."""
+"""The drawing of a set-up and the radius of a check."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A lens from corners of boards that are made up: what is left, its terms, and what of the picture was calibrated."""
+"""A lens from corners of made-up boards, and the part that was calibrated."""
 
 from __future__ import annotations
 
@@ -10,44 +10,12 @@ import pytest
 
 from acquire.errors import DataError
 from live.setup import lens_calibration as module
-from live.setup.lens_calibration import from_boards, lens_of_corners
-from live.setup.scale import Board, Corners
+from live.setup.lens_calibration import _box, from_boards, lens_of_corners
+from live.setup.scale import (
+    Board,
+    Corners,
+)
 from tests.live.test_lens import FOCAL, MIDDLE, TRUE, VIEWS
-import math
-from dataclasses import replace
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
-import cv2
-import numpy as np
-import pytest
-from acquire.errors import ConfigError, DataError, DeviceError
-from acquire.frame import CameraInfo
-from acquire.load_cell.zeroed import ZeroedLoadCell
-from analysis import Roi, StrainField, ZoiGrid
-from analysis.optics import Readout
-from live.config.loading import load_config
-from live.setup import devices as devices_module
-from live.setup import prepared as prepared_module
-from live.setup import readout as readout_module
-from live.setup import scale as scale_module
-from live.setup.check.check_list import median
-from live.setup.check.noise_floor import BURSTS, ORDERS, SIZES, StrainNoise, ZoiFloor, _filled, _share
-from live.setup.check.quick_check import QuickCheck, RollingFrames, _same_region
-from live.setup.check.sample import FrameStack, around, moved, temporal_noise
-from live.setup.check.stillness import MAX_ZOIS, covered, middle
-from live.setup.compiling import progress_text
-from live.setup.devices import _open_cropped, at_rest, open_rig
-from live.setup.dry_run import _image, picture_kinds
-from live.setup.lens_calibration import _box
-from live.setup.pictures import correction, mask_picture, read_mask, with_mask
-from live.setup.prepared import MeasurePlan, PreparedKernel, _focal_px
-from live.setup.readout import from_lamp, from_motion
-from live.setup.region import FirstLook, Region, _mean_and_noise, _within
-from live.setup.rig_proposal import Proposal
-from live.setup.scale import Board, _bands, _edge, _sides, _tilt, from_points, from_width, specimen_width
-from tests.live.fakes import ListCamera, frame
-from tests.live.made_up import make_field, make_grid
 
 ROW_COLUMN = np.mgrid[:6, :8].reshape(2, -1).T
 MM = 10.0 * ROW_COLUMN[:, ::-1] - [35.0, 25.0]

@@ -16,55 +16,28 @@ from analysis.field import Blur
 from analysis.quality.steadiness import Steadiness
 from live.config.loading import load_config
 from live.setup.check import noise_floor, sharpness
+from live.setup.check.check_list import median
 from live.setup.check.noise_floor import (
+    BURSTS,
     MAX_ZOIS,
+    ORDERS,
+    SIZES,
+    StrainNoise,
+    ZoiFloor,
     _bursts,
+    _filled,
     _floor,
     _gauges,
     _grid,
     _noise,
     _scatter,
+    _share,
     noise_floors,
     predict_noise,
 )
 from live.setup.check.sharpness import NOT_KNOWN, SharpestPicture
 from live.setup.check.stillness import PictureStillness, light
 from tests.live.made_up import make_grid
-import math
-from dataclasses import replace
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
-import cv2
-import numpy as np
-import pytest
-from acquire.errors import ConfigError, DataError, DeviceError
-from acquire.frame import CameraInfo
-from acquire.load_cell.zeroed import ZeroedLoadCell
-from analysis import Roi, StrainField, ZoiGrid
-from analysis.optics import Readout
-from live.config.loading import load_config
-from live.setup import devices as devices_module
-from live.setup import prepared as prepared_module
-from live.setup import readout as readout_module
-from live.setup import scale as scale_module
-from live.setup.check.check_list import median
-from live.setup.check.noise_floor import BURSTS, ORDERS, SIZES, StrainNoise, ZoiFloor, _filled, _share
-from live.setup.check.quick_check import QuickCheck, RollingFrames, _same_region
-from live.setup.check.sample import FrameStack, around, moved, temporal_noise
-from live.setup.check.stillness import MAX_ZOIS, covered, middle
-from live.setup.compiling import progress_text
-from live.setup.devices import _open_cropped, at_rest, open_rig
-from live.setup.dry_run import _image, picture_kinds
-from live.setup.lens_calibration import _box
-from live.setup.pictures import correction, mask_picture, read_mask, with_mask
-from live.setup.prepared import MeasurePlan, PreparedKernel, _focal_px
-from live.setup.readout import from_lamp, from_motion
-from live.setup.region import FirstLook, Region, _mean_and_noise, _within
-from live.setup.rig_proposal import Proposal
-from live.setup.scale import Board, _bands, _edge, _sides, _tilt, from_points, from_width, specimen_width
-from tests.live.fakes import ListCamera, frame
-from tests.live.made_up import make_field, make_grid
 
 
 class Sample:

@@ -10,6 +10,7 @@ import signal
 import threading
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -17,52 +18,26 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from acquire.errors import DeviceError
 from analysis.field import Blur
 from live.cli import main
 from live.commands import check_watch as check_watch
 from live.commands.check_watch import RenewedLines, blur_line, card, peak_line
 from live.config.loading import load_config
 from live.setup.check.check_list import examine
-from live.setup.check.quick_check import RENEW_EVERY, SEARCH_EVERY, QuickCheck, QuickChecker
+from live.setup.check.quick_check import (
+    RENEW_EVERY,
+    SEARCH_EVERY,
+    QuickCheck,
+    QuickChecker,
+    RollingFrames,
+    _same_region,
+)
 from live.setup.check.sample import take
 from live.setup.check.verdict import CheckLine
 from live.setup.region import Region
 from live.ui.terminal.screen import TerminalScreen
-import math
-from dataclasses import replace
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
-import cv2
-import numpy as np
-import pytest
-from acquire.errors import ConfigError, DataError, DeviceError
-from acquire.frame import CameraInfo
-from acquire.load_cell.zeroed import ZeroedLoadCell
-from analysis import Roi, StrainField, ZoiGrid
-from analysis.optics import Readout
-from live.config.loading import load_config
-from live.setup import devices as devices_module
-from live.setup import prepared as prepared_module
-from live.setup import readout as readout_module
-from live.setup import scale as scale_module
-from live.setup.check.check_list import median
-from live.setup.check.noise_floor import BURSTS, ORDERS, SIZES, StrainNoise, ZoiFloor, _filled, _share
-from live.setup.check.quick_check import QuickCheck, RollingFrames, _same_region
-from live.setup.check.sample import FrameStack, around, moved, temporal_noise
-from live.setup.check.stillness import MAX_ZOIS, covered, middle
-from live.setup.compiling import progress_text
-from live.setup.devices import _open_cropped, at_rest, open_rig
-from live.setup.dry_run import _image, picture_kinds
-from live.setup.lens_calibration import _box
-from live.setup.pictures import correction, mask_picture, read_mask, with_mask
-from live.setup.prepared import MeasurePlan, PreparedKernel, _focal_px
-from live.setup.readout import from_lamp, from_motion
-from live.setup.region import FirstLook, Region, _mean_and_noise, _within
-from live.setup.rig_proposal import Proposal
-from live.setup.scale import Board, _bands, _edge, _sides, _tilt, from_points, from_width, specimen_width
 from tests.live.fakes import ListCamera, frame
-from tests.live.made_up import make_field, make_grid
 
 STILL = "sim:uniform?bits=8&fps=50&width=224&height=192"
 SMALL = ["--zoi", "48", "--reference-burst", "8"]

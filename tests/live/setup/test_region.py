@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,44 +23,9 @@ from live.config.loading import load_config
 from live.results import Strain
 from live.setup.devices import open_rig
 from live.setup.placement import auto_gauges, with_auto_gauges
-from live.setup.region import FirstLook, Region, first_look, located_on, region_of
+from live.setup.region import FirstLook, Region, _mean_and_noise, _within, first_look, located_on, region_of
 from live.setup.rig_proposal import _axis, _size
 from tests.live.made_up import CAMERA, make_field
-import math
-from dataclasses import replace
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
-import cv2
-import numpy as np
-import pytest
-from acquire.errors import ConfigError, DataError, DeviceError
-from acquire.frame import CameraInfo
-from acquire.load_cell.zeroed import ZeroedLoadCell
-from analysis import Roi, StrainField, ZoiGrid
-from analysis.optics import Readout
-from live.config.loading import load_config
-from live.setup import devices as devices_module
-from live.setup import prepared as prepared_module
-from live.setup import readout as readout_module
-from live.setup import scale as scale_module
-from live.setup.check.check_list import median
-from live.setup.check.noise_floor import BURSTS, ORDERS, SIZES, StrainNoise, ZoiFloor, _filled, _share
-from live.setup.check.quick_check import QuickCheck, RollingFrames, _same_region
-from live.setup.check.sample import FrameStack, around, moved, temporal_noise
-from live.setup.check.stillness import MAX_ZOIS, covered, middle
-from live.setup.compiling import progress_text
-from live.setup.devices import _open_cropped, at_rest, open_rig
-from live.setup.dry_run import _image, picture_kinds
-from live.setup.lens_calibration import _box
-from live.setup.pictures import correction, mask_picture, read_mask, with_mask
-from live.setup.prepared import MeasurePlan, PreparedKernel, _focal_px
-from live.setup.readout import from_lamp, from_motion
-from live.setup.region import FirstLook, Region, _mean_and_noise, _within
-from live.setup.rig_proposal import Proposal
-from live.setup.scale import Board, _bands, _edge, _sides, _tilt, from_points, from_width, specimen_width
-from tests.live.fakes import ListCamera, frame
-from tests.live.made_up import make_field, make_grid
 
 SIM = "sim:hole?seconds=2&fps=20&width=320&height=320&hole=40&lockstep=yes"
 QUICK = ["--zoi", "32", "--step", "16", "--no-view", "--no-rrd"]

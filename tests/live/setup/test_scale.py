@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -14,44 +15,22 @@ from acquire.errors import ConfigError, DataError
 from live.cli import main
 from live.config.loading import load_config
 from live.results.run_folder import open_run
-from live.setup.region import Region, region_of
-from live.setup.scale import Board, Corners, false_strain, from_board, from_points, from_width
-from tests.live.made_run import CONFIG, make_run
-import math
-from dataclasses import replace
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
-import cv2
-import numpy as np
-import pytest
-from acquire.errors import ConfigError, DataError, DeviceError
-from acquire.frame import CameraInfo
-from acquire.load_cell.zeroed import ZeroedLoadCell
-from analysis import Roi, StrainField, ZoiGrid
-from analysis.optics import Readout
-from live.config.loading import load_config
-from live.setup import devices as devices_module
-from live.setup import prepared as prepared_module
-from live.setup import readout as readout_module
 from live.setup import scale as scale_module
-from live.setup.check.check_list import median
-from live.setup.check.noise_floor import BURSTS, ORDERS, SIZES, StrainNoise, ZoiFloor, _filled, _share
-from live.setup.check.quick_check import QuickCheck, RollingFrames, _same_region
-from live.setup.check.sample import FrameStack, around, moved, temporal_noise
-from live.setup.check.stillness import MAX_ZOIS, covered, middle
-from live.setup.compiling import progress_text
-from live.setup.devices import _open_cropped, at_rest, open_rig
-from live.setup.dry_run import _image, picture_kinds
-from live.setup.lens_calibration import _box
-from live.setup.pictures import correction, mask_picture, read_mask, with_mask
-from live.setup.prepared import MeasurePlan, PreparedKernel, _focal_px
-from live.setup.readout import from_lamp, from_motion
-from live.setup.region import FirstLook, Region, _mean_and_noise, _within
-from live.setup.rig_proposal import Proposal
-from live.setup.scale import Board, _bands, _edge, _sides, _tilt, from_points, from_width, specimen_width
-from tests.live.fakes import ListCamera, frame
-from tests.live.made_up import make_field, make_grid
+from live.setup.region import Region, region_of
+from live.setup.scale import (
+    Board,
+    Corners,
+    _bands,
+    _edge,
+    _sides,
+    _tilt,
+    false_strain,
+    from_board,
+    from_points,
+    from_width,
+    specimen_width,
+)
+from tests.live.made_run import CONFIG, make_run
 
 CHECKER = Board(9, 6, 5.0)
 CHARUCO = Board(8, 6, 6.0, 4.5)

@@ -1,4 +1,4 @@
-"""A campaign without workers: what is done before, what fails first, what is written, and how it ends."""
+"""A campaign without workers: what is done first, what fails, and its end."""
 
 from __future__ import annotations
 

@@ -1,24 +1,24 @@
 """Tasks on a cluster without Dask: what is submitted, taken, given up and told."""
 
 from __future__ import annotations
-import io
+
 import json
 import queue
 import socket
-import sys
 from concurrent.futures import CancelledError
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
+
 import pytest
+
 from acquire.errors import ConfigError, DataError
 from live.pipeline.screen import Screen
-from live.replay.batch import cluster, worker
+from live.replay.batch import cluster
 from live.replay.batch.cluster import Cluster, advice, check, check_scheduler
 from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow
 from live.replay.batch.task import ROW_FILE, Task, TaskProgress
-from live.replay.batch.worker import NEEDED, ONE_THREAD, describe_worker
+from live.replay.batch.worker import NEEDED
 
 
 class Future:

@@ -1,42 +1,31 @@
-"""Workers load their libraries while the campaign is planned; the order of their tasks."""
+"""Workers: when they load their libraries, their tasks, what they tell."""
 
 from __future__ import annotations
 
+import io
+import json
+import queue
+import sys
 import threading
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from acquire.errors import ConfigError, DataError
 from analysis import PICTURE_KINDS, warm_up
-from live.replay.batch import campaign
+from live.replay.batch import campaign, worker
 from live.replay.batch.campaign import CampaignRequest, run_campaign
 from live.replay.batch.keys import longest_first
 from live.replay.batch.row import BatchRow, failed
-from live.replay.batch.task import Task
+from live.replay.batch.task import Task, TaskProgress
 from live.replay.batch.test_list import find_tests
+from live.replay.batch.worker import NEEDED, ONE_THREAD, describe_worker
 from live.replay.batch.worker_processes import Pool, WorkerProcess, WorkerProcesses
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.replay.batch.running import is_gone
 from tests.live.ui.waiting import LONG_S
-import io
-import json
-import queue
-import socket
-import sys
-from concurrent.futures import CancelledError
-from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
-import pytest
-from acquire.errors import ConfigError, DataError
-from live.pipeline.screen import Screen
-from live.replay.batch import cluster, worker
-from live.replay.batch.cluster import Cluster, advice, check, check_scheduler
-from live.replay.batch.keys import deciding_versions
-from live.replay.batch.row import BatchRow
-from live.replay.batch.task import ROW_FILE, Task, TaskProgress
-from live.replay.batch.worker import NEEDED, ONE_THREAD, describe_worker
 
 
 class Counted(WorkerProcesses):

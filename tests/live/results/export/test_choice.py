@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +18,6 @@ from live.results.run_folder import RunFolder, open_run
 from tests.live.made_run import CONFIG, GAUGES, make_run
 
 SHOWN = Display(mm_per_px=0.05, y_up=True, percent=True)
-
-
-@pytest.fixture
-def run(run_dir: Path) -> Iterator[RunFolder]:
-    with open_run(run_dir) as opened:
-        yield opened
 
 
 @pytest.mark.parametrize(

@@ -1,26 +1,22 @@
 """The curves of a report, by value: force, strains, stress, neck and lag."""
 
 from __future__ import annotations
-import re
-import subprocess
+
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+
 import numpy as np
 import pytest
-from acquire.errors import ConfigError, DataError
+
 from analysis.evaluate import Figure, true_curve
-from live.pipeline.screen import Screen
 from live.results.maps.colours import MICROSTRAIN
-from live.results.report import curves, saving
+from live.results.report import curves
 from live.results.report.curves import load_unit, strain_unit, stress_strain, true_stress_strain
 from live.results.report.evaluation import EvaluatedCurve, lag_of, neck_line, time_steps
-from live.results.report.saving import as_csv, save_figures, save_page, save_pdf, to_pdf, to_png
-from live.results.report.svg import Mark, Plot, PlotLine, draw
 from live.results.run_folder import open_run
 from tests.live.made_run import CONFIG, E_PA, GAUGES, PULLED, force_of, make_run
-
 
 N = len(PULLED)
 

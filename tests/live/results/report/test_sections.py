@@ -1,45 +1,38 @@
 """Sections of a report, by value: rig, gauges, times, events, noise, lens, maps."""
 
 from __future__ import annotations
+
 import base64
 import hashlib
 import html
-import io
 import math
 import re
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+
 import cv2
 import numpy as np
 import pytest
-from acquire.errors import DataError
+
 from acquire.events import Event, EventKind
 from acquire.frame import CameraInfo
 from analysis.evaluate import Figure, NoiseFloor
 from live.pipeline.screen import Screen
 from live.results.maps.colours import diverging_table
 from live.results.maps.scale import ColourScale
-from live.results.report import comparison, record, report
+from live.results.report import record, report
 from live.results.report.evaluation import EvaluatedCurve
 from live.results.report.maps import _bar, map_pictures, maps, statuses
 from live.results.report.noise_floor import still_phase_of
 from live.results.report.practice import PracticeValues, reporting_table
 from live.results.report.record import events, gauges, hashes, times, version_table
-from live.results.report.report import Report, ReportRequest, make_report, tensile
+from live.results.report.report import ReportRequest, make_report, tensile
 from live.results.run_folder import RunFolder, open_run
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
 
-
 N = len(PULLED)
-
-
-@pytest.fixture
-def run(run_dir: Path) -> Iterator[RunFolder]:
-    with open_run(run_dir) as opened:
-        yield opened
 
 
 def plain(text: str) -> str:

@@ -1,4 +1,4 @@
-"""What is sent to the process of the view, when and in which order; and what the view takes of a fast test."""
+"""What is sent to the process of the view, when, and in which order."""
 
 from __future__ import annotations
 

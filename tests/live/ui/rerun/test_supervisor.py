@@ -1,4 +1,4 @@
-"""The supervisor of the view's process by its own clock: when it starts, restarts and gives up, and what it tells."""
+"""When the view's process starts, restarts and is given up."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The stages of the page without a browser: folders, answers, report and pictures; and one test after the other."""
+"""The stages of the page without a browser, and one test after the other."""
 
 from __future__ import annotations
 

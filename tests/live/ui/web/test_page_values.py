@@ -1,34 +1,30 @@
 """What a page shows of a run: figures and their units, maps, lines over the curve."""
 
 from __future__ import annotations
-import json
+
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
 import cv2
 import numpy as np
 import pytest
+
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from analysis import StrainField
 from analysis.evaluate import GaugeValue
-from analysis.field import Status
 from live.config.loading import Config, load_config
 from live.config.sections import SpecimenConfig
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
-from live.ui.web.authorization import HttpError
-from live.ui.web.broadcaster import Broadcaster, plain
-from live.ui.web.curve_history import CurveHistory
+from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.map_view import MapView
 from live.ui.web.page_consumer import PageConsumer
-from live.ui.web.page_consumers import PageConsumers
 from live.ui.web.run_result import peaks, run_result
 from tests.live.made_run import E_PA, PULLED, THICKNESS_MM, WIDTH_MM, YIELD, force_of
 from tests.live.made_up import START, make_frame, make_grid, make_measurement
-
 
 LINE = {"gauges.long": {"kind": "line", "start": [64, 20], "end": [64, 70]}}
 

@@ -1,4 +1,4 @@
-"""What the set-up shows, by value: force and its noise, colours, devices, drafts, the region and its undo."""
+"""What the set-up shows, by value: force, colours, devices, drafts, region."""
 
 from __future__ import annotations
 

@@ -1,0 +1,106 @@
+"""What stands in a session file: groups, columns with units and ranges, long events."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from acquire.errors import DataError
+from acquire.events import Event, EventKind
+from acquire.session import Session, layout
+from acquire.session.layout import event_rows
+from tests.acquire.session.fixtures import frame, sample, writer
+
+
+def test_what_a_whole_session_has_at_its_top(path: Path) -> None:
+    with writer(path) as session:
+        for raw in (b"12.5 N", b"", b"x"):
+            session.write_load(dataclasses.replace(sample(0), raw=raw))
+    with h5py.File(path) as file:
+        assert (file.attrs["format"], file.attrs["format_version"]) == (b"phasedic-session", 1)
+        assert (file.attrs["set_id"], file.attrs["part"]) == (b"none", 0)
+        entry = file["entry"]
+        assert (entry.attrs["record"], entry.attrs["crop"].tolist()) == (b"all", [0, 0, 0, 0])
+        assert entry["start_time"][()] == b"2026-05-09T07:35:25.123456Z"
+        assert entry["load/lines"][:].tobytes() == b"12.5 N\n\nx\n"
+        assert entry["load/line_end"][:].tolist() == [7, 8, 10]
+        assert json.loads(entry["load/flags"].attrs["flag_names"])["STEP"] == 256
+        assert entry["frames/image"].attrs["bits"] == 12
+        assert entry["frames/time_s"].fletcher32 and entry["bursts/sum"].chunks == (1, 12, 16)
+
+
+TIME = ("f8", "s", -1e12, 1e12)
+
+
+COUNT = ("u4", "none", 0, np.inf)
+
+
+INDEX = ("i8", "none", 0, np.inf)
+
+
+CLOCK = ("u1", "none", 0, 2)
+
+
+COLUMNS = {
+    "frames": {
+        "time_s": TIME, "monotonic_s": TIME, "raw_monotonic_s": TIME, "index": INDEX, "lost_before": COUNT,
+        "damaged": ("u1", "none", 0, 1), "clock": CLOCK,
+    },
+    "load": {
+        "time_s": TIME, "monotonic_s": TIME, "force": ("f8", "N", -1e12, 1e12), "flags": ("u4", "none", 0, 511),
+        "stable": ("i1", "none", -1, 1), "device_ms": ("f8", "ms", -np.inf, np.inf),
+        "unit": ("S8", "none", -np.inf, np.inf), "line_end": ("u8", "none", 1, np.inf),
+    },
+    "bursts": {
+        "time_s": TIME, "monotonic_s": TIME, "n": ("u4", "none", 1, 65536), "noise": ("f8", "GL", 0, 65535),
+        "duration": TIME, "first_index": INDEX, "last_index": INDEX, "lost": COUNT, "clock": CLOCK,
+    },
+    "clock": {"monotonic_s": TIME, "utc": ("S27", "none", -np.inf, np.inf)},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("group", COLUMNS)
+def test_columns_their_units_and_ranges(path: Path, group: str) -> None:
+    declared = {
+        "frames": layout.FRAME_COLUMNS,
+        "load": layout.LOAD_COLUMNS,
+        "bursts": layout.BURST_COLUMNS,
+        "clock": layout.CLOCK_COLUMNS,
+    }[group]
+    assert {name: (c.dtype, c.unit, c.low, c.high) for name, c in declared.items()} == COLUMNS[group]
+    writer(path).close()
+    with h5py.File(path) as file:
+        for name, (dtype, unit, _, _) in COLUMNS[group].items():
+            column = file["entry"][group][name]
+            assert (column.dtype, column.attrs["units"]) == (np.dtype(dtype), unit.encode())
+
+
+def test_numbers_that_do_not_increase_are_refused(path: Path) -> None:
+    with writer(path) as session:
+        for index in (5, 6, 6):
+            session.write_frame(frame(0, index=index))
+    with pytest.raises(
+        DataError, match="the sequence numbers of frames do not increase at row 2; the file is"
+    ):
+        Session.open(path)
+
+
+def test_times_that_run_backwards_are_told(path: Path) -> None:
+    with writer(path) as session:
+        for k, t in enumerate((1001.0, 1002.0, 1002.0, 1001.5)):
+            session.write_frame(frame(k, t=t))
+    with Session.open(path) as back:
+        assert back.recovered == f"{path}: the times of frames run backwards at 1 places, first after row 2"
+
+
+def test_a_long_event_goes_on_in_rows_that_begin_with_a_plus() -> None:
+    rows = event_rows(Event(10.0, EventKind.NOTE, "operator", "y" * 1200), 4.0)
+    assert [len(row) for row in rows.tolist()][:2] == [512, 512]
+    assert [row[:1] for row in rows.tolist()] == [b"{", b"+", b"+"]
+    whole = json.loads(b"".join((rows[0], *(row[1:] for row in rows[1:]))))
+    assert (whole["time_s"], whole["monotonic_s"], whole["text"]) == (6.0, 10.0, "y" * 1200)

@@ -1,0 +1,164 @@
+"""Outputs of a test with their channels and alarms, and its view."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from acquire.clock import ClockPair
+from acquire.errors import ConfigError
+from acquire.serial_line.ports import LineSettings
+from live.commands import consumers
+from live.commands.consumers import OUTPUT_NAME, signals_of
+from live.config.loading import Config, load_config
+from live.pipeline.run_state import RunState
+from live.pipeline.screen import Screen
+from live.results.sides.channels import JointChannels
+from tests.live.made_run import UTC_START
+from tests.live.made_up import CAMERA, START, make_grid
+
+LINE = {"gauges.mid": {"kind": "line", "start": [20, 20], "end": [20, 70]}}
+
+
+class Said(Screen):
+    """Keeps the lines."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def print(self, text: str = "") -> None:
+        self.lines.append(text)
+
+
+class Out:
+    """A strain output that only keeps what it was made of."""
+
+    name, ended = "an output", False
+
+    def __init__(self, *made: Any) -> None:
+        self.made = made
+
+    def end(self) -> str:
+        self.ended = True
+        return ""
+
+
+def about(config: Config, **more: Any) -> Any:
+    known = {"config": config, "start": ClockPair(START, UTC_START), "end": lambda reason: None, "camera": CAMERA,
+             "grid": make_grid(), "folder": Path("run")}  # fmt: skip
+    return SimpleNamespace(**{**known, **more})
+
+
+def test_no_outputs_of_a_replay() -> None:
+    config = load_config(None, {"strain_out.udp": "127.0.0.1:5005"})
+    assert signals_of(about(config, end=None), RunState.new(1.0), Said(), None) == []
+
+
+def test_each_output_is_opened_at_its_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("UdpOut", "SerialOut", "TcpOut"):
+        monkeypatch.setattr(consumers, name, Out)
+    monkeypatch.setattr(
+        "live.config.listen_address.ListenAddress.listen", lambda self, name: (name, self.port)
+    )
+    given = {"strain_out.udp": "127.0.0.1:5005", "strain_out.serial": "/dev/ttyUSB1?baud=9600",
+             "strain_out.tcp": "127.0.0.1:5006", **LINE}  # fmt: skip
+    screen = Said()
+    found: list[Any] = list(signals_of(about(load_config(None, given)), RunState.new(1.0), screen, None))
+    tcp, udp, serial = found
+    assert (tcp.made[0], tcp.made[1]) == ((OUTPUT_NAME, 5006), "")
+    assert udp.made[:2] == ("127.0.0.1", 5005)
+    assert serial.made[0] == LineSettings("/dev/ttyUSB1", 9600) and screen.lines == ["an output"] * 3
+    usual = signals_of(
+        about(load_config(None, {"strain_out.serial": "/dev/ttyUSB1"})), RunState.new(1.0), Said(), None
+    )
+    assert usual[0].made[0] == LineSettings("/dev/ttyUSB1", 115200)  # type: ignore[attr-defined]
+
+
+def test_an_output_that_fails_closes_those_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Out] = []
+    monkeypatch.setattr(consumers, "UdpOut", lambda *given: made.append(Out(*given)) or made[-1])  # type: ignore[func-returns-value]
+    given = {"strain_out.udp": "127.0.0.1:5005", "strain_out.serial": "/dev/ttyUSB1?bauds=9600"}
+    with pytest.raises(ConfigError):
+        signals_of(about(load_config(None, given)), RunState.new(1.0), Said(), None)
+    assert [one.ended for one in made] == [True]
+
+
+def test_the_channels_of_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Any] = []
+    monkeypatch.setattr(consumers, "LineFormat", lambda *given: made.append(given))
+    state = RunState.new(1.0)
+    consumers._lines(about(load_config(None, LINE)), state, None)
+    consumers._lines(about(load_config(None, LINE)), state, JointChannels())
+    consumers._lines(about(load_config(None, {"strain_out.channels": ["force_N", "eyy"]})), state, None)
+    plain, joint, chosen = (given[1] for given in made)
+    assert plain == (*consumers.DEFAULT_CHANNELS, "gauge_mid", "sigma_gauge_mid")
+    assert joint[: len(plain)] == plain and {"mean_axial", "bending_gauge_mid"} <= set(joint)
+    assert tuple(chosen) == ("force_N", "eyy")
+
+
+def test_alarms_see_the_machine_and_both_sides(monkeypatch: pytest.MonkeyPatch) -> None:
+    config, state = load_config(None, {"alarm": [{"channel": "axial", "above": 0.01}]}), RunState.new(1.0)
+    machine = lambda self, now: {"disk_min": now, "mean_axial": 0.0}  # noqa: E731
+    monkeypatch.setattr(type(state.health), "channels", machine)
+    made: list[Any] = []
+    monkeypatch.setattr(consumers, "AlarmWatch", lambda *given, **more: made.append((given, more)))
+
+    class Joint(JointChannels):
+        lost = "why"  # type: ignore[assignment]
+
+        def read(self, start: float) -> dict[str, float]:
+            return {"mean_axial": start}
+
+    for joint in (None, Joint()):
+        signals_of(about(config), state, Said(), joint)
+    (alone, nothing), (both, more) = made
+    assert len(alone[0]) == len(both[0]) == 1 and not nothing
+    assert alone[2](5.0) == {"disk_min": 5.0, "mean_axial": 0.0}
+    assert both[2](5.0) == {"disk_min": 5.0, "mean_axial": START} and more["lost"]() == "why"
+    assert both[3:] == alone[3:] == (state.alarms, state.event_log)
+
+
+def test_the_view_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[Any] = []
+    monkeypatch.setattr(consumers, "View", lambda setup, **more: made.append((setup, more)))
+    given = {**LINE, "specimen.area_mm2": 40.0, "specimen.axis": "x", "view.light": True, "view.rrd": True,
+             "load.address": "none:", "view.strain_range": 0.02, "view.scale": "automatic"}  # fmt: skip
+    consumers._view(about(load_config(None, given)), RunState.new(1.0), Said())
+    usual = {"load.address": "sim:", "view.port": 9999, "view.rrd": False}
+    consumers._view(about(load_config(None, usual)), RunState.new(1.0), Said())
+    (light, more), (plain, other) = made
+    assert (light.width, light.height, light.bits, light.start_monotonic) == (128, 96, 12, START)
+    assert (light.area_m2, light.axis, light.strain_range, light.scale) == (
+        pytest.approx(40e-6),
+        "x",
+        0.02,
+        "automatic",
+    )
+    assert (light.picture_hz, light.light, light.with_load) == (1.0, True, False) and set(light.outlines) == {
+        "mid"
+    }
+    assert more["rrd"] == Path("run") / "view.rrd"
+    assert (plain.picture_hz, plain.with_load, plain.axis, plain.scale) == (5.0, True, "y", "symmetric")
+    assert (other["port"], other["rrd"]) == (9999, None)
+
+
+@pytest.mark.parametrize(
+    ("spawn", "opens", "words"),
+    [
+        (True, True, "the viewer opens in its own window"),
+        (True, False, "(no display)"),
+        (False, True, "(view.spawn is off)"),
+    ],
+)
+def test_the_viewer_is_opened_or_how_to_is_told(
+    monkeypatch: pytest.MonkeyPatch, spawn: bool, opens: bool, words: str
+) -> None:
+    monkeypatch.setattr(consumers, "spawn_viewer", lambda port, tell: object() if opens else None)
+    screen = Said()
+    view: Any = SimpleNamespace(port=9876, instructions="watch: a\nlater: b")
+    consumers._announce(view, spawn, screen, lambda text: None)
+    assert words in screen.lines[0]
+    assert screen.lines[1:] == ([] if spawn and opens else ["  watch: a", "  later: b"])

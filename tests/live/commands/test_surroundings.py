@@ -1,0 +1,161 @@
+"""What surrounds a command: streams, environment, help, and what a batch or a recovery is told."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import math
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+from acquire.errors import ConfigError
+from live.cli import main
+from live.commands import environment, recover, streams
+from live.commands.batch import _chunk_s
+from live.commands.options import add_options
+from live.commands.streams import NonBlockingStream
+from live.config.loading import load_config
+
+
+class Slow(io.StringIO):
+    """A terminal that is stopped until it is let go."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.began, self.go = threading.Event(), threading.Event()
+
+    def write(self, text: str) -> int:
+        self.began.set()
+        self.go.wait()
+        return super().write(text)
+
+    def fileno(self) -> int:
+        raise OSError
+
+
+def test_a_stopped_terminal_loses_writes_and_says_how_many() -> None:
+    slow = Slow()
+    stream = NonBlockingStream(slow, 3)
+    stream.write("first")
+    assert slow.began.wait(10)
+    for k in range(5):
+        assert stream.write(str(k)) == 1
+    assert not stream.drain(0.001) and not stream.isatty()
+    slow.go.set()
+    assert stream.drain(10)
+    stream.write("last")
+    assert stream.drain(10) and slow.getvalue() == "first012(2 writes left out: nobody read them)\nlast"
+    with pytest.raises(OSError):
+        stream.fileno()
+
+
+def test_streams_are_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    out = io.StringIO()
+    monkeypatch.setattr(streams.sys, "stdout", out)
+    with streams.nonblocking_streams():
+        print("a line")
+        assert streams.sys.stdout is not out
+    assert streams.sys.stdout is out and out.getvalue() == "a line\n"
+
+
+@pytest.mark.parametrize(("name", "value", "well"), [
+    ("NUMBA_NUM_THREADS", "1", True), ("NUMBA_NUM_THREADS", "0", False), ("NUMBA_NUM_THREADS", "2.5", False),
+    ("SOURCE_DATE_EPOCH", "0", True), ("SOURCE_DATE_EPOCH", "-1", False), ("NUMBA_NUM_THREADS", "²", False),
+])  # fmt: skip
+def test_whole_numbers_of_the_environment(
+    monkeypatch: pytest.MonkeyPatch, name: str, value: str, well: bool
+) -> None:
+    monkeypatch.setenv(name, value)
+    if well:
+        environment.check_environment()
+    else:
+        with pytest.raises(ConfigError, match=f"{name}=.* is not possible; give a whole number from"):
+            environment.check_environment()
+
+
+def test_a_threading_layer_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails() -> str:
+        raise ValueError("No threading layer could be loaded.\nmore")
+
+    monkeypatch.setattr("analysis.threading_library", fails)
+    monkeypatch.setenv("NUMBA_THREADING_LAYER", "tbb")
+    with pytest.raises(
+        ConfigError,
+        match=r"NUMBA_THREADING_LAYER=tbb is not possible \(No threading layer could be loaded\); ",
+    ):
+        environment.check_environment()
+
+
+def test_one_thread_of_openblas_unless_the_user_says_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    environment.limit_threads()
+    assert environment.os.environ["OPENBLAS_NUM_THREADS"] == "1"
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
+    environment.limit_threads()
+    assert environment.os.environ["OPENBLAS_NUM_THREADS"] == "3"
+
+
+@pytest.mark.parametrize(("unreadable", "code"), [(0, 0), (3, 5), (12, 5)])
+def test_ten_losses_of_a_recovery_are_named(
+    monkeypatch: pytest.MonkeyPatch, unreadable: int, code: int
+) -> None:
+    sentences = [f"loss {k}" for k in range(unreadable)]
+    done = SimpleNamespace(unreadable=sentences, line=lambda: "12 frames")
+    monkeypatch.setattr("acquire.session.recover", lambda session, out: done)
+    said: list[str] = []
+    assert recover.command(argparse.Namespace(session="a.h5", out=None), said.append) == code
+    assert said == ["12 frames", *(f"  {one}" for one in sentences[:10])]
+
+
+def test_the_help_names_the_defaults_there_are() -> None:
+    parser = argparse.ArgumentParser()
+    add_options(parser, "group", "zoi", "mask", "no-view", "order")
+    helps = {action.dest: str(action.help) for action in parser._actions}
+    defaults = load_config(None, {}).measure
+    assert helps["measure.zoi"].endswith(f"(default {defaults.zoi})")
+    assert helps["measure.order"].endswith(f"(default {defaults.order})")
+    assert "default" not in helps["measure.mask"] and helps["view.enabled"].startswith("do not ")
+    found = parser.parse_args(["--zoi", "40", "--no-view"])
+    assert getattr(found, "measure.zoi") == 40 and getattr(found, "view.enabled") is False
+    assert getattr(found, "measure.mask") is None
+
+
+def test_the_short_help_has_all_options_but_those_for_experts(capsys: pytest.CaptureFixture[str]) -> None:
+    shown = {}
+    for option in ("--help", "--help-all"):
+        with pytest.raises(SystemExit) as ended:
+            main(["replay", option])
+        assert ended.value.code == 0
+        shown[option] = capsys.readouterr().out
+    for words in (
+        "--zoi PX",
+        "--out DIR",
+        "width,thickness of the section in mm",
+        "metadata, stored in every file",
+    ):
+        assert words in shown["--help"] and words in shown["--help-all"], words
+    assert "--bending" in shown["--help-all"] and "--bending" not in shown["--help"]
+
+
+@pytest.mark.parametrize(
+    ("chunk", "as_measured", "words"),
+    [
+        (None, False, ""),
+        (None, True, ""),
+        (0.5, False, ""),
+        (0.5, True, "--as-measured is bit-identical"),
+        (0.0, False, "seconds above 0"),
+        (-1.0, False, "seconds above 0"),
+        (math.inf, False, "seconds above 0"),
+        (math.nan, False, "seconds above 0"),
+    ],
+)
+def test_chunks_of_a_batch(chunk: float | None, as_measured: bool, words: str) -> None:
+    arguments = argparse.Namespace(chunk_s=chunk, as_measured=as_measured)
+    if words:
+        with pytest.raises(ConfigError, match=words):
+            _chunk_s(arguments)
+    else:
+        assert _chunk_s(arguments) == chunk
