@@ -14,7 +14,7 @@ from typing import TextIO
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.printable import brief, printable
 from live.commands.arguments import Command, parse
-from live.commands.environment import check_environment, limit_threads
+from live.commands.environment import check_environment, limit_resources
 from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.signals import ended_by_sigterm
 from live.commands.streams import nonblocking_streams
@@ -25,7 +25,7 @@ _WRONG_PATH = {errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     _replace_closed_streams()
-    limit_threads()
+    limit_resources()
     try:
         with ended_by_sigterm():
             command, arguments = parse(sys.argv[1:] if argv is None else argv)

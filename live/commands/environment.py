@@ -5,20 +5,22 @@ from __future__ import annotations
 import os
 
 from acquire.errors import ConfigError
+from acquire.system import limit_memory_pools
 
 _LEAST = {"NUMBA_NUM_THREADS": 1, "SOURCE_DATE_EPOCH": 0}
 """Whole numbers in the environment for which numba ends the program where they are none."""
 _LAYERS = ("NUMBA_THREADING_LAYER", "NUMBA_THREADING_LAYER_PRIORITY")
 
 
-def limit_threads() -> None:
-    """Give OpenBLAS one thread, where the environment gives no number; to be called before numpy is loaded.
+def limit_resources() -> None:
+    """Give OpenBLAS one thread and memory few pools, unless the environment says else; called before numpy is loaded.
 
     The matrices are small: a second thread mostly spins, and keeps the camera and the recording from their cores.
     Preparing a reference of 5 megapixels took 10 s beside busy programs and takes 4; alone 1.0 and 1.1, with a tenth
     less of processor time (2 cores, November 2026).
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    limit_memory_pools()
 
 
 def check_environment() -> None:

@@ -47,6 +47,30 @@ def test_the_memory_of_this_process_is_in_mebibytes(monkeypatch: pytest.MonkeyPa
 
 
 @linux
+@pytest.mark.parametrize(
+    ("platform", "given", "asked"),
+    [("linux", None, [(-8, 2)]), ("linux", "4", []), ("darwin", None, []), ("win32", None, [])],
+)
+def test_memory_has_two_pools_unless_the_user_says_another(
+    platform: str, given: str | None, asked: list[tuple[int, int]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found: list[tuple[int, int]] = []
+    library = SimpleNamespace(mallopt=lambda what, value: found.append((what, value)))
+    monkeypatch.setattr("ctypes.CDLL", lambda name: library)
+    monkeypatch.setattr(sys, "platform", platform)
+    monkeypatch.setenv("MALLOC_ARENA_MAX", given) if given else monkeypatch.delenv(
+        "MALLOC_ARENA_MAX", raising=False
+    )
+    system.limit_memory_pools()
+    assert found == asked
+
+
+def test_another_c_library_has_no_pools_to_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("MALLOC_ARENA_MAX", raising=False)
+    monkeypatch.setattr("ctypes.CDLL", lambda name: SimpleNamespace())
+    system.limit_memory_pools()
+
+
 def test_a_process_that_has_ended_does_not_run() -> None:
     """Also before its parent has asked for its exit code."""
     child = subprocess.Popen(["true"])

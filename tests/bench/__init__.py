@@ -1,8 +1,8 @@
 """The benchmark, ``make bench``; it stops with advice where OpenCV does not work."""
 
-from live.commands.environment import limit_threads
+from live.commands.environment import limit_resources
 
-limit_threads()  # as the program does, before numpy is loaded
+limit_resources()  # as the program does, before numpy is loaded
 try:
     import cv2
 

@@ -90,10 +90,10 @@ def test_a_threading_layer_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) 
 
 def test_one_thread_of_openblas_unless_the_user_says_another(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
-    environment.limit_threads()
+    environment.limit_resources()
     assert environment.os.environ["OPENBLAS_NUM_THREADS"] == "1"
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
-    environment.limit_threads()
+    environment.limit_resources()
     assert environment.os.environ["OPENBLAS_NUM_THREADS"] == "3"
 
 
