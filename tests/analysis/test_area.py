@@ -163,6 +163,17 @@ def test_unevenness_needs_twenty_zois_that_are_no_line(
     assert np.isfinite([found.exx, found.eyy, found.misfit]).all() == known
 
 
+def test_lost_zois_of_a_uniform_strain_make_it_no_less_even() -> None:
+    zois = grid()
+    plain = affine(zois)
+    status = np.where(np.random.default_rng(2).random(zois.shape) < 0.3, 5, 0)
+    values = {name: plain.value(name) for name in ("u", "v", *GRADIENT)}
+    area = AreaStrain.of(StrainField.from_values(zois, values, 1e-3, status=status))
+    assert area is not None
+    found = area.unevenness()
+    assert max(found.exx, found.eyy, found.misfit) < 1e-9
+
+
 def test_a_strain_of_the_second_degree_is_uneven() -> None:
     zois = grid()
     _, y = np.meshgrid(zois.x, zois.y)

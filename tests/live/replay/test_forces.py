@@ -63,6 +63,9 @@ def test_only_between_times_there_are_gaps(tmp_path: Path) -> None:
     sparse = read_forces(table(tmp_path, "time_s,force_N\n0,0\n1,10\n2,20\n6,60\n"))
     log = sparse.log(sparse.samples(None, 100.0), 0.5)
     assert log.forces_one_zero([101.5, 104.0]).tolist() == pytest.approx([15.0, math.nan], nan_ok=True)
+    dense = read_forces(table(tmp_path, "time_s,force_N\n0,0\n0.1,10\n0.2,20\n0.6,60\n"))
+    log = dense.log(dense.samples(None, 100.0), 0.5)
+    assert log.forces_one_zero([100.4]).tolist() == pytest.approx([40.0])
 
 
 @pytest.mark.parametrize("text", ["file,force_kN\na1.png,1\nshots/a0.png,-0.5\n", "a1,1000\na0.png,-500\n"])

@@ -77,6 +77,14 @@ def test_specimen_and_metadata_are_those_of_the_first_camera(both: SetupSessions
     assert back.load is front.load and back.devices is front.devices
 
 
+def test_all_cameras_are_checked(both: SetupSessions, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[str] = []
+    for name, session in both.by_name.items():
+        monkeypatch.setattr(session.check, "begin", lambda name=name: begun.append(name))
+    both.check()
+    assert begun == ["front", "back"]
+
+
 def test_another_load_cell_has_no_zero_yet(both: SetupSessions) -> None:
     front, back = both.by_name.values()
     front.draft.change_all({"load.zero_N": 5.0})
