@@ -85,7 +85,7 @@ def anisotropy(loading: Loading, line: FittedLine, nu: Figure) -> Figure:
         return Figure.none("the width does not shrink as the length grows: is the load along the axis?")
     share, _, _ = _slope(part.along[used], part.elastic[used])
     sigma_nu = (nu.high - nu.low) / 2 / quantile()
-    # E changes the length's elastic strain; the width's only where nu is not made with it, which takes from this.
+    # nu is made with E, so E changes the elastic strain of the length alone; for another nu this is more than enough.
     elastic = abs(share) * math.hypot(sigma_nu, slope * line.sigma / line.slope)
     return Figure.about(
         -slope / (1 + slope),

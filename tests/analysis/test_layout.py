@@ -9,6 +9,7 @@ from analysis.field import Block, Roi, ZoiGrid
 from analysis.optics import PlateLayout, without_plates
 
 GRID = ZoiGrid.cover(Roi(100, 200, 160, 160), 32, 16)  # 9 x 9 ZOIs
+GRID_WIDE = ZoiGrid.cover(Roi(100, 200, 16 * 30 + 32, 16 * 30 + 32), 32, 16)
 
 
 def test_plates_above_and_below_widen_the_grid_by_whole_steps() -> None:
@@ -39,9 +40,6 @@ def test_two_zois_a_side_make_a_plate(width: float, room: bool) -> None:
                 ValueError, match=r"plate p of .* has no room for 2 x 2 ZOIs of 32 px, 16 px apart"
             ):
                 PlateLayout.of(GRID, {"p": box})
-
-
-GRID_WIDE = ZoiGrid.cover(Roi(100, 200, 16 * 30 + 32, 16 * 30 + 32), 32, 16)
 
 
 def test_without_a_zoi_beside_the_plates_nothing_is_measured() -> None:
