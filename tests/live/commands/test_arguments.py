@@ -12,6 +12,7 @@ import pytest
 
 from acquire.errors import ConfigError
 from analysis.field import Blur
+from live import VERSION
 from live.cli import main
 from live.commands.arguments import parse
 from live.commands.check_watch import RenewedLines, blur_line, peak_line, short_line
@@ -38,6 +39,12 @@ def test_options_win_over_the_file_and_the_file_over_defaults(tmp_path: Path) ->
     assert (found.measure.zoi, found.measure.burst) == (32, 6)
     assert (found.specimen.width_mm, found.specimen.thickness_mm) == (20.0, 2.0)
     assert found.specimen.area_m2 == pytest.approx(40e-6)
+
+
+def test_the_version_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        parse(["--version"])
+    assert (end.value.code, capsys.readouterr().out) == (0, f"phasedic {VERSION}\n")
 
 
 def test_metadata_and_a_lens_that_is_left_out() -> None:

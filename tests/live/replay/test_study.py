@@ -168,6 +168,11 @@ def test_the_knee() -> None:
         recommended(tried[:1])
 
 
+def test_a_strain_counts_from_three_sigmas_on() -> None:
+    assert not found(32, 1e-3, 2.9e-3).is_significant
+    assert found(32, 1e-3, 3.1e-3).is_significant
+
+
 def test_the_largest_strain_and_its_uncertainty_are_those_of_the_other_half_of_the_bursts() -> None:
     """Its place is found in one half of them, its value read in the other: a mean of three less one of two."""
     grid, rng = ZoiGrid.cover(Roi(0, 0, 160, 128), 32, 16), np.random.default_rng(4)

@@ -34,8 +34,7 @@ class Rates:
     picture_hz, map_hz, row_hz : float, 1/s
         Pictures, maps, and parcels of rows (means and loads, all of them).
     gather_s : float, s
-        What is drawn of one entity in this time is sent together; the memory of rerun grows with each parcel
-        (for a file: permanently, by 0.3 MiB a minute with 5 s and half of it with 20 s).
+        What is drawn of one entity in this time is sent together; a file of a killed test lacks the last of it.
     parcel_bytes : int
         A parcel is sent when it reaches this size; large ones fragment the memory, which then grows by as much as
         is written.
@@ -173,10 +172,12 @@ def write(setup: ViewSetup, target: ViewTarget) -> RerunSink:
     rates = (
         ALL
         if setup.finished
-        else Rates(1.0, 2.0, 0.1, gather_s=60.0, parcel_bytes=2**16, limit_bytes=RRD_LIMIT_BYTES)
+        else Rates(1.0, 2.0, 0.1, gather_s=20.0, parcel_bytes=2**16, limit_bytes=RRD_LIMIT_BYTES)
     )
+    # The footer lists every parcel and is kept in memory until the end: 16 MiB for a file of 1 GB.
+    file = rr.FileSink(str(path), write_footer=setup.finished)
     # Two streams with one name in a process would be one stream.
-    return _sink(rr.FileSink(str(path)), setup, f"{target.recording}-file", rates)
+    return _sink(file, setup, f"{target.recording}-file", rates)
 
 
 def _sink(

@@ -39,11 +39,12 @@ function row(one) {
   if (one.head) return heads(one.head);
   const name = el("th", { text: ofSide(one.name.includes(" ") ? t(one.name) : one.name, one), scope: "row" });
   if (one.text == null) return el("tr", { class: "unknown" }, name, el("td", { text: t(one.why), title: t(one.why), colSpan: 2 }));
-  return el("tr", {}, name, el("td", { text: one.words ? t(one.text) : withRemark(one) }), el("td", { text: one.interval }));
+  if (one.words) return el("tr", {}, name, el("td", { class: "words", text: t(one.text), colSpan: 2 }));
+  const remark = one.remark ? [el("span", { class: "words", text: ` ${t(one.remark)}` })] : [];
+  return el("tr", {}, name, el("td", { text: one.text }, ...remark), el("td", { text: one.interval }));
 }
 
 const ofSide = (name, one) => (one.side ? `${name}, ${t(one.side)}` : name);
-const withRemark = (one) => (one.remark ? `${one.text} (${t(one.remark)})` : one.text);
 
 function gaugeRow(one) {
   if (one.head) return heads(one.head);

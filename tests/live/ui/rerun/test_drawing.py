@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -62,15 +63,22 @@ def test_a_curve_of_nothing_but_zero_has_an_axis() -> None:
 
 
 chunk = pytest.importorskip("rerun.chunk")
+check_for_rrd_footer = pytest.importorskip("rerun_bindings").check_for_rrd_footer
 
 
 def make_setup(**more: Any) -> ViewSetup:
     return ViewSetup("a test", 128, 96, 12, make_grid(), START, **more)
 
 
+def parts_of(path: Path) -> list[Any]:
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "RRD file has no footer")
+        return list(chunk.RrdReader(path).stream())
+
+
 def rows_in(path: Path) -> Counter[str]:
     rows: Counter[str] = Counter()
-    for part in chunk.RrdReader(path).stream():
+    for part in parts_of(path):
         rows[str(part.entity_path)] += part.num_rows
     return rows
 
@@ -148,7 +156,7 @@ def test_what_a_server_forgets_is_sent_again(tmp_path: Path) -> None:
     with scene_into({path: Rates(10.0, 10.0, repeat_bytes=20e3)}) as (scene, _):
         draw_a_test(scene)
     times: Counter[int] = Counter()
-    for part in chunk.RrdReader(path).stream():
+    for part in parts_of(path):
         if str(part.entity_path) == "/strain/eyy" and not part.is_static:
             times.update(part.to_record_batch().column("time").cast("int64").to_pylist())
     assert len(times) == 30
@@ -156,7 +164,7 @@ def test_what_a_server_forgets_is_sent_again(tmp_path: Path) -> None:
 
 
 def test_a_file_of_a_minute_has_few_parts_of_a_curve(tmp_path: Path) -> None:
-    """The memory of rerun grows with each part of a file, and is not freed before its end."""
+    """Each part has a head of 2 kB."""
     path, setup = tmp_path / "view.rrd", make_setup()
     scene = ViewScene([write(setup, ViewTarget(None, str(path), "a-test"))], setup)
     scene.begin()
@@ -164,9 +172,21 @@ def test_a_file_of_a_minute_has_few_parts_of_a_curve(tmp_path: Path) -> None:
         scene.means([(START + 0.1 * k, *(1e-6 * k, 1e-5) * 3)])
         scene.loads([(START + 0.1 * k, 1.0 * k)])
     scene.end()
-    parts = Counter(str(part.entity_path) for part in chunk.RrdReader(path).stream() if not part.is_static)
+    parts = Counter(str(part.entity_path) for part in parts_of(path) if not part.is_static)
     assert 1 <= parts["/strain/exx"] <= 7 and 1 <= parts["/load/force"] <= 7
     assert rows_in(path)["/strain/exx"] == 601, "with its style"
+
+
+@pytest.mark.parametrize("finished", [False, True])
+def test_the_file_of_a_running_test_has_no_footer(tmp_path: Path, finished: bool) -> None:
+    """What it lists grows in memory with the file; the file of a finished test has one."""
+    path, setup = tmp_path / "view.rrd", make_setup(finished=finished)
+    scene = ViewScene([write(setup, ViewTarget(None, str(path), "a-test"))], setup)
+    scene.begin()
+    scene.field(START, make_measurement(1).field)
+    scene.end()
+    assert check_for_rrd_footer(str(path)) is finished
+    assert rows_in(path)["/specimen/map/exx"] == 1 + STATIC
 
 
 def test_what_does_not_change_is_not_drawn_again(tmp_path: Path) -> None:
@@ -188,7 +208,7 @@ def test_a_thinned_picture_keeps_its_size_on_the_screen(tmp_path: Path) -> None:
         scene.picture(PictureMessage(np.zeros((48, 64), np.uint8), 8, START, 2))
     columns = {
         name
-        for part in chunk.RrdReader(path).stream()
+        for part in parts_of(path)
         if str(part.entity_path) == "/camera/picture"
         for name in part.to_record_batch().schema.names
     }

@@ -309,6 +309,40 @@ def test_the_whole_way_in_three_languages(browser: Any, start: Start) -> None:
     readable(page, "after")
 
 
+SHOW_RESULT = """async result => { const { showAfter } = await import("/static/after.js");
+    document.body.dataset.stage = "after"; await showAfter(result); }"""
+UNEVEN = "the strain varies by 12 % over the region"
+FIGURES = [
+    {"name": "E", "text": "71 GPa", "interval": "± 10", "remark": UNEVEN},
+    {"name": "E by chord", "text": None, "why": "no chord: 3 points from 0.05 to 0.25 %, and 5 are needed"},
+    {"name": "nu", "text": "0.33035", "interval": "± 0.00083", "remark": UNEVEN},
+    {"name": "strain of E and nu", "text": "eyy of the region", "interval": "", "words": True},
+    {
+        "name": "interval of E",
+        "text": "scatter; no limits of error are stated",
+        "interval": "",
+        "words": True,
+    },
+]
+
+
+def test_remarks_and_words_of_a_result_fit(browser: Any, start: Start) -> None:
+    page = start()
+    for one in (page, *(another(browser, page.address, locale) for locale in LOCALES[1:])):
+        made = {
+            "figures": FIGURES,
+            "gauges": [],
+            "troubles": [],
+            "words": "",
+            "folder": "runs/bar",
+            "ledger": "",
+        }
+        one.page.evaluate(SHOW_RESULT, {**made, "report": True})
+        fits(one, "after")
+        assert one.page.inner_text("#results tr:nth-child(2) td").startswith("71 GPa ")
+        assert not one.errors
+
+
 MESSAGES = {
     "/dev/video0: another program holds the camera (cheese, PID 12); close it and try again": (
         "/dev/video0: ein anderes Programm hält die Kamera (cheese, PID 12); es schließen und nochmals versuchen"

@@ -1,0 +1,92 @@
+"""Software triggers: at a steady rate, none to catch up, a refusal said once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from acquire.genicam import trigger
+from acquire.genicam.device import GenicamDevice
+from acquire.genicam.library import GenicamError
+
+
+class Bench:
+    """A device and the time; work goes on in the caller, until ``turns`` waits have passed.
+
+    Attributes
+    ----------
+    triggered : list of float, s
+        When it was triggered.
+    costs : list of float, s
+        How long each trigger blocks; nothing after them.
+    """
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, costs: list[float], turns: int) -> None:
+        self.now, self.turns, self.costs = 100.0, turns, costs
+        self.triggered: list[float] = []
+        self.asked: list[str] = []
+        self.stopped = False
+        self.refused_from = 10**6
+        self.at_refusal: Callable[[], None] = lambda: None
+        threads = SimpleNamespace(Event=lambda: self, Thread=self._thread)
+        monkeypatch.setattr(trigger, "threading", threads)
+        monkeypatch.setattr(trigger, "time", SimpleNamespace(monotonic=lambda: self.now))
+
+    def _thread(self, target: Callable[[], None], **_: Any) -> Any:
+        return SimpleNamespace(start=target)
+
+    def wait(self, seconds: float) -> bool:
+        assert seconds >= 0.0
+        self.turns -= 1
+        self.now += seconds
+        return self.stopped or self.turns < 0
+
+    def set(self) -> None:
+        self.stopped = True
+
+    def is_set(self) -> bool:
+        return self.stopped
+
+    def ask(self, name: str) -> None:
+        if len(self.triggered) >= self.refused_from:
+            self.at_refusal()
+            raise GenicamError("the line is down")
+        self.asked.append(name)
+        self.triggered.append(self.now)
+        self.now += self.costs.pop(0) if self.costs else 0.0
+
+    def work(self, period_s: float) -> list[str]:
+        """What it reports."""
+        said: list[str] = []
+        trigger.SoftwareTrigger(cast(GenicamDevice, self), period_s, said.append)
+        return said
+
+
+def test_one_picture_each_period_whatever_a_trigger_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench(monkeypatch, [0.01, 0.03, 0.0, 0.02], turns=5)
+    assert bench.work(0.05) == []
+    assert bench.triggered == pytest.approx([100.0, 100.05, 100.10, 100.15, 100.20])
+    assert set(bench.asked) == {"arv_camera_software_trigger"}
+
+
+def test_periods_that_a_trigger_blocked_are_not_caught_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench(monkeypatch, [0.0, 0.22], turns=5)
+    bench.work(0.05)
+    assert bench.triggered == pytest.approx([100.0, 100.05, 100.27, 100.32, 100.37])
+
+
+def test_a_refusal_is_reported_once_and_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = Bench(monkeypatch, [], turns=10)
+    bench.refused_from = 3
+    assert bench.work(0.05) == ["triggers are refused: the line is down"]
+    assert len(bench.triggered) == 3 and bench.turns == 6
+
+
+def test_a_refusal_after_stop_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A camera that is being closed refuses."""
+    bench = Bench(monkeypatch, [], turns=10)
+    bench.refused_from, bench.at_refusal = 3, bench.set
+    assert bench.work(0.05) == []
