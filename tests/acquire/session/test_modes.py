@@ -15,6 +15,7 @@ from acquire.frame import Burst, CameraInfo
 from acquire.record_mode import RecordMode
 from acquire.session import RotatingWriter, Session
 from tests.acquire.session.fixtures import CAMERA, START, frame, info, sample, writer
+from tests.clock import Clock
 
 EIGHT_BIT = dataclasses.replace(CAMERA, bits=8)
 
@@ -45,6 +46,16 @@ def test_bursts_come_back_bit_equal(tmp_path: Path, camera: CameraInfo, n: int) 
         assert back.mode.kind == "bursts" and back.burst_count == 3 and len(back) == 0
         for a, b in zip(bursts, back.bursts(), strict=True):
             assert_same_burst(a, b)
+
+
+def test_a_burst_waits_for_the_disk_with_all_its_frames(tmp_path: Path) -> None:
+    clock = Clock()
+    with writer(tmp_path / "session.h5", now=clock, mode=RecordMode("bursts"), burst_frames=7) as session:
+        for burst, clock.now_s in zip(bursts_of(7, 3), (1.0, 1.02, 1.04), strict=True):
+            session.write_burst(burst)
+        assert session.unflushed_frames == 14
+        session.flush()
+        assert session.unflushed_frames == 0
 
 
 def test_short_sums_are_stored_short(tmp_path: Path) -> None:
