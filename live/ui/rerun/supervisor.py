@@ -138,7 +138,7 @@ def _environment() -> dict[str, str]:
     (``sinks.write``), of which it would warn.
     """
     paths = [_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])]
-    own = {"MIMALLOC_PURGE_DELAY": "0", "RUST_LOG": "info,re_log_encoding::rrd::file_sink=error"}
+    own = {"MIMALLOC_PURGE_DELAY": "0", "RUST_LOG": "warn,re_log_encoding::rrd::file_sink=error"}
     return {**own, **os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
