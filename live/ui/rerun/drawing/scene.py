@@ -15,7 +15,7 @@ from acquire.events import Event, EventKind
 from analysis.field import Status
 from live.pipeline.queues import Thinned
 from live.pipeline.snapshot import Snapshot
-from live.results.maps.colours import MICROSTRAIN, number, ramp
+from live.results.maps.colours import number, ramp
 from live.results.maps.field_maps import FieldMaps, Painted
 from live.ui.rerun.drawing.curve import MAX_POINTS, CurveDrawing
 from live.ui.rerun.drawing.large_figures import paint
@@ -85,6 +85,7 @@ class ViewScene:
         self._arrows = ArrowScale()
         self._strains: Thinned[Row] = Thinned(_MAX_STRAINS)
         self._forces: Thinned[Row] = Thinned(_MAX_FORCES)
+        self._newest: Snapshot | None = None
 
     def begin(self) -> None:
         """Draw everything that does not change."""
@@ -105,9 +106,11 @@ class ViewScene:
         self._region(self._setup.grid)
 
     def end(self) -> None:
-        """Send what waits, and close the sinks."""
+        """Draw the last figures, send what waits, and close the sinks."""
+        if self._newest is not None:
+            self._draw_figures([sink for sink in self._sinks if sink.lacks("figures", self._newest.t)])
         for sink in self._sinks:
-            sink.send_rows(_columns)
+            sink.send_rows()
             sink.close()
         self._sinks = []
 
@@ -295,15 +298,15 @@ class ViewScene:
         for sink in self._sinks:
             sink.add_row(path, row)
             if sink.takes("rows", t):
-                sink.send_rows(_columns)
+                sink.send_rows()
 
     def _send_again(self) -> None:
         due = [sink for sink in self._sinks if sink.needs_curves_again()]
         for sink in due:
-            sink.send("load/force", self._forces.items(), _columns)
+            sink.send("load/force", self._forces.items())
             for k, name in enumerate(STRAINS):
                 rows = [(row[0], *row[2 * k + 1 : 2 * k + 3]) for row in self._strains.items()]
-                sink.send(f"strain/{name}", rows, _columns)
+                sink.send(f"strain/{name}", rows)
         if due:
             self._drawn = {}
             self._drawn_curve.reset()
@@ -322,13 +325,17 @@ class ViewScene:
         self._log("events", rr.TextLog(text, level=_LEVELS[event.level]))
 
     def figures(self, snapshot: Snapshot) -> None:
-        """Draw the large figures where a sink is due."""
+        """Draw the large figures where a sink is due, and the last of all at the end."""
+        self._newest = snapshot
+        self._draw_figures([sink for sink in self._sinks if sink.takes("figures", snapshot.t)])
+
+    def _draw_figures(self, due: Sequence[RerunSink]) -> None:
         import rerun as rr
 
-        self._due = [sink for sink in self._sinks if sink.takes("figures", snapshot.t)]
-        if self._due:
-            data = encode(".jpg", paint(snapshot), FIGURES_QUALITY)
-            self._at(snapshot.t)
+        self._due = due
+        if due and self._newest is not None:
+            data = encode(".jpg", paint(self._newest), FIGURES_QUALITY)
+            self._at(self._newest.t)
             self._log_due("figures", rr.EncodedImage(contents=data, media_type="image/jpeg"))
 
     def status(self, markdown: str) -> None:
@@ -360,13 +367,3 @@ class ViewScene:
     def _count(self, data: bytes) -> None:
         for sink in self._due:
             sink.count(data)
-
-
-def _columns(path: str, values: Sequence[Any]) -> Any:
-    """The columns of rerun for the rows of an entity."""
-    import rerun as rr
-
-    if path == "load/force":
-        return rr.Scalars.columns(scalars=values[0])
-    means, sigmas = (value * MICROSTRAIN.factor for value in values)
-    return rr.Measurements.columns(values=means, variances=sigmas**2)

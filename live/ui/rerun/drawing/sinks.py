@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from live.results.maps.colours import MICROSTRAIN
 from live.ui.rerun.drawing.layout import blueprint
 from live.ui.rerun.drawing.proxy import ViewerProxy, hidden_address, wait_for
 from live.ui.rerun.messages import ViewSetup, ViewTarget
@@ -100,6 +101,10 @@ class RerunSink:
         self._last_t[kind] = t
         return True
 
+    def lacks(self, kind: str, t: float) -> bool:
+        """Whether one of that kind at ``t`` (s) was not drawn, since the last was too near."""
+        return self._last_t[kind] < t
+
     def needs_curves_again(self) -> bool:
         """Whether ``repeat_bytes`` were drawn since the curves were sent."""
         if self.drawn_bytes - self._repeated_at < self._rates.repeat_bytes:
@@ -111,24 +116,34 @@ class RerunSink:
         """Keep (time, value ...) until rows are due."""
         self._rows.setdefault(path, []).append(row)
 
-    def send_rows(self, columns: Callable[[str, Any], Any]) -> None:
-        """Draw all waiting rows; ``columns`` makes the columns of rerun from a path and (values, N)."""
+    def send_rows(self) -> None:
+        """Draw all waiting rows."""
         kept, self._rows = self._rows, {}
         for path, rows in kept.items():
-            self.send(path, rows, columns)
+            self.send(path, rows)
 
-    def send(self, path: str, rows: Sequence[Sequence[float]], columns: Callable[[str, Any], Any]) -> None:
+    def send(self, path: str, rows: Sequence[Sequence[float]]) -> None:
         """Draw rows."""
         import rerun as rr
 
         if rows:
             times, *values = np.array(rows, np.float64).T
-            self.stream.send_columns(path, [rr.TimeColumn("time", duration=times)], columns(path, values))
+            self.stream.send_columns(path, [rr.TimeColumn("time", duration=times)], _columns(path, values))
 
     def close(self) -> None:
         """Send everything, and close the stream."""
         self.stream.flush(timeout_sec=_FLUSH_S)
         self.stream.disconnect()
+
+
+def _columns(path: str, values: Sequence[Any]) -> Any:
+    """The columns of rerun for the rows of an entity."""
+    import rerun as rr
+
+    if path == "load/force":
+        return rr.Scalars.columns(scalars=values[0])
+    means, sigmas = (value * MICROSTRAIN.factor for value in values)
+    return rr.Measurements.columns(values=means, variances=sigmas**2)
 
 
 def serve(setup: ViewSetup, target: ViewTarget, notify: Callable[[str], None]) -> tuple[RerunSink, int]:

@@ -19,7 +19,8 @@ from live.pipeline.snapshot import Snapshot
 from live.results.maps.colours import diverging_table
 from live.ui.rerun.drawing.curve import CurveDrawing, force_axis, rounded, strain_axis, stress_axis
 from live.ui.rerun.drawing.layout import BAR_HEIGHT, BAR_LABEL, BAR_TOP, blueprint
-from live.ui.rerun.drawing.scene import ViewScene, _columns
+from live.ui.rerun.drawing.scene import ViewScene
+from live.ui.rerun.drawing.sinks import _columns
 from live.ui.rerun.messages import PictureMessage, ViewSetup
 from tests.live.made_up import START, make_grid
 
@@ -52,7 +53,7 @@ class Sink:
     def add_row(self, path: str, row: Sequence[float]) -> None:
         self.rows[path].append(row)
 
-    def send_rows(self, columns: Any) -> None: ...
+    def send_rows(self) -> None: ...
 
     def needs_curves_again(self) -> bool:
         return False
