@@ -190,7 +190,7 @@ def test_noise_of_a_stretched_picture_is_a_mean_over_more_pixels(
     """Nothing but the noise of the deformed picture: its uncertainty goes with the root of det F."""
     motion, rng = {"du_dx": du_dx, "dv_dy": dv_dy}, np.random.default_rng(7)
     still, moved = (200 * Speckle(2.5, 3, span=500).at(*affine(SHAPE, **m)) for m in ({}, motion))
-    quiet, noise = NoiseModel(0, 0.05), NoiseModel(slope, 2.0)
+    quiet, noise = NoiseModel(slope * 1e-3, 0.05), NoiseModel(slope, 2.0)
     zois = ZoiGrid.cover(Roi(88, 88, 144, 144), 48, 24)
     x, y = np.meshgrid(zois.x - (SHAPE[1] - 1) / 2, zois.y - (SHAPE[0] - 1) / 2)
     start = StrainField.from_values(zois, {"u": du_dx * x, "v": dv_dy * y, **motion})
