@@ -161,3 +161,17 @@ def test_a_lost_block_is_searched_for_a_hundred_pixels_farther_than_it_had_moved
     monkeypatch.setattr(ReferencePicture, "searched_near", near)
     retry._search_again(solution, before)
     assert asked == [(np.flatnonzero(block).tolist(), 137.0)]
+
+
+@pytest.mark.parametrize(("u", "v"), [(15.0, -13.0), (-14.0, 16.0)])
+def test_a_block_is_searched_for_around_the_place_where_it_was(u: float, v: float) -> None:
+    """Far from the edges of the picture; all else of it has another motion."""
+    made, image = reference(), picture().astype(np.float32)
+    later = np.roll(image, (-30, 25), (0, 1))
+    place = np.s_[60:140, 70:150]
+    later[place] = np.roll(image, (int(v), int(u)), (0, 1))[place]
+    y, x = (made.prepared.origins + (made.grid.size - 1) / 2).T
+    which = np.flatnonzero((abs(x - 110) < 14) & (abs(y - 100) < 14))
+    found = made.searched_near(later, which, 20.0)[:, [0, made.modes // 2]]
+    assert len(which) >= 2
+    assert found == pytest.approx(np.tile((u, v), (len(which), 1)))
