@@ -107,8 +107,8 @@ class ViewScene:
 
     def end(self) -> None:
         """Draw the last figures, send what waits, and close the sinks."""
-        if self._newest is not None:
-            self._draw_figures([sink for sink in self._sinks if sink.lacks("figures", self._newest.t)])
+        if (last := self._newest) is not None:
+            self._draw_figures(last, [sink for sink in self._sinks if sink.lacks("figures", last.t)])
         for sink in self._sinks:
             sink.send_rows()
             sink.close()
@@ -327,15 +327,15 @@ class ViewScene:
     def figures(self, snapshot: Snapshot) -> None:
         """Draw the large figures where a sink is due, and the last of all at the end."""
         self._newest = snapshot
-        self._draw_figures([sink for sink in self._sinks if sink.takes("figures", snapshot.t)])
+        self._draw_figures(snapshot, [sink for sink in self._sinks if sink.takes("figures", snapshot.t)])
 
-    def _draw_figures(self, due: Sequence[RerunSink]) -> None:
+    def _draw_figures(self, snapshot: Snapshot, due: Sequence[RerunSink]) -> None:
         import rerun as rr
 
         self._due = due
-        if due and self._newest is not None:
-            data = encode(".jpg", paint(self._newest), FIGURES_QUALITY)
-            self._at(self._newest.t)
+        if due:
+            data = encode(".jpg", paint(snapshot), FIGURES_QUALITY)
+            self._at(snapshot.t)
             self._log_due("figures", rr.EncodedImage(contents=data, media_type="image/jpeg"))
 
     def status(self, markdown: str) -> None:

@@ -102,7 +102,7 @@ class RerunSink:
         return True
 
     def lacks(self, kind: str, t: float) -> bool:
-        """Whether one of that kind at ``t`` (s) was not drawn, since the last was too near."""
+        """Whether the last of that kind is older than ``t`` (s)."""
         return self._last_t[kind] < t
 
     def needs_curves_again(self) -> bool:
@@ -189,7 +189,7 @@ def write(setup: ViewSetup, target: ViewTarget) -> RerunSink:
         if setup.finished
         else Rates(1.0, 2.0, 0.1, gather_s=20.0, parcel_bytes=2**16, limit_bytes=RRD_LIMIT_BYTES)
     )
-    # The footer lists every parcel and is kept in memory until the end: 16 MiB for a file of 1 GB.
+    # The footer lists every parcel and is kept in memory until the end: 16 to 27 MiB for a file of 1 GB.
     file = rr.FileSink(str(path), write_footer=setup.finished)
     # Two streams with one name in a process would be one stream.
     return _sink(file, setup, f"{target.recording}-file", rates)

@@ -164,7 +164,7 @@ def test_what_a_server_forgets_is_sent_again(tmp_path: Path) -> None:
 
 
 def test_a_file_of_a_minute_has_few_parts_of_a_curve(tmp_path: Path) -> None:
-    """Each part has a head of 2 kB."""
+    """Each part has a head of 1 kB."""
     path, setup = tmp_path / "view.rrd", make_setup()
     scene = ViewScene([write(setup, ViewTarget(None, str(path), "a-test"))], setup)
     scene.begin()
