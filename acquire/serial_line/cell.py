@@ -11,11 +11,12 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any, Self
 
 from acquire.addresses import Address
 from acquire.closing import Closing
-from acquire.device_clock import DeviceClock
+from acquire.device_clock import ClockUnit, DeviceClock
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
@@ -76,6 +77,7 @@ class SerialCell(Closing):
             DeviceClock(),
             ArrivalRate(),
         )
+        self._unit = ClockUnit()  # of the device's own time
         self._last_t = -math.inf  # of the last sample
         self._last_read = math.nan
         self._watch, self._flood = (
@@ -235,6 +237,7 @@ class SerialCell(Closing):
         if not readings:
             return []
         times = [self._times.began(reading.start) for reading in readings]
+        readings = self._in_milliseconds(readings, times[-1])
         stamps = [(r.device_ms, t) for r, t in zip(readings, times, strict=True) if r.device_ms is not None]
         waited = self._flood.late
         if not waited:  # messages of unknown age cannot tie the device's clock
@@ -247,6 +250,20 @@ class SerialCell(Closing):
         else:
             late = self._pace.late(times)
         return [self._sample(*one) for one in zip(readings, times, late, strict=True)]
+
+    def _in_milliseconds(self, readings: list[Reading], arrived: float) -> list[Reading]:
+        """The readings with the device's own time in ms, whatever it counts; without it where it is no clock."""
+        count = readings[-1].device_ms
+        if count is not None and not self._flood.late and (text := self._unit.look(count, arrived)):
+            self._report("warning", text)
+            self._device = DeviceClock()
+        ms = self._unit.ms
+        if ms == 1.0:
+            return readings
+        return [
+            replace(r, device_ms=None if ms is None or r.device_ms is None else r.device_ms * ms)
+            for r in readings
+        ]
 
     def _sample(self, reading: Reading, t: float, late: bool) -> LoadSample:
         if reading.device_ms is not None and self._device.tied:
