@@ -22,6 +22,7 @@ from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.protocols.base import Reading
 from acquire.serial_line.clock import ArrivalRate, ArrivalTimes
+from acquire.serial_line.echo import Echo
 from acquire.serial_line.link import FloodGuard, Link, LinkContext, LoadWatch, Opener
 from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling
@@ -89,7 +90,8 @@ class SerialCell(Closing):
         self._skipped = 0  # bytes, in floods
         self._waited = True  # for the bytes of the last round
         context = LinkContext(opener, clock, self._stop, self._sleep)
-        self._link = Link(settings.line, context, self._report, lambda: self._watch.last_words(clock()))
+        echo = Echo(self._parser, self._report) if settings.mode == "poll" else None
+        self._link = Link(settings.line, context, self._report, lambda: self._watch.last_words(clock()), echo)
         try:
             self._command("start")
             self._wait_for_first()
@@ -202,7 +204,7 @@ class SerialCell(Closing):
         self._rest()
         began = self._clock()
         data = self._link.receive(BLOCK)
-        self._last_read = self._clock()
+        self._last_read = self._link.arrived if data else self._clock()
         self._waited = self._last_read - began > 1e-3
         readings = self._feed(data)
         if not data or self._last_read - self._polled > ANSWER_S:
@@ -288,7 +290,7 @@ class SerialCell(Closing):
         data = self._settings.commands.get(name)
         if data is None or (name in ("start", "stop") and self._settings.mode != "stream"):
             return False
-        return self._link.write(data)
+        return self._link.write(data, polls=self._settings.mode == "poll")
 
     def tare(self, *, force: bool = False) -> None:
         """Make the present load zero; done, or refused, by the reading thread at its next round."""
