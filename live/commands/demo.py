@@ -27,7 +27,7 @@ from live.config.loading import Config
 from live.config.values import AUTO
 from live.pipeline.consumer import Consumer
 from live.pipeline.measurement import Measurement
-from live.results.figures import evaluate, tensile_table
+from live.results.figures import tensile_table
 from live.results.folder import check_folder
 from live.run.outcome import Outcome
 from live.setup.compiling import compile_ahead
@@ -222,7 +222,7 @@ def compare(
     print_line("against the simulated truth (elastic part; exx, eyy, exy):")
     agreed = _print_strain(np.array(ratios), np.array(errors), print_line)
     _print_force(outcome, specimen, print_line)
-    figures = evaluate(outcome.run_state.history, outcome.run_state.loads, config.specimen)
+    figures = outcome.test.figures
     rows = tensile_table(figures, stresses=True)
     by = f" by {figures.elastic_strain}" if figures.E.known else ""
     print_line(f"  E  {rows['E'].text}{by}, true {specimen.E / 1e9:g} GPa")

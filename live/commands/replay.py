@@ -74,7 +74,7 @@ def _print(done: Replayed, screen: Screen, *, verbose: bool = False, with_report
     print_summary(
         screen,
         done.run_state,
-        done.config.specimen,
+        done.test,
         done.folder,
         done.lines,
         verbose=verbose,

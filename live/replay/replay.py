@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import datetime
 import itertools
+import math
 import threading
 import time
 from collections.abc import Iterable, Iterator
@@ -33,6 +34,8 @@ from live.replay.parts import StoredResults
 from live.replay.pictures import picture_of, picture_source, write_names
 from live.replay.session import session_path
 from live.replay.source import ReplayRequest, ReplaySource, Work, check_window, prefetch
+from live.results.finished.figures_file import finished
+from live.results.finished.finished_test import FinishedTest
 from live.results.folder import check_folder, make_folder
 from live.results.writer import write_results
 from live.setup.devices import open_rig
@@ -54,6 +57,7 @@ class Replayed:
     exit_code : int
     lines : tuple of str
         A summary for a person: pictures that were left out, speed, the kernel's share of the time.
+    test : FinishedTest
     left_out : int
         Pictures that could not be read or are not like the first.
     """
@@ -62,6 +66,7 @@ class Replayed:
     run_state: RunState
     config: Config
     exit_code: int
+    test: FinishedTest
     lines: tuple[str, ...] = ()
     left_out: int = 0
 
@@ -193,7 +198,9 @@ def _run(
     lines = [*cut_off, *stopped, *lines]
     lossy = outputs.failed or not run_state.history.has_values or left_out > 0 or cut_off
     code = 130 if stopping.is_set() else 5 if lossy else 0
-    return Replayed(folder, run_state, config, code, tuple(lines), left_out)
+    at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
+    test = finished(folder, config, run_state, code, at_reference)
+    return Replayed(folder, run_state, config, code, test, tuple(lines), left_out)
 
 
 def _with_final_folder(config: Config, folder: Path | None) -> Config:

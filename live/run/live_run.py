@@ -22,6 +22,8 @@ from live.pipeline.consumer_thread import Outputs
 from live.pipeline.latency import LatencyMonitor
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
+from live.results.finished.figures_file import finished
+from live.results.finished.finished_test import reference_force
 from live.results.writer import write_results
 from live.run.burst_queue import TAKING, BurstQueue
 from live.run.control import ControlRefused
@@ -318,7 +320,10 @@ def run_prepared(
     about = RunInfo(prepared.config, prepared.folder, rig.camera.info, grid, prepared.start, stop.request)
     outputs = Outputs(consumers(about, run_state), run_state.loads, run_state.event_log, run_state.history)
     code = _with_outputs(prepared, run_state, outputs, screen, stop, on_start)
-    return Outcome(prepared.folder, prepared.config, run_state, outputs, rig, grid, code)
+    test = finished(
+        prepared.folder, prepared.config, run_state, code, reference_force(run_state.event_log.events())
+    )
+    return Outcome(prepared.folder, prepared.config, run_state, outputs, rig, grid, code, test)
 
 
 def _with_outputs(
