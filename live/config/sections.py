@@ -226,6 +226,7 @@ class AlarmConfig:
     hysteresis: float = key(number(0), 0.0, "distance back from the limit at which the alarm ends")
     name: str = key(TEXT, "", "name of the alarm in messages")
     end: bool = key(FLAG, False, "the alarm ends the run")
+    end_on_unknown: bool = key(FLAG, False, "also where it comes because the value is not known (with end = true)")
     line: str = key(TEXT, "", "line sent on all strain outputs when the alarm begins")
 
 

@@ -28,6 +28,7 @@ from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
 from live.pipeline.run_state import FrameCounts, RunState
 from live.pipeline.screen import Screen
+from live.pipeline.timed.force_watch import ForceWatch
 from live.replay.forces import read_forces
 from live.replay.opening import open_session_source, prepare_replay
 from live.replay.parts import StoredResults
@@ -163,6 +164,7 @@ def _run(
         source.loads,
         History(config.specimen.axis),
         specimen=config.specimen,
+        with_load=len(source.loads) > 0,
     )
     write_names(request.source, folder / "pictures.csv")
     screen.print(f"replaying {request.source} into {request.final_folder or folder}")
@@ -174,7 +176,9 @@ def _run(
         source.start,
         deferred=request.final_folder is not None,
     )
-    outputs = Outputs(consumers(about, run_state), run_state.loads, event_log, run_state.history)
+    watch = [ForceWatch(run_state)] if run_state.with_load else []
+    made = [*consumers(about, run_state), *watch]
+    outputs = Outputs(made, run_state.loads, event_log, run_state.history)
     began, work = time.perf_counter(), prefetch(bursts)
     try:
         _pass_on_recorded(source, outputs)
@@ -189,6 +193,7 @@ def _run(
         took = time.perf_counter() - began
     finally:
         work.close()
+        run_state.health.ended = True
         outputs.end()
     speed = f"joined of {len(request.parts)} chunks" if request.parts else speed_line(run_state.history, took)
     lines = [*_account(source, run_state), speed]
