@@ -11,6 +11,7 @@ from acquire.errors import ConfigError
 from acquire.system import cores
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import (
+    FORCES,
     MEASURE,
     add_as_measured,
     add_config_file,
@@ -50,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_config_file(parser)
     add_options(parser, "measurement", *MEASURE)
     add_options(parser, "evaluation", *OUTPUT)
+    add_options(parser, "files of forces", *FORCES)
     add_section(parser)
     add_metadata(parser)
     add_verbose(parser)

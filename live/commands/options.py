@@ -19,6 +19,7 @@ MEASURE = (
     "order", "bending", "noise",
 )  # fmt: skip
 OUTPUT = ("out", "no-view", "no-rrd", "light", "axis", "standard", "zero", "lag", "report")
+FORCES = ("load-unit", "load-column", "load-decimal", "load-sign")
 PICTURES = (".png", ".tif")
 
 

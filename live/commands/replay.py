@@ -10,7 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from live.commands.exit_codes import EXIT_WORDS
-from live.commands.options import add_as_measured, add_measure, add_time_span, overrides
+from live.commands.options import (
+    FORCES,
+    add_as_measured,
+    add_measure,
+    add_options,
+    add_time_span,
+    overrides,
+)
 from live.commands.sides import TABLE, put_together
 from live.commands.signals import signals
 from live.config.sides import BACK, FRONT, SIDES
@@ -35,8 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_as_measured(parser)
     add_time_span(parser)
     parser.add_argument("--reference", metavar="FILE", help="reference picture (default: the first)")
-    words = "forces by file or time_s: a CSV with a header such as file,force_kN"
+    words = "forces: the export of a testing machine, or a CSV with a header such as file,force_kN or time_s,force_N"
     parser.add_argument("--load", dest="forces", metavar="FILE.csv", help=words)
+    add_options(parser, "file of forces", *FORCES)
     add_measure(parser)
 
 

@@ -18,6 +18,7 @@ from live.config.values import (
     RECORD_MODE,
     RECTANGLE,
     REGION,
+    SIGN,
     SIZE,
     STRAINS,
     TEXT,
@@ -74,6 +75,15 @@ class LoadConfig:
         Option("lag", "S", expert=True))
     zero_N: float = key(number(-1e9, 1e9), 0.0,
         "force from which forces count, N; the page sets it for one test, where the operator tares before it")
+    unit: str | None = key(TEXT, None,
+        "unit of the force in a file, N, kN, kgf, lbf; N,ms: that of its times too (default: as the file says)",
+        Option("load-unit", "UNIT"))
+    column: str | None = key(TEXT, None,
+        "column of the force in a file, by heading or number from 1; FORCE,TIME: that of times or names too",
+        Option("load-column", "NAME"))
+    decimal: str | None = key(choice("point", "comma"), None,
+        "decimal mark of a file, where it can be read in two ways", Option("load-decimal"))
+    sign: int = key(SIGN, 1, "-1: the force is negative in tension", Option("load-sign", "SIGN"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from acquire.addresses import parse_address
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError, DataError
@@ -87,7 +89,7 @@ def replay(
     if path is None:
         return _replay_pictures(request, screen, stopping, consumers)
     with open_session_source(path, request, screen) as (found, config):
-        source = _with_forces(found, request, config)
+        source = _with_forces(found, request, config, screen)
         return _run(source, config, request, screen, stopping, EventLog(), consumers)
 
 
@@ -110,24 +112,44 @@ def _replay_pictures(
     rig = open_rig(config.camera.address, "none:", _in_test_time(event_log), crop=config.camera.crop)
     try:
         with rig.camera as camera:
-            source = _with_forces(picture_source(camera, request, config), request, config)
+            source = _with_forces(picture_source(camera, request, config), request, config, screen)
             return _run(source, config, request, screen, stopping, event_log, consumers)
     finally:
         rig.close()
 
 
-def _with_forces(source: ReplaySource, request: ReplayRequest, config: Config) -> ReplaySource:
-    """The same source with the forces of the given CSV."""
+def _with_forces(
+    source: ReplaySource, request: ReplayRequest, config: Config, screen: Screen
+) -> ReplaySource:
+    """The same source with the forces of the given file, after a line on what was taken from it."""
     if request.forces is None:
         return source
-    address, table = parse_address(with_scheme(request.source)), read_forces(request.forces)
-    names = picture_times(address) if table.names and address.scheme == "files" else None
-    samples = table.samples(names, source.start.monotonic)
+    table = read_forces(request.forces, config.load)
+    named = table.export.times is None
+    pictures = _picture_times(request.source, named=named)
+    placed = table.placed(pictures, source.start, recorded=source.count is None)
+    times = source.times if pictures is None else np.array([*pictures.values()])
+    placed = placed.at_pictures(str(request.forces), config.load, times)
+    screen.print("; ".join([f"{request.forces.name}: {table.export.taken}", *placed.remarks]))
     return replace(
         source,
-        samples=tuple(samples),
-        loads=table.log(samples, config.load.max_gap_s, config.load.lag_s),
+        samples=placed.samples(),
+        loads=placed.log(config.load),
+        doubts=placed.doubts,
     )
+
+
+def _picture_times(source: str, *, named: bool) -> dict[str, float] | None:
+    """Times of pictures by name; None where the source has none, or where they are pages and not ``named``."""
+    address = parse_address(with_scheme(source))
+    if address.scheme != "files":
+        return None
+    try:
+        return picture_times(address)
+    except ConfigError:
+        if named:
+            raise
+        return None
 
 
 def _in_test_time(event_log: EventLog) -> EventSink:
@@ -200,8 +222,10 @@ def _run(
     left_out = source.count.left_out if source.count else 0
     cut_off = [e.text for e in event_log.events("warning") if "missing" in e.data and not stopping.is_set()]
     stopped = [f"{report.name} stopped: {report.failed}" for report in outputs.reports if report.failed]
-    lines = [*cut_off, *stopped, *lines]
-    lossy = outputs.failed or not run_state.history.has_values or left_out > 0 or cut_off
+    lines = [*cut_off, *source.doubts, *stopped, *lines]
+    lossy = (
+        outputs.failed or bool(source.doubts) or not run_state.history.has_values or left_out > 0 or cut_off
+    )
     code = 130 if stopping.is_set() else 5 if lossy else 0
     at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
     test = finished(folder, config, run_state, code, at_reference)
