@@ -7,7 +7,7 @@ device; the simulated camera has its frames from here too: which come, and what 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -140,13 +140,11 @@ class Planned:
     fate: Fate
 
 
-def plan_frames(duration_s: Callable[[], float], fps: float, faults: FaultPlan) -> Iterator[Planned]:
-    """Every frame period of a test of ``duration_s`` seconds, asked at each, in order; ends after "gone"."""
+def plan_frames(duration_s: float, fps: float, faults: FaultPlan) -> Iterator[Planned]:
+    """Every frame period of a test of ``duration_s`` seconds, in order; ends after "gone"."""
     left: dict[str, float] = {"drop": 0.0, "damage": 0.0}
-    for index in itertools.count():
+    for index in itertools.takewhile(lambda index: index <= duration_s * fps + 1e-9, itertools.count()):
         t = index / fps
-        if index > duration_s() * fps + 1e-9:
-            return
         for name in left:
             while fault := faults.begun(name, t):
                 left[name] += fault.amount

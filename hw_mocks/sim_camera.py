@@ -10,6 +10,7 @@ with it. ``lockstep=yes`` waits for its reader, on nominal time.
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -149,7 +150,7 @@ class SimCamera(Closing):
         self._sleep = sleep or self._stopped.wait
         self._scene = settings.scene(specimen)
         self._exposer = Exposer(settings.sensor, (specimen.height, specimen.width), settings.seed + 1)
-        self._plan = plan_frames(lambda: specimen.duration_s - self._delay_s, settings.fps, settings.faults)
+        self._plan = self._planned()
         self._ring = Ring(settings.buffers)
         self._thread: threading.Thread | None = None
         self._error: Exception | None = None
@@ -265,19 +266,23 @@ class SimCamera(Closing):
                 if planned.t < self._entered_s:
                     self._last_index = planned.index
                 else:
-                    self._serve(self._delayed(planned))
+                    self._serve(planned)
         except Exception as error:
             log.exception("the simulated camera failed")
             self._error = error
         finally:
             self._ring.close()
 
-    def _delayed(self, planned: Planned) -> Planned:
-        """A frame of an unhurried camera: no earlier than now."""
-        if self._settings.unhurried:
-            due = self._start() + planned.t + self._delay_s + self._settings.exposure_s / 2
-            self._delay_s += max(0.0, self._clock() - due)
-        return replace(planned, t=planned.t + self._delay_s)
+    def _planned(self) -> Iterator[Planned]:
+        """The frames until the test ends, which its operator may decide; no time of an unhurried camera has passed."""
+        for planned in plan_frames(math.inf, self._settings.fps, self._settings.faults):
+            if self._settings.unhurried:
+                due = self._start() + planned.t + self._delay_s + self._settings.exposure_s / 2
+                self._delay_s += max(0.0, self._clock() - due)
+            t = planned.t + self._delay_s
+            if t > self.specimen.duration_s + 1e-9:
+                return
+            yield replace(planned, t=t)
 
     def _serve(self, planned: Planned) -> None:
         """One frame period; the picture is made before its time and stored when it is due.
