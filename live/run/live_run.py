@@ -36,7 +36,7 @@ from live.run.outcome import Outcome, StopSignal
 from live.run.pre_trigger import PreTriggerBuffer
 from live.run.prepared_run import PreparedRun, new_run_state, set_up
 from live.run.recorder import open_recording
-from live.setup.devices import open_rig
+from live.setup.devices import Rig, open_rig
 
 _ARMED = "; nothing is recorded until the command start"
 _SILENT_S = 1.0
@@ -114,6 +114,11 @@ class LiveRun:
     def live(self) -> bool:
         """Whether the camera is there now; else its pictures are recorded."""
         return self._rig.camera.info.live
+
+    @property
+    def rig(self) -> Rig:
+        """The devices."""
+        return self._rig
 
     @property
     def run_state(self) -> RunState:
