@@ -36,7 +36,7 @@ from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Work, 
 from live.results.folder import check_folder, make_folder
 from live.results.writer import write_results
 from live.setup.devices import open_rig
-from live.setup.pictures import with_mask
+from live.setup.pictures import with_film, with_mask
 from live.setup.region import is_auto_region
 
 _MOST_TOLD = 5  # pictures that were left out, in the summary
@@ -151,6 +151,7 @@ def _run(
     consumers: Compose,
 ) -> Replayed:
     check_folder(config.output.dir)
+    config = with_film(config, source.camera)
     ready = prepare_replay(source, config, request.source, screen, stopping.is_set)
     stored = StoredResults.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements

@@ -20,6 +20,7 @@ from live.results.figures import (
     elastic_lines,
     evaluate,
     figure_lines,
+    film_line,
     lag_line,
     plastic_lines,
     tare_line,
@@ -65,6 +66,7 @@ def brief_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
     lines = [
         f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
         f"strain along {axis} at the end: {strain_text(strain, sigma)} µm/m",
+        *film_line(specimen),
         *_figures(run_state, specimen),
         noise_line(history),
         *_remarks(run_state, specimen),
