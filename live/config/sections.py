@@ -276,6 +276,9 @@ class SpecimenConfig:
     strain_error_um_m: float | None = key(number(0, 1e5), None,
         "limit of error of the strain that comes with the load over the elastic interval, um/m: motion off the plane"
         " (0.1 mm at 500 mm: 200), lens, alignment; in the interval of E")
+    film_error_percent: float | None = key(number(0, 100), None,
+        "limit of error of strains from a film whose codec makes pictures of earlier ones (H.264, VP9 ...), %: a replay"
+        " of such a film takes 10 where none is given; in the intervals of strains and of E")
     modulus_GPa: float | None = key(number(1e-6, 1e6), None,
         "modulus that is expected, GPa: phasedic check shows its budget in GPa too")
     nu: float | None = key(number(0, 0.5), None,

@@ -34,15 +34,15 @@ from live.pipeline.timed.force_watch import ForceWatch
 from live.replay.forces import read_forces
 from live.replay.opening import open_session_source, prepare_replay
 from live.replay.parts import StoredResults
-from live.replay.pictures import picture_of, picture_source, write_names
+from live.replay.pictures import picture_of, picture_source, with_reference, write_names
 from live.replay.session import session_path
-from live.replay.source import ReplayRequest, ReplaySource, Work, check_window, prefetch
+from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Work, check_window, prefetch
 from live.results.finished.figures_file import finished
 from live.results.finished.finished_test import FinishedTest
 from live.results.folder import check_folder, make_folder
 from live.results.writer import write_results
 from live.setup.devices import open_rig
-from live.setup.pictures import with_mask
+from live.setup.pictures import with_film, with_mask
 from live.setup.region import is_auto_region
 
 _MOST_TOLD = 5  # pictures that were left out, in the summary
@@ -101,6 +101,7 @@ def _replay_pictures(
 ) -> Replayed:
     if request.as_measured:
         raise ConfigError(f"{request.source}: --as-measured needs a session; pictures have none")
+    request = with_reference(request)
     config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
     region = AUTO if is_auto_region(config) else config.measure.roi
     config = replace(
@@ -112,7 +113,11 @@ def _replay_pictures(
     rig = open_rig(config.camera.address, "none:", _in_test_time(event_log), crop=config.camera.crop)
     try:
         with rig.camera as camera:
-            source = _with_forces(picture_source(camera, request, config), request, config, screen)
+            found = picture_source(camera, request, config)
+            screen.print(found.words)
+            for warning in camera.info.warnings:
+                screen.print(f"warning: {warning}")
+            source = _with_forces(found, request, config, screen)
             return _run(source, config, request, screen, stopping, event_log, consumers)
     finally:
         rig.close()
@@ -174,10 +179,11 @@ def _run(
     consumers: Compose,
 ) -> Replayed:
     check_folder(config.output.dir)
+    config = with_film(config, source.camera)
     ready = prepare_replay(source, config, request.source, screen, stopping.is_set)
     stored = StoredResults.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements
-    bursts = _not_empty(stored.bursts() if stored else source.bursts, request.source)
+    bursts = _not_empty(stored.bursts() if stored else source.bursts, request, source.count)
     folder = make_folder(ready.plan.config.output.dir, datetime.datetime.now(datetime.UTC))
     config = _with_final_folder(with_mask(ready.plan.config, ready.plan.mask, folder), request.final_folder)
     run_state = RunState(
@@ -268,13 +274,18 @@ def speed_line(history: History, seconds: float) -> str:
     )
 
 
-def _not_empty(bursts: Iterable[Work], source: str) -> Iterator[Work]:
+def _not_empty(bursts: Iterable[Work], request: ReplayRequest, count: PictureCount | None) -> Iterator[Work]:
     """The same bursts; raises DataError before anything is written where there are none."""
     rest = iter(bursts)
     first = [*itertools.islice(rest, 1)]
+    if not first and count and count.pictures - count.left_out == max(count.reference, 1) == 1:
+        raise DataError(
+            f"{request.source}: one picture alone has no strain; give the folder that the others are in, or the picture"
+            " before the test as --reference FILE"
+        )
     if not first:
         raise DataError(
-            f"{source}: no whole burst after the reference, nothing to measure; give a smaller --burst"
+            f"{request.source}: no whole burst after the reference, nothing to measure; give a smaller --burst"
         )
     return _after(first, rest)
 

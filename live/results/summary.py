@@ -19,6 +19,7 @@ from live.results.figures import (
     elastic_lines,
     evaluate,
     figure_lines,
+    film_line,
     lag_line,
     sharpness_line,
     tare_line,
@@ -83,6 +84,7 @@ def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
         f" exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
         f"{f' {part}' if part else ''};"
         f" largest of any ZOI {largest * 1e6:+.0f} µm/m",
+        *film_line(specimen),
         noise_line(history),
     ]
     lines += sharpness_line(history.column("blur").tolist(), history.column("sigma_blur").tolist())
@@ -126,6 +128,7 @@ class StatusCard:
             f"**{i.n_valid} of {i.n_zoi}** ZOIs valid" + (f" ({i.refused})" if i.refused else ""),
             f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, region **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
         ]
+        lines += film_line(self._specimen)
         blur = Blur(i.blur, i.sigma_blur).text
         lines += [f"{blur} since the reference"] * bool(blur)
         if part := share_text(i.least_share):

@@ -12,7 +12,7 @@ from acquire.errors import DataError
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
 from live.results.budget import CameraView, budget_cells
-from live.results.figures import axis_text, budget_of, figure_lines, headline, sharpness_line
+from live.results.figures import axis_text, budget_of, figure_lines, film_line, headline, sharpness_line
 from live.results.finished.figures_file import finished_in
 from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
@@ -250,11 +250,11 @@ def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
 
 
 def _sharpness_section(run: RunFolder) -> list[Html]:
-    """Nothing for results of earlier versions, which do not have the blur."""
+    """What a film holds back, and the blur, which results of earlier versions do not have."""
     values = run.strain.values
-    if "blur_px" not in values:
-        return []
-    lines = sharpness_line(values["blur_px"].tolist(), values["sigma_blur_px"].tolist())
+    lines = film_line(run.specimen)
+    if "blur_px" in values:
+        lines += sharpness_line(values["blur_px"].tolist(), values["sigma_blur_px"].tolist())
     return [section("Sharpness", *(paragraph(line.replace("+-", "±")) for line in lines))] * bool(lines)
 
 

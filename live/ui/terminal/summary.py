@@ -18,6 +18,7 @@ from live.results.figures import (
     alignment_line,
     elastic_lines,
     figure_lines,
+    film_line,
     plastic_lines,
     tare_line,
 )
@@ -65,6 +66,7 @@ def brief_lines(run_state: RunState, test: FinishedTest) -> list[str]:
         *doubt_lines(test),
         f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
         f"strain along {axis} at the end: {strain_text(strain, sigma)} µm/m",
+        *film_line(specimen),
         *_figures(test),
         noise_line(history),
         *_remarks(run_state, test),
