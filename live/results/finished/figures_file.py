@@ -12,6 +12,7 @@ from typing import Any
 from acquire.errors import DataError, PhasedicError
 from acquire.events import EventKind
 from analysis.evaluate import CONFIDENCE, Figure
+from analysis.evaluate.elastic import FILM
 from live.config.loading import Config
 from live.pipeline.run_state import RunState
 from live.results.export.atomic_file import new_file
@@ -120,7 +121,8 @@ def _figures(test: FinishedTest) -> Iterator[dict[str, Any]]:
     yield _row("lag", test.lag, "s")
     for name, value in test.at_end.items():
         figure = Figure.about(value.value, value.sigma) if not value.reason else Figure.none(value.reason)
-        yield _row(f"{name} at the end", figure, "1")
+        film = test.specimen.film_error_percent
+        yield _row(f"{name} at the end", figure.limited(film / 100, FILM) if film else figure, "1")
 
 
 def _row(name: str, figure: Figure, unit: str) -> dict[str, Any]:
@@ -132,7 +134,7 @@ def _row(name: str, figure: Figure, unit: str) -> dict[str, Any]:
         "confidence": CONFIDENCE if figure.known else None,
         "unit": unit,
         "reason": None if figure.known else figure.why or "not known",
-        "qualifier": getattr(figure, "qualifier", "") or None,
+        "qualifier": figure.qualifier or None,
     }
 
 

@@ -22,6 +22,7 @@ from live.results.finished.findings import findings
 from live.results.finished.finished_test import FinishedTest
 from live.results.run_folder import open_run
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
+from tests.live.results.finished.test_findings import FLAT
 from tests.live.results.finished.test_findings import test_of as made_test
 
 WITH_GAUGES = {**CONFIG, "gauges": GAUGES}
@@ -92,6 +93,22 @@ def test_strains_at_the_end_are_those_of_the_last_burst(tmp_path: Path) -> None:
     )
     assert found["exx at the end"]["value"] is None and found["exx at the end"]["reason"] == "no ZOI"
     assert found["gauge a at the end"]["value"] == 1e-3
+
+
+def test_a_film_qualifies_what_is_read_from_strains(tmp_path: Path) -> None:
+    """The interval of E holds the limit already, by the evaluation."""
+    plain = by_name(written(made_test(), tmp_path))
+    (tmp_path / FILE).unlink()
+    test = made_test(specimen=replace(FLAT, film_error_percent=10.0))
+    film = by_name(written(test, tmp_path))
+    qualified = {name for name, one in film.items() if one["qualifier"] == "film"}
+    assert {"E", "nu", "Rp0.2", "eyy at the end"} <= qualified and not {"Rm", "lag"} & qualified
+    end, before = film["eyy at the end"], plain["eyy at the end"]
+    assert end["value"] == before["value"]
+    assert end["low"] == pytest.approx(before["low"] - 0.002, abs=1e-5)
+    assert end["high"] == pytest.approx(before["high"] + 0.002, abs=1e-5)
+    assert film["E"]["high"] - film["E"]["low"] == pytest.approx(2 * 1.96 * 0.1 / 3**0.5 * 70e9, rel=0.03)
+    assert {one["qualifier"] for one in plain.values()} == {None}
 
 
 def test_it_is_never_overwritten(tmp_path: Path) -> None:
