@@ -79,7 +79,10 @@ def _figures(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
             line for line in [*elastic_lines(figures, specimen), *plastic_lines(figures, specimen)] if line
         ]
     if not np.isfinite(run_state.history.forces(run_state.loads)).any():
-        return ["E is not known: no force is known (--load)"]
+        if not run_state.with_load:
+            return ["E is not known: no force is known (--load)"]
+        last_t = run_state.history.time_steps[-1].t
+        return [f"E is not known: no burst has a force: {run_state.loads.why_none_at(last_t)}"]
     return [f"E is not known: {figures.E.why}", *figure_lines(figures, specimen)[:1]]
 
 
