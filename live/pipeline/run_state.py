@@ -198,10 +198,11 @@ class RunState:
             health.machine(now) | {FORCE: self.force(now, step)} | strains_at(now, health, self.history, step)
         )
         if ended:
-            figures = {name: figure.but(FigureState.ENDED) for name, figure in figures.items()}
-        if not self.with_load:
-            del figures[FORCE]
-        elif self.specimen.area_m2:
+            there = (
+                (name, figure) for name, figure in figures.items() if figure.state is not FigureState.NONE
+            )
+            figures = {name: figure.but(FigureState.ENDED) for name, figure in there}
+        if self.specimen.area_m2 and FORCE in figures:
             figures[STRESS] = figures[FORCE].scaled(1 / self.specimen.area_m2)
         return Snapshot(
             t=now,
@@ -224,4 +225,4 @@ class RunState:
 
     def force(self, now: float, step: TimeStep | None = None) -> TimedFigure:
         """The force at ``now`` (s, monotonic): the newest of the load cell, of recorded pictures that of ``step``."""
-        return force_at(now, self.health, self.loads, step)
+        return force_at(now, self.health, self.loads, step) if self.with_load else TimedFigure()

@@ -67,21 +67,23 @@ def brief_lines(run_state: RunState, test: FinishedTest) -> list[str]:
         f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
         f"strain along {axis} at the end: {strain_text(strain, sigma)} µm/m",
         *film_line(specimen),
-        *_figures(test),
+        *_figures(run_state, test),
         noise_line(history),
         *_remarks(run_state, test),
     ]
     return [line.strip() for line in lines]
 
 
-def _figures(test: FinishedTest) -> list[str]:
+def _figures(run_state: RunState, test: FinishedTest) -> list[str]:
     figures, specimen = test.figures, test.specimen
     if figures.E.known:
         return [
             line for line in [*elastic_lines(figures, specimen), *plastic_lines(figures, specimen)] if line
         ]
     if not test.has_force:
-        return ["E is not known: no force is known (--load)"]
+        last_t = run_state.history.time_steps[-1].t
+        why = f"no burst has a force: {run_state.loads.why_none_at(last_t)}"
+        return [f"E is not known: {why if run_state.with_load else 'no force is known (--load)'}"]
     odd = doubts(findings(test))
     why = figures.E.why + "; the first line above says what to look at" * bool(odd)
     return [f"E is not known: {why}", *figure_lines(figures, specimen)[:1]]
