@@ -12,6 +12,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import logging
 import os
@@ -63,6 +64,29 @@ def reason(error: Exception) -> str:
 
 
 log = logging.getLogger(__name__)
+_HELD = (errno.EAGAIN, errno.EACCES)
+
+
+def open_file(path: Path, mode: str = "r", **options: Any) -> h5py.File:
+    """Open an HDF5 file, without a lock where its file system has none; ``options`` as of ``h5py.File``.
+
+    Raises
+    ------
+    DataError
+        Another program has locked it.
+    OSError or RuntimeError
+        It cannot be opened.
+    """
+    try:
+        return h5py.File(path, mode, **options)
+    except OSError as error:
+        if "unable to lock file" not in str(error):
+            raise
+        if error.errno not in _HELD:
+            return h5py.File(path, mode, locking=False, **options)
+        raise DataError(
+            f"{path} is locked: another program has it open or writes to it; close it there, or wait, and call again"
+        ) from error
 
 
 def abandon_file(file: h5py.File) -> None:
@@ -108,7 +132,7 @@ def create_file(path: Path, declare: Callable[[h5py.File], object]) -> h5py.File
     except OSError:
         path.unlink(missing_ok=True)
         raise
-    file = h5py.File(path, "r+", libver=_BOUNDS, rdcc_nbytes=CACHE_BYTES)
+    file = open_file(path, "r+", libver=_BOUNDS, rdcc_nbytes=CACHE_BYTES)
     cache = file.id.get_mdc_config()
     cache.set_initial_size = True
     cache.initial_size = cache.min_size = cache.max_size = METADATA_BYTES
