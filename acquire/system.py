@@ -21,6 +21,7 @@ from types import FrameType
 
 _START_S = 10.0  # for the memory of another process's socket
 _CLOSED_POLL_S = 0.5
+_ROOT = Path(__file__).parents[1]
 _ARENA_MAX, _POOLS = -8, 2  # malloc.h
 
 if sys.platform == "win32":
@@ -83,6 +84,20 @@ def signal_handler(
 
 
 # -- processes --------------------------------------------------------------------------------
+
+
+def python_command(module: str, *words: str) -> list[str]:
+    """The command of a Python process that runs ``module``; a module in the working folder is not taken for another."""
+    return [sys.executable, "-P", "-m", module, *words]
+
+
+def python_environment(**more: str) -> dict[str, str]:
+    """The environment for ``python_command``, with this code in its path where it is not installed."""
+    paths = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    if _ROOT.name not in ("site-packages", "dist-packages"):  # they stand behind Python's own modules
+        paths = [str(_ROOT), *paths]
+    # An empty entry would be the working folder.
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths)), **more}
 
 
 def start_with_socket(

@@ -17,7 +17,6 @@ import io
 import logging
 import os
 import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,12 +25,13 @@ from typing import Any
 import h5py
 
 from acquire.errors import DataError
+from acquire.system import python_command, python_environment
 
 PROBE_S = 30.0  # HDF5 retries a bad checksum of an unfinished file for ever
 
 
 def probe(path: Path, package: str, timeout_s: float | None = None, *, words: Sequence[str] = ()) -> None:
-    """Read ``path`` by ``python -m package path``, with more ``words``, first.
+    """Read ``path`` by ``python -P -m package path``, with more ``words``, first.
 
     Parameters
     ----------
@@ -43,11 +43,11 @@ def probe(path: Path, package: str, timeout_s: float | None = None, *, words: Se
     DataError
         The child crashed, did not end in time, or refused the file itself.
     """
-    command = [sys.executable, "-m", package, str(path), *words]
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, timeout=timeout_s or PROBE_S, check=False
-        )
+            python_command(package, str(path), *words), env=python_environment(), capture_output=True, text=True,
+            errors="backslashreplace", timeout=timeout_s or PROBE_S, check=False,
+        )  # fmt: skip
     except subprocess.TimeoutExpired as error:
         raise DataError(f"{path} is damaged: reading it does not come to an end") from error
     if done.returncode != 0:
