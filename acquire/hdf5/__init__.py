@@ -37,6 +37,7 @@ from acquire.hdf5.tables import (
     new_group,
     new_json,
     set_attributes,
+    storable,
     to_json,
 )
 
@@ -75,6 +76,7 @@ __all__ = [
     "read_superblock",
     "reason",
     "set_attributes",
+    "storable",
     "stored_rows",
     "to_json",
 ]
