@@ -7,7 +7,7 @@ kept.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -114,9 +114,10 @@ def true_at_top(strength: Figure, strain: Figure) -> tuple[Figure, Figure]:
 
     Volume is kept, and the strain is uniform up to there. Both must be known.
     """
-    stretch = strain.minus(-1.0)
-    stress = Figure(strength.value * stretch.value, strength.low * stretch.low, strength.high * stretch.high)
-    return stress, Figure(math.log(stretch.value), math.log(stretch.low), math.log(stretch.high))
+    stretch, ends = strain.minus(-1.0), ("value", "low", "high")
+    stress = {end: getattr(strength, end) * getattr(stretch, end) for end in ends}
+    log = {end: math.log(getattr(stretch, end)) for end in ends}
+    return replace(strength, **stress, why=""), replace(strain, **log, why="")
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from acquire.load_cell import LoadLog
 from analysis.evaluate import (
+    AT_LEAST,
     CONFIDENCE,
     STANDARDS,
     ErrorLimits,
@@ -54,9 +55,10 @@ def value_text(value: float, sigma: float, unit: str) -> str:
 
 
 def figure_text(figure: Figure, unit_is: float = 1.0, unit: str = "") -> str:
-    """A figure with the larger half of its interval, in ``unit``, which is ``unit_is`` in SI units."""
+    """A figure with the larger half of its interval, or as a bound, in ``unit``, which is ``unit_is`` in SI units."""
     half = max(figure.high - figure.value, figure.value - figure.low)
-    return value_text(figure.value / unit_is, half / unit_is, unit)
+    words = f"{AT_LEAST} " if figure.is_bound else ""
+    return words + value_text(figure.value / unit_is, half / unit_is, unit)
 
 
 @dataclass(frozen=True, slots=True)

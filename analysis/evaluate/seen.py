@@ -1,0 +1,116 @@
+"""What of the force was seen: readings that their neighbours confirm, and gaps that may hide the highest force."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.evaluate.curve import Curve, Floats, broken_at, noise, running_median
+
+_USUAL, _STEEP, _SURE = (
+    95,
+    4.0,
+    8.0,
+)  # percentile of the rises; times those, and standard deviations of the noise
+_RUN, _LONGEST, _SHARE = 3, 0.025, 0.1  # readings in a row, or share of all; and of all together
+_FEWEST = 12  # readings that know what is usual
+_GAP = 2.5  # usual intervals
+
+
+def confirmed(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
+    """The curve without stresses that rise in no time and come back, and words that name those.
+
+    A stress is reached through its neighbours: it rises from one reading to the next by no more than a few times what
+    is usual, unless the strain jumps as well. A break falls and does not come back; a jump that stays is no single
+    reading.
+    """
+    known = np.flatnonzero(np.isfinite(curve.stress))
+    stress, strain = curve.stress[known], curve.strain[known]
+    alone = _alone(stress, strain)
+    if not alone.any():
+        return curve, ()
+    rows = known[alone]
+    highest = int(rows[np.argmax(curve.stress[rows])])
+    words = (
+        f"{len(rows)} forces that no neighbour confirms are left out,"
+        f" the highest {curve.stress[highest] / np.max(stress[~alone]):.3g} times the highest of the others,"
+        f" at {curve.t[highest] - curve.t[0]:.4g} s"
+    )
+    return replace(curve, stress=np.where(np.isin(np.arange(len(curve.t)), rows), math.nan, curve.stress)), (
+        words,
+    )
+
+
+def _alone(stress: Floats, strain: Floats) -> NDArray[np.bool_]:
+    """Which stresses lie far above those before them, and are followed by one that does not, (N,)."""
+    n, alone = len(stress), np.zeros(len(stress), np.bool_)
+    rises, pulls = np.diff(stress), np.diff(strain)
+    if n < _FEWEST or not (rises > 0).any():
+        return alone
+    longest = max(_RUN, round(_LONGEST * n))
+    usual = max(
+        float(np.percentile(rises[rises > 0], _USUAL)),
+        float(np.diff(running_median(stress, longest)).max()),
+    )
+    most = _STEEP * usual + _SURE * noise(stress)
+    pulled = pulls[np.isfinite(pulls)]
+    jump = _STEEP * float(np.percentile(np.abs(pulled), _USUAL)) if len(pulled) else math.inf
+    k = 0
+    while k < n - 1:
+        if rises[k] <= most or abs(pulls[k]) > jump:
+            k += 1
+            continue
+        back = np.flatnonzero(stress[k + 1 : k + 2 + longest] <= stress[k] + most)
+        if len(back) or k + 2 == n:
+            alone[k + 1 : k + 1 + (int(back[0]) if len(back) else 1)] = True
+        k += 1 + (int(back[0]) if len(back) else 0)
+    return alone if alone.sum() <= _SHARE * n else np.zeros(n, np.bool_)
+
+
+@dataclass(frozen=True, slots=True)
+class Unseen:
+    """A gap in the force that may hide the highest stress.
+
+    Attributes
+    ----------
+    before, after : int
+        Rows of the curve with the last force before it and the first after it; ``after`` is -1 at the end.
+    words : str
+    """
+
+    before: int
+    after: int
+    words: str
+
+
+def unseen(curve: Curve) -> Unseen | None:
+    """The first gap up to the break in which the stress may have passed the highest that is known, or None.
+
+    One after the highest stress counts where it is longer than the usual interval; any other where the stress could
+    pass the highest at the fastest rise of the test.
+    """
+    stop = broken_at(curve.stress, curve.strain)
+    known = np.flatnonzero(np.isfinite(curve.stress[: len(curve.t) if stop is None else stop + 1]))
+    if len(known) < 3:
+        return None
+    t, stress = curve.t[known], curve.stress[known]
+    next_to = np.diff(known) == 1
+    usual = float(np.median(np.diff(curve.t)))
+    rises = (np.diff(stress) / np.maximum(np.diff(t), 1e-9))[next_to]
+    fastest = float(np.percentile(rises, _USUAL)) if len(rises) else math.inf
+    ends = np.append(stress[1:], -math.inf if stop is None else 0.0)
+    spans = np.append(np.diff(t), 0.0 if stop is not None else curve.t[-1] - t[-1])
+    reached = np.where(np.isfinite(ends), (stress + ends + fastest * spans) / 2, stress + fastest * spans)
+    top = int(np.argmax(stress))
+    missing = np.append(~next_to, spans[-1] > _GAP * usual)
+    late = (np.arange(len(known)) >= top) & (spans > _GAP * usual)
+    hidden = np.flatnonzero(missing & (late | (reached > stress[top])))
+    if not len(hidden):
+        return None
+    k = int(hidden[0])
+    after = int(known[k + 1]) if k + 1 < len(known) else -1
+    until = f"to {curve.t[after] - curve.t[0]:.4g} s" if after >= 0 else "on"
+    return Unseen(int(known[k]), after, f"no force is known from {t[k] - curve.t[0]:.4g} s {until}")
