@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -115,9 +115,9 @@ def true_at_top(strength: Figure, strain: Figure) -> tuple[Figure, Figure]:
     Volume is kept, and the strain is uniform up to there. Both must be known.
     """
     stretch, ends = strain.minus(-1.0), ("value", "low", "high")
-    stress = {end: getattr(strength, end) * getattr(stretch, end) for end in ends}
-    log = {end: math.log(getattr(stretch, end)) for end in ends}
-    return replace(strength, **stress, why=""), replace(strain, **log, why="")
+    stress: dict[str, Any] = {end: getattr(strength, end) * getattr(stretch, end) for end in ends}
+    logarithm: dict[str, Any] = {end: math.log(getattr(stretch, end)) for end in ends}
+    return replace(strength, **stress, why=""), replace(strain, **logarithm, why="")
 
 
 @dataclass(frozen=True, slots=True)

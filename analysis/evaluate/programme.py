@@ -60,12 +60,13 @@ class Programme:
     end: int | None = None
 
     @classmethod
-    def of(cls, curve: Curve, given: Kind | Literal["auto"] = "auto") -> Programme:
+    def of(cls, curve: Curve, given: str = "auto") -> Programme:
         """As ``given``, or found from the course of ``curve``."""
         found, how, end = _found(curve)
         if given == "auto":
             return cls(found, _NAMES[found] + how, None if found == "tensile" else end)
-        return cls(given, f"{_NAMES[given]}, as given", end if given == found != "tensile" else None)
+        kind = next(one for one in KINDS if one == given)
+        return cls(kind, f"{_NAMES[kind]}, as given", end if kind == found != "tensile" else None)
 
     @property
     def why(self) -> str:

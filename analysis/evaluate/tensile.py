@@ -27,7 +27,7 @@ from analysis.evaluate.elastic import (
 )
 from analysis.evaluate.figure import Figure
 from analysis.evaluate.flow import anisotropy, hardening
-from analysis.evaluate.programme import Kind, Programme
+from analysis.evaluate.programme import KINDS, Kind, Programme
 from analysis.evaluate.rates import midway, seconds_of, strain_rate
 from analysis.evaluate.seen import Unseen, confirmed, unseen
 from analysis.evaluate.standards import STANDARDS, Standard
@@ -71,11 +71,13 @@ class TensileOptions:
     zero: ZeroBy = "raw"
     preload: float = 0.0
     limits: ErrorLimits = field(default_factory=ErrorLimits)
-    test: Kind | Literal["auto"] = "auto"
+    test: str = "auto"
 
     def __post_init__(self) -> None:
         if self.zero not in ("raw", "toe", "preload"):
             raise ValueError(f"unknown zero {self.zero!r}; known: raw, toe, preload")
+        if self.test not in ("auto", *KINDS):
+            raise ValueError(f"unknown test {self.test!r}; known: auto, {', '.join(KINDS)}")
         if self.zero == "preload" and not self.preload > 0:
             raise ValueError("a zero at a preload needs that preload, in Pa above 0")
 

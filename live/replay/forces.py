@@ -96,7 +96,7 @@ class ForceTable:
         """The samples as a closed log; a gap is at least three median intervals of a table with times."""
         steps = np.diff([sample.t for sample in samples])
         gap = math.inf if self.names else max(max_gap_s, 3 * float(np.median(steps)) if len(steps) else 0.0)
-        log = LoadLog(gap, lag_s)
+        log = LoadLog(gap, lag_s, by_name=bool(self.names))
         for sample in samples:
             log.append(sample)
         log.close()
