@@ -38,7 +38,7 @@ _HELD_TIME, _HELD = (
     0.03,
 )  # share of the time from there on, and of the range, within which a value is held
 _STILL_LOADED, _RELAXED = 0.2, 0.01  # of the highest stress: what a hold keeps, and loses
-_SLOW = 0.5  # of the strain rate of the loading: a creep is slower
+_SLOW = 0.8  # of the strain rate of the loading: a creep is slower
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +151,9 @@ def _hold(t: Floats, strain: Floats, stress: Floats) -> tuple[Kind, int] | None:
             continue
         level = smoothed(other, 2)
         gone, before = float(level[-1] - level[since]), float(level[since] - level[start])
-        if kind == "relaxation" and -gone > max(_RELAXED * top, _SURE * noise(stress)):
+        if kind == "relaxation" and level[since:].max() - level[-1] > max(
+            _RELAXED * top, _SURE * noise(stress)
+        ):
             return "relaxation", since
         slow = gone * (t[since] - t[start]) < _SLOW * before * (t[-1] - t[since])
         if kind == "creep" and slow:

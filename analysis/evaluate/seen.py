@@ -16,6 +16,7 @@ _USUAL, _STEEP, _SURE = (
     8.0,
 )  # percentile of the rises; times those, and standard deviations of the noise
 _RUN, _LONGEST, _SHARE = 3, 0.025, 0.1  # readings in a row, or share of all; and of all together
+_PART = 0.01  # of the strain: over so much the steepest rise is read
 _FEWEST = 12  # readings that know what is usual
 _GAP = 2.5  # usual intervals
 
@@ -24,8 +25,8 @@ def confirmed(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
     """The curve without stresses that rise in no time and come back, and words that name those.
 
     A stress is reached through its neighbours: it rises from one reading to the next by no more than a few times what
-    is usual, unless the strain jumps as well. A break falls and does not come back; a jump that stays is no single
-    reading.
+    is usual, and by what the strain that comes with it makes of it. A break falls and does not come back; a jump that
+    stays is no single reading.
     """
     known = np.flatnonzero(np.isfinite(curve.stress))
     stress, strain = curve.stress[known], curve.strain[known]
@@ -51,23 +52,34 @@ def _alone(stress: Floats, strain: Floats) -> NDArray[np.bool_]:
     if n < _FEWEST or not (rises > 0).any():
         return alone
     longest = max(_RUN, round(_LONGEST * n))
-    usual = max(
-        float(np.percentile(rises[rises > 0], _USUAL)),
-        float(np.diff(running_median(stress, longest)).max()),
-    )
-    most = _STEEP * usual + _SURE * noise(stress)
-    pulled = pulls[np.isfinite(pulls)]
-    jump = _STEEP * float(np.percentile(np.abs(pulled), _USUAL)) if len(pulled) else math.inf
+    level = running_median(stress, longest)
+    usual = max(float(np.percentile(rises[rises > 0], _USUAL)), float(np.diff(level).max()))
+    pulled = _STEEP * _stiffness(strain, level) * np.nan_to_num(np.maximum(pulls, 0.0))
+    most = _STEEP * usual + _SURE * noise(stress) + pulled
     k = 0
     while k < n - 1:
-        if rises[k] <= most or abs(pulls[k]) > jump:
+        if rises[k] <= most[k]:
             k += 1
             continue
-        back = np.flatnonzero(stress[k + 1 : k + 2 + longest] <= stress[k] + most)
+        back = np.flatnonzero(stress[k + 1 : k + 2 + longest] <= stress[k] + most[k])
         if len(back) or k + 2 == n:
             alone[k + 1 : k + 1 + (int(back[0]) if len(back) else 1)] = True
         k += 1 + (int(back[0]) if len(back) else 0)
     return alone if alone.sum() <= _SHARE * n else np.zeros(n, np.bool_)
+
+
+def _stiffness(strain: Floats, level: Floats) -> float:
+    """The steepest rise of the stress over the strain, Pa; 0 where strain is not known."""
+    known = np.isfinite(strain)
+    highest = np.maximum.accumulate(strain[known])
+    if len(highest) < _FEWEST:
+        return 0.0
+    span = max(_PART * float(np.ptp(highest)), 20 * noise(strain))
+    on = np.searchsorted(highest, highest + span)
+    inside = on < len(highest)
+    rise = level[known][np.minimum(on, len(highest) - 1)] - level[known]
+    run = highest[np.minimum(on, len(highest) - 1)] - highest
+    return float(np.max(rise[inside] / run[inside], initial=0.0)) if span > 0 else 0.0
 
 
 @dataclass(frozen=True, slots=True)

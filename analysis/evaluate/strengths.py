@@ -9,10 +9,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.evaluate.curve import ENOUGH, Curve, Floats, Loading, first_crossing, noise, reading, smoothed
 from analysis.evaluate.elastic import FittedLine
 from analysis.evaluate.figure import Figure, quantile
+
+Indices = NDArray[np.intp]
 
 _DROP, _RANGE = (
     0.005,
@@ -60,8 +63,9 @@ def proof_strength(loading: Loading, line: FittedLine, offset: float) -> Figure:
     doubt = math.hypot(strain.sigma, line.sigma_at(value))
     found = Figure.about(value, math.hypot(stress.sigma, hardening * doubt), max(last - first - 3, 4))
     if last - first >= ENOUGH:
-        return found
-    between = _bend(loading.stress, at) + hardening * _bend(plastic, at)
+        between = _waves(loading, at, stress.value, np.arange(first, last))
+    else:
+        between = _bend(loading.stress, at) + hardening * _bend(plastic, at)
     return replace(found, low=found.low - between, high=found.high + between)
 
 
@@ -102,6 +106,10 @@ def highest_stress(loading: Loading, at: int) -> Figure:
     before = max(at - _BEFORE, 0)
     rise = max(float(stress[at] - stress[before]), 0.0) / max(at - before, 1)
     value = float(stress[at])
+    # Where samples lie farther apart from here on, more may lie between them.
+    steps = np.diff(loading.strain[before : at + 2])
+    if at > before and at + 1 < loading.n and steps[-1] > 2 * (usual := float(steps[:-1].mean())) > 0:
+        rise *= float(steps[-1]) / usual
     return Figure(value, value - lifted, value + quantile() * sigma + rise)
 
 
@@ -144,14 +152,13 @@ def _lower(loading: Loading, at: int, passed: int, upper: Figure) -> Figure:
     part = plateau[after[plateau] <= _PLATEAU]
     if not len(part):
         return Figure.none("the plateau is too short to tell the lower yield strength")
-    # Means over a good part of a wave would pass over its lowest value.
-    narrow = round(_FINE / max(float(np.ptp(loading.course[part])) / max(len(part) - 1, 1), 1e-12) / 2)
-    half = min(loading.half, narrow)
-    level = loading.level if half == loading.half else smoothed(loading.stress, half)
+    half, level = _fine(loading, part)
     doubt = _SURE * loading.noise_stress / math.sqrt(2 * half + 1)
     lowest = int(part[np.argmin(level[part])])
     value, least = float(level[lowest]), float(level[plateau].min())
-    bend = float(np.abs(np.diff(level[max(lowest - 2, 0) : lowest + 3], 2)).max(initial=0.0)) / 2
+    # What means over a bottom lift it by, and what lies between two samples there.
+    reach = min(max(half, 1), lowest, loading.n - 1 - lowest)
+    bend = max(float(level[lowest - reach] - 2 * value + level[lowest + reach]), 0.0) / 2
     return Figure(min(value, upper.value), min(value, least) - doubt - bend, min(value + doubt, upper.high))
 
 
@@ -176,6 +183,20 @@ def _bend(values: Floats, at: float) -> float:
     if before < 1 or len(near) < 4:
         return abs(float(values[before + 1] - values[before]))
     return float(np.abs(np.diff(near, 2)).sum()) / 4
+
+
+def _fine(loading: Loading, part: Indices) -> tuple[int, Floats]:
+    """Running means of the stress over no more than a part of a wave, and half the width of them, samples."""
+    a_sample = float(np.diff(loading.course[part]).max(initial=0.0))
+    half = min(loading.half, round(_FINE / max(a_sample, 1e-12) / 2))
+    return half, loading.level if half == loading.half else smoothed(loading.stress, half)
+
+
+def _waves(loading: Loading, at: float, value: float, part: Indices) -> float:
+    """How far the stress at ``at`` may be from a parabola over ``part``: where it waves, beyond noise."""
+    half, level = _fine(loading, part)
+    off = abs(float(np.interp(at, np.arange(loading.n), level)) - value)
+    return 1.25 * off if off > _SURE * loading.noise_stress / math.sqrt(2 * half + 1) else 0.0
 
 
 def _around(course: Floats, at: float, low: float, high: float) -> tuple[int, int]:

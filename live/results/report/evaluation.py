@@ -79,7 +79,7 @@ def intercept_of(axial: Array, load: Array, figures: TensileFigures) -> float:
 
 
 def lag_of(run: RunFolder) -> Figure:
-    """The lag of the load behind the frames, s: as the run told it (figures.json), else found from what was recorded."""
+    """The lag of the load behind the frames, s: as the run told it (figures.json), else from what was recorded."""
     if (told := _lag_told(run.path / FIGURES)) is not None:
         return told
     samples = run.load_samples
