@@ -10,15 +10,14 @@ from numpy.typing import NDArray
 
 from analysis.evaluate.curve import Curve, Floats, broken_at, noise, running_median
 
-_USUAL, _STEEP, _SURE = (
-    95,
-    4.0,
-    8.0,
-)  # percentile of the rises; times those, and standard deviations of the noise
+_USUAL, _STEEP = 75, 3.0  # percentile of the rises, and times those
+_SURE = 8.0  # standard deviations of the noise
+_PULLED = 2.5  # times the steepest rise over the strain
+_BESIDE = 0.99  # of the highest stress: a gap before it is beside it
 _RUN, _LONGEST, _SHARE = 3, 0.025, 0.1  # readings in a row, or share of all; and of all together
 _PART = 0.01  # of the strain: over so much the steepest rise is read
 _FEWEST = 12  # readings that know what is usual
-_GAP = 2.5  # usual intervals
+_GAP, _FASTEST = 2.5, 95  # usual intervals; percentile of the rises
 
 
 def confirmed(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
@@ -36,9 +35,9 @@ def confirmed(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
     rows = known[alone]
     highest = int(rows[np.argmax(curve.stress[rows])])
     words = (
-        f"{len(rows)} forces that no neighbour confirms are left out,"
-        f" the highest {curve.stress[highest] / np.max(stress[~alone]):.3g} times the highest of the others,"
-        f" at {curve.t[highest] - curve.t[0]:.4g} s"
+        f"forces left out because no neighbour confirms them: {len(rows)}, the highest, at"
+        f" {curve.t[highest] - curve.t[0]:.4g} s, {curve.stress[highest] / np.max(stress[~alone]):.3g} times"
+        " the highest of the others"
     )
     return replace(curve, stress=np.where(np.isin(np.arange(len(curve.t)), rows), math.nan, curve.stress)), (
         words,
@@ -54,8 +53,8 @@ def _alone(stress: Floats, strain: Floats) -> NDArray[np.bool_]:
     longest = max(_RUN, round(_LONGEST * n))
     level = running_median(stress, longest)
     usual = max(float(np.percentile(rises[rises > 0], _USUAL)), float(np.diff(level).max()))
-    pulled = _STEEP * _stiffness(strain, level) * np.nan_to_num(np.maximum(pulls, 0.0))
-    most = _STEEP * usual + _SURE * noise(stress) + pulled
+    pulled = _PULLED * _stiffness(strain, level) * np.nan_to_num(np.maximum(pulls, 0.0))
+    most = np.maximum(_STEEP * usual, pulled) + _SURE * noise(stress)
     k = 0
     while k < n - 1:
         if rises[k] <= most[k]:
@@ -98,11 +97,11 @@ class Unseen:
     words: str
 
 
-def unseen(curve: Curve) -> Unseen | None:
+def unseen(curve: Curve, measured: Curve) -> Unseen | None:
     """The first gap up to the break in which the stress may have passed the highest that is known, or None.
 
-    One after the highest stress counts where it is longer than the usual interval; any other where the stress could
-    pass the highest at the fastest rise of the test.
+    One after the highest stress counts where it is longer than the usual interval; one beside it, or of forces that
+    ``measured`` has and ``curve`` has not, where the stress could pass the highest at the fastest rise of the test.
     """
     stop = broken_at(curve.stress, curve.strain)
     known = np.flatnonzero(np.isfinite(curve.stress[: len(curve.t) if stop is None else stop + 1]))
@@ -112,14 +111,20 @@ def unseen(curve: Curve) -> Unseen | None:
     next_to = np.diff(known) == 1
     usual = float(np.median(np.diff(curve.t)))
     rises = (np.diff(stress) / np.maximum(np.diff(t), 1e-9))[next_to]
-    fastest = float(np.percentile(rises, _USUAL)) if len(rises) else math.inf
+    fastest = float(np.percentile(rises, _FASTEST)) if len(rises) else math.inf
     ends = np.append(stress[1:], -math.inf if stop is None else 0.0)
     spans = np.append(np.diff(t), 0.0 if stop is not None else curve.t[-1] - t[-1])
     reached = np.where(np.isfinite(ends), (stress + ends + fastest * spans) / 2, stress + fastest * spans)
     top = int(np.argmax(stress))
     missing = np.append(~next_to, spans[-1] > _GAP * usual)
-    late = (np.arange(len(known)) >= top) & (spans > _GAP * usual)
-    hidden = np.flatnonzero(missing & (late | (reached > stress[top])))
+    left_out = np.cumsum(np.isfinite(measured.stress) & ~np.isfinite(curve.stress))[known]
+    late = (
+        (np.arange(len(known)) >= top)
+        & (spans > _GAP * usual)
+        & (np.diff(left_out, append=left_out[-1]) == 0)
+    )
+    beside = (reached > stress[top]) & (np.maximum(stress, ends) > _BESIDE * stress[top])
+    hidden = np.flatnonzero(missing & (late | beside))
     if not len(hidden):
         return None
     k = int(hidden[0])

@@ -154,12 +154,16 @@ def _lower(loading: Loading, at: int, passed: int, upper: Figure) -> Figure:
         return Figure.none("the plateau is too short to tell the lower yield strength")
     half, level = _fine(loading, part)
     doubt = _SURE * loading.noise_stress / math.sqrt(2 * half + 1)
-    lowest = int(part[np.argmin(level[part])])
-    value, least = float(level[lowest]), float(level[plateau].min())
-    # What means over a bottom lift it by, and what lies between two samples there.
-    reach = min(max(half, 1), lowest, loading.n - 1 - lowest)
-    bend = max(float(level[lowest - reach] - 2 * value + level[lowest + reach]), 0.0) / 2
-    return Figure(min(value, upper.value), min(value, least) - doubt - bend, min(value + doubt, upper.high))
+    value = float(level[part].min())
+    least = min(value, float((level - _hidden_bottom(level, max(half, 1), doubt))[plateau].min()))
+    return Figure(min(value, upper.value), least - doubt, min(value + doubt, upper.high))
+
+
+def _hidden_bottom(level: Floats, reach: int, doubt: float) -> Floats:
+    """How far a bottom may lie below each value: lifted by means, or between two samples, (N,)."""
+    bend = np.zeros(len(level))
+    bend[reach:-reach] = level[: -2 * reach] - 2 * level[reach:-reach] + level[2 * reach :]
+    return np.where(bend > 2 * doubt, bend / 2, 0.0)
 
 
 def _doubt(loading: Loading) -> float:

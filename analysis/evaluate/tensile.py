@@ -186,7 +186,7 @@ def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> Tensil
     if programme.why:
         found = _untensile(_evaluated(programme.first_rise(sure), options), programme.why)
     else:
-        gap = unseen(sure)
+        gap = unseen(sure, curve)
         found = _evaluated(sure, options) if gap is None else _bounded(_evaluated(sure, options), sure, gap)
         notes += () if gap is None else (gap.words,)
     if programme.why or options.test != "auto":
