@@ -275,7 +275,7 @@ class _Reader:
         elif at is not None or NUMBERISH.fullmatch(key) or (not key and force is not None and value):
             bad = value if force is None else key
             raise DataError(
-                f"{self._where}: line {line}: {bad[:40]!r} in {','.join(row)[:60]!r} is not a number with a decimal"
+                f"{self._where}: line {line}: {bad[:40]!r} in {self._table.separator.join(row)[:60]!r} is not a number with a decimal"
                 f" {self._decimal}; mend it, or give --load-decimal point or comma"
             )
         else:
@@ -375,7 +375,13 @@ class _Reader:
     def _taken(self, forces: Array, clock: str) -> str:
         t = self._table
         low, high = _shown(np.nanmin(forces)), _shown(np.nanmax(forces))
-        kind = "times of the day" if self._is_clock else self._time_unit or "s"
+        kind = (
+            "times of the day"
+            if clock == "clock"
+            else "h:min:s"
+            if self._is_clock
+            else self._time_unit or "s"
+        )
         kind = f" ({'Unix times' if clock == 'unix' else kind})" if not t.by_name else ""
         against = f" against {t.name(t.key)}{kind}" if t.key is not None else ""
         return (
