@@ -7,7 +7,6 @@ be the force are refused with the option that settles it (docs/load-cells.md).
 from __future__ import annotations
 
 import csv
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import BinaryIO
@@ -22,22 +21,13 @@ from live.replay.export_headings import (
     newtons_of,
     plain_unit,
 )
+from live.replay.export_numbers import CLOCK, EMPTY, NUMBERISH
 from live.replay.export_text import HEAD, Rows, encoding_of, lines_of, split_rows
 
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", "  ": "blanks", " ": "blanks"}
 _BETWEEN = 5  # lines of text and blanks between a heading and its rows, at most
 _SHORT = {"file", "time", "time_s", "t", "force", "F"}
 """Our own headings; with them a force without a unit is in newtons."""
-
-NUMBERISH = re.compile(r"[-+\u2212]?[.,]?\d[\d.,'\u2019 \u00a0\u2009\u202f]*(?:[eE][-+]?\d+)?")
-"""A number in any form, not yet read."""
-CLOCK = re.compile(
-    r"(?:(\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[T ]+)?(?:(\d{1,3}):)?(\d{1,2}):(\d{1,2})(?:([.,:])(\d+))?"
-    r"\s*(?:([AaPp])\.?[Mm]\.?|Z|UTC|[-+]\d\d:?\d\d)?"
-)
-"""Date, hours, minutes, seconds, mark, fraction, A or P of a time of the day or an elapsed one."""
-EMPTY = ("", "nan", "-", "--", "---", "n/a", "#n/a", "#nv", "null", "1.#qnan", "-1.#ind")
-"""Cells without a force, in lower case."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,8 +176,8 @@ class _Search:
         below = [i for i in range(k + 1, min(k + 2 + _BETWEEN, len(self.rows))) if self.rows[i]]
         between = next((n for n, i in enumerate(below) if _has_value(self.rows[i])), 0)
         texts = [self.rows[i] for i in below[:between]]
-        called = [row for row in self.rows[:k] if row[:1] == ["Y_Unit_Label"]][-1:]  # LabVIEW
-        heads = self._with_units(self.rows[k], [*filter(_is_units, texts), *called])
+        labels = [["s", *row[1:]] for row in self.rows[:k] if row[:1] == ["Y_Unit_Label"]]  # LabVIEW
+        heads = self._with_units(self.rows[k], [*filter(_is_units, texts), *labels[-1:]])
         first = below[between] if below else len(self.rows)
         heads = self._fitting(heads, len(self.rows[first]) if below else len(heads))
         columns = self._columns(heads)
@@ -211,7 +201,8 @@ class _Search:
                 raise DataError(
                     f"{self.where}: {head!r} has the unit {unit!r} below it: which one? give --load-unit"
                 )
-            found.append(f"{head} [{unit}]" if unit and not own else head)
+            below = f"{head} [{unit}]"
+            found.append(below if not own and name_and_unit(below)[1] else head)
         return found
 
     def _fitting(self, heads: list[str], width: int) -> list[str]:
