@@ -220,3 +220,41 @@ def test_names_must_fit(shots: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
     assert cv2.imwritemulti(str(stack), [cv2.imread(str(shots / f"a{k}.png"), 0) for k in range(3)])
     assert replayed(shots, tmp_path, "file,force_N\na0.png,1\n", source=str(stack))[0] == 2
     assert "two pictures share a name" in capsys.readouterr().err
+
+
+def test_what_was_taken_is_printed_and_the_sign_turns_forces_of_files_and_recordings(
+    shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = "Zeit [s];Kraft [kN]\n" + "".join(f"{t};{-0.01 * t:.4f}\n".replace(".", ",") for t in range(6))
+    code, out = replayed(shots, tmp_path, text, "--load-sign", "-1")
+    assert code == 0
+    assert (
+        "forces.csv: column Kraft, kN, 6 rows, 0 to 50 N against Zeit (s); UTF-8, semicolons, decimal comma;"
+        " 6 of 6 pictures have a force"
+    ) in capsys.readouterr().out
+    with open_run(out) as run:
+        np.testing.assert_allclose(run.force, 10 * run.strain.time_s, rtol=1e-9)
+    live = tmp_path / "run"
+    cell = ["--load", "sim:?noise_N=0", "--camera", "sim:uniform?fps=20"]
+    assert main(["run", *cell, "--seconds", "2", *SMALL, "--out", str(live)]) in (0, 5)  # 5: a busy machine
+    forces = []
+    for sign in ("1", "-1"):
+        folder = tmp_path / f"sign{sign}"
+        assert main(["replay", str(live), "--load-sign", sign, *SMALL, "--out", str(folder)]) == 0
+        with open_run(folder) as run:
+            forces.append(run.force)
+    assert np.nanmax(np.abs(forces[0])) > 0
+    np.testing.assert_allclose(forces[1], -forces[0])
+
+
+def test_a_test_with_a_load_cell_takes_the_sign_from_its_address(tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[camera]\naddress = "sim:"\n[load]\naddress = "sim:"\nsign = -1\n', encoding="utf-8")
+    assert main(["run", "--config", str(rig), "--seconds", "1", "--out", str(tmp_path / "out")]) == 2
+
+
+def test_half_without_a_force_is_exit_code_5(
+    shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert replayed(shots, tmp_path, "time_s,force_N\n" + "".join(f"{t},{t}\n" for t in range(3)))[0] == 5
+    assert "3 of 6 pictures have a force" in capsys.readouterr().out
