@@ -235,7 +235,7 @@ def test_what_was_taken_is_printed_and_the_sign_turns_forces_of_files_and_record
     with open_run(out) as run:
         np.testing.assert_allclose(run.force, 10 * run.strain.time_s, rtol=1e-9)
     live = tmp_path / "run"
-    cell = ["--load", "sim:?noise_N=0", "--camera", "sim:uniform?fps=20"]
+    cell = ["--load", "sim:?noise_N=3", "--camera", "sim:uniform?fps=20"]
     assert main(["run", *cell, "--seconds", "2", *SMALL, "--out", str(live)]) in (0, 5)  # 5: a busy machine
     forces = []
     for sign in ("1", "-1"):
