@@ -35,7 +35,7 @@ class ReplayRequest:
     start_s, end_s : float or None, s
         Part of the session, in seconds since its start.
     reference : str or None
-        An image file as the reference, in place of the first pictures.
+        An image file as the reference, or the name of one of the pictures, in place of the first.
     forces : Path or None
         A file with the forces (``live.replay.forces``).
     config_file : Path or None
@@ -98,6 +98,8 @@ class ReplaySource:
         The pictures so far; None for a session, whose bursts have the number of lost frames.
     doubts : tuple of str
         What makes the result incomplete.
+    words : str
+        Which picture is the reference, which the last, and how many there are.
     """
 
     camera: CameraInfo
@@ -111,6 +113,7 @@ class ReplaySource:
     times: NDArray[np.float64] | None = None
     count: PictureCount | None = None
     doubts: tuple[str, ...] = ()
+    words: str = ""
 
 
 def check_window(request: ReplayRequest) -> None:
