@@ -122,7 +122,8 @@ def test_some_options_are_switches_and_some_are_for_experts() -> None:
     assert {name for name, one in found.items() if one.on} == {"armed", "light", "report"}
     assert {name for name, one in found.items() if one.off} == {"no-record", "no-view", "no-rrd"}
     assert {name for name, one in found.items() if not one.expert} == {
-        "camera", "back", "beside", "load", "load-unit", "load-column", "load-decimal", "load-sign", "roi", "zoi", "step", "burst", "mask", "gauges", "strain", "scale",
+        "camera", "back", "beside", "load", "load-unit", "load-column", "load-decimal", "load-sign",
+        "roi", "zoi", "step", "burst", "mask", "gauges", "strain", "scale",
         "no-record", "armed", "orders", "strain-out", "no-view", "axis", "out", "seconds", "report",
     }  # fmt: skip
     keys = {name: key for name, (key, _) in options().items()}
