@@ -29,6 +29,11 @@ EMPTY = ("", "nan", "-", "--", "---", "n/a", "#n/a", "#nv", "null", "1.#qnan", "
 """Cells without a force, in lower case."""
 
 
+def is_value(cell: str) -> bool:
+    """Whether a cell is a number or a time in any form."""
+    return bool(NUMBERISH.fullmatch(cell) or CLOCK.fullmatch(cell))
+
+
 def vote(cell: str) -> str:
     """The decimal mark that a number proves; "?" where three digits may be thousands; "" without a mark."""
     body = re.sub(f"[-+\u2212{_BETWEEN_THOUSANDS}]|[eE].*", "", cell)
