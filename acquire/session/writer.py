@@ -302,7 +302,7 @@ class SessionWriter(Closing):
             raise DataError(words if self.is_gone else _write_failure(self.path, error)) from error
 
     def _watch_file(self) -> None:
-        """Raise OSError where somebody else has removed, cut or renamed the file; only renamed, its frames are there."""
+        """Raise OSError where somebody else has removed, cut or renamed the file; a renamed one has its frames."""
         try:
             self._watch.check()
         except OSError as error:
