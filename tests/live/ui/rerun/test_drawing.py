@@ -370,3 +370,19 @@ def test_the_curve_rises_with_the_force() -> None:
     )
     first, last = np.asarray(drawn["curve/line"].strips.as_arrow_array().to_pylist()[0])
     assert first[1] == pytest.approx(1) and last[1] < 0.3 and last[0] > first[0]
+
+
+def test_a_stream_that_cannot_be_ended_says_why() -> None:
+    """As on a full disk: the thread of rerun that writes has ended."""
+
+    class Full:
+        ended = False
+
+        def flush(self, timeout_sec: float) -> None:
+            raise RuntimeError("File-writer thread shut down prematurely")
+
+        def disconnect(self) -> None:
+            self.ended = True
+
+    stream = Full()
+    assert RerunSink(stream, ALL).close() == "File-writer thread shut down prematurely" and stream.ended
