@@ -31,7 +31,7 @@ from live.ui.rerun.drawing.shapes import (
     thinned,
     with_heads,
 )
-from live.ui.rerun.drawing.sinks import Rates, RerunSink, write
+from live.ui.rerun.drawing.sinks import ALL, Rates, RerunSink, write
 from live.ui.rerun.messages import PictureMessage, ViewSetup, ViewTarget, row_of
 from tests.live.made_up import START, make_field, make_frame, make_grid, make_measurement
 

@@ -110,7 +110,7 @@ def without_values(run_state: RunState, *numbers: int) -> RunState:
     """The same run, whose time steps of these numbers have no value at all."""
     changed = RunState.new(0.5, specimen=SECTION)
     for k, step in enumerate(run_state.history.time_steps):
-        nothing = {name: math.nan for name in ("exx", "eyy", "exy", "sigma_eyy")} | {
+        nothing = dict.fromkeys(("exx", "eyy", "exy", "sigma_eyy"), math.nan) | {
             "n_valid": 0,
             "gauges": {},
         }
