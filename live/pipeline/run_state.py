@@ -33,7 +33,7 @@ class FrameCounts:
     load_samples, load_lost : int
         Samples of the load cell; samples that were missing when the test ended.
     failed : int
-        Frames of bursts that could not be measured (``live.pipeline.burst_failures``).
+        Frames of bursts that could not be measured (``live.results.folder``).
     """
 
     grabbed: int = 0

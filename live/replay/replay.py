@@ -23,7 +23,6 @@ from acquire.opencv.images import picture_times
 from acquire.printable import counted
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
-from live.pipeline.burst_failures import LOG, BurstFailures
 from live.pipeline.consumer import Compose, RunInfo
 from live.pipeline.consumer_thread import Outputs
 from live.pipeline.event_log import EventLog
@@ -36,7 +35,7 @@ from live.replay.parts import StoredResults
 from live.replay.pictures import picture_of, picture_source, write_names
 from live.replay.session import session_path
 from live.replay.source import ReplayRequest, ReplaySource, Work, check_window, prefetch
-from live.results.folder import check_folder, make_folder
+from live.results.folder import LOG, BurstFailures, check_folder, make_folder
 from live.results.writer import write_results
 from live.setup.devices import open_rig
 from live.setup.pictures import with_mask

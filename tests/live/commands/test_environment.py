@@ -75,7 +75,7 @@ def random_bytes(data: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("harm", [emptied, halved, zeroed, one_bit, random_bytes])
-@pytest.mark.parametrize("checked", [cache.CheckedFile, compiled_loops.CheckedFile])
+@pytest.mark.parametrize("checked", [cache.CheckedFile, compiled_loops.KeptFile])
 def test_a_damaged_file_of_the_cache_is_as_if_it_were_not_there(
     checked: Any, harm: Any, tmp_path: Path
 ) -> None:
@@ -105,7 +105,7 @@ def test_all_compiled_loops_are_checked() -> None:
     from hw_mocks.speckle_loops import splat
 
     for loop in (tile_sums, fletcher32, splat):
-        assert isinstance(loop._cache._cache_file, compiled_loops.CheckedFile)
+        assert isinstance(loop._cache._cache_file, compiled_loops.KeptFile)
     assert isinstance(getattr(coefficients, "dispatcher", coefficients)._cache._cache_file, cache.CheckedFile)
 
 
