@@ -127,13 +127,14 @@ def test_the_end_is_that_of_the_last_burst() -> None:
     torn = without_values(whole, 2, 3)
     assert whole.history.ends_with_values and not torn.history.ends_with_values and torn.history.has_values
     n_zoi = torn.history.time_steps[-1].n_zoi
-    lines = brief_lines(torn, SpecimenConfig(axis="y"))
+    lines = brief_lines(torn, finished(torn))
     assert lines[0] == f"measured 4 bursts, 0 of {n_zoi} ZOIs valid in the last (9 LOST)"
     assert lines[1] == f"strain along y at the end: no value, 0 of {n_zoi} valid"
     assert lines[2].startswith("the last burst with a value is 2 of 4: +1,000 \u00b1 ")
     assert any(
         f"last strain of the region: no value, 0 of {n_zoi} ZOIs valid" in x
-        for x in summary_lines(torn, SECTION)
+        for x in summary_lines(torn, finished(torn))
     )
-    found_again = brief_lines(without_values(whole, 1, 2), SpecimenConfig(axis="y"))
+    back = without_values(whole, 1, 2)
+    found_again = brief_lines(back, finished(back))
     assert found_again[1].startswith("strain along y at the end: +3,000 \u00b1 ")
