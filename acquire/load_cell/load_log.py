@@ -60,6 +60,15 @@ class LoadLog:
                 self._add(self._t[-1], math.nan)
             self._add(sample.t, sample.force)
 
+    def extend(self, times: NDArray[np.float64], forces: NDArray[np.float64]) -> None:
+        """Add many samples at once, (N,) s and N; their times rise, and follow those before."""
+        with self._lock:
+            self._t.frombytes(np.ascontiguousarray(times, np.float64).tobytes())
+            self._force.frombytes(np.ascontiguousarray(forces, np.float64).tobytes())
+            self._count += len(times)
+            if len(times):
+                self._latest = LoadSample(float(times[-1]), float(forces[-1]))
+
     def _add(self, t: float, force: float) -> None:
         self._t.append(max(t, self._t[-1]) if self._t else t)
         self._force.append(force)

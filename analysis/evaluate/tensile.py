@@ -15,6 +15,7 @@ import numpy as np
 
 from analysis.evaluate.curve import Curve, Loading, first_crossing, noise, reading
 from analysis.evaluate.elastic import (
+    FILM,
     MIN_POINTS,
     ErrorLimits,
     FittedLine,
@@ -164,8 +165,19 @@ def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> Tensil
     TensileFigures
         E and nu carry a remark in ``why`` where the strain is not uniform over the area that they are from.
     """
-    found = _evaluated(curve, options or TensileOptions())
+    options = options or TensileOptions()
+    found = _of_film(_evaluated(curve, options), options.limits.film)
     return replace(found, strain=curve.source, elastic_strain=curve.elastic_source or curve.source)
+
+
+def _of_film(figures: TensileFigures, limit: float | None) -> TensileFigures:
+    """With a limit of error of strains in the figures that depend on strain; E has it in its budget."""
+    shares = dict.fromkeys(("E", "E_chord", "Rp01", "Rp02", "Rp1"), 0.0)
+    shares |= dict.fromkeys(("nu", "Agt", "Ag", "At", "A", "r", "n"), limit or 0.0)
+    limited: dict[str, Any] = {
+        name: getattr(figures, name).limited(share, FILM) for name, share in shares.items()
+    }
+    return replace(figures, **limited) if limit else figures
 
 
 def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:

@@ -146,6 +146,7 @@ def tensile_options(specimen: SpecimenConfig) -> TensileOptions:
         _times(specimen.force_error_percent, 0.01),
         _times(specimen.section_error_percent, 0.01) if specimen.area_m2 else None,
         _times(specimen.strain_error_um_m, 1e-6),
+        _times(specimen.film_error_percent, 0.01),
     )
     if specimen.zero == "preload" and specimen.area_m2 is not None:
         return TensileOptions(standard, "preload", specimen.preload_MPa * 1e6, limits)
@@ -196,6 +197,17 @@ def sharpness_line(blur: Sequence[float], sigma: Sequence[float]) -> list[str]:
         return []
     largest = max(known, key=lambda one: abs(one.px))
     return [f"sharpness since the reference: {largest.text} at most, {known[-1].text} in the last picture"]
+
+
+def film_line(specimen: SpecimenConfig) -> list[str]:
+    """The limit of error of strains of a compressed film; nothing for others."""
+    limit = specimen.film_error_percent
+    if not limit:
+        return []
+    return [
+        f"strains of a compressed film: not better than {limit:g} %, beside ± (the codec holds motion back; record"
+        " MJPG, FFV1 or pictures)"
+    ]
 
 
 def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:

@@ -24,6 +24,8 @@ from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.pipeline.timed.figure import OLD_S
 from live.pipeline.timed.force_watch import ForceWatch
+from live.results.finished.figures_file import finished
+from live.results.finished.finished_test import reference_force
 from live.results.writer import write_results
 from live.run.burst_queue import TAKING, BurstQueue
 from live.run.control import ControlRefused
@@ -34,7 +36,7 @@ from live.run.outcome import Outcome, StopSignal
 from live.run.pre_trigger import PreTriggerBuffer
 from live.run.prepared_run import PreparedRun, new_run_state, set_up
 from live.run.recorder import open_recording
-from live.setup.devices import open_rig
+from live.setup.devices import Rig, open_rig
 
 _ARMED = "; nothing is recorded until the command start"
 _SILENT_S = 1.0
@@ -112,6 +114,11 @@ class LiveRun:
     def live(self) -> bool:
         """Whether the camera is there now; else its pictures are recorded."""
         return self._rig.camera.info.live
+
+    @property
+    def rig(self) -> Rig:
+        """The devices."""
+        return self._rig
 
     @property
     def run_state(self) -> RunState:
@@ -337,7 +344,10 @@ def run_prepared(
     made = [*consumers(about, run_state), *watch]
     outputs = Outputs(made, run_state.loads, run_state.event_log, run_state.history)
     code = _with_outputs(prepared, run_state, outputs, screen, stop, on_start)
-    return Outcome(prepared.folder, prepared.config, run_state, outputs, rig, grid, code)
+    test = finished(
+        prepared.folder, prepared.config, run_state, code, reference_force(run_state.event_log.events())
+    )
+    return Outcome(prepared.folder, prepared.config, run_state, outputs, rig, grid, code, test)
 
 
 def _with_outputs(

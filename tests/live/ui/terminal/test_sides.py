@@ -22,6 +22,7 @@ from live.ui.terminal.screen import TerminalScreen
 from live.ui.terminal.sides import SidesScreen
 from live.ui.terminal.status_line import fitted, gauge_texts, sides_line, status_line, strain_text
 from live.ui.terminal.summary import print_summary, trouble_lines
+from tests.live.made_run import finished
 from tests.live.made_up import START, figures, make_loads, make_measurement
 from tests.live.ui.terminal.test_screen import Terminal, time_step
 
@@ -161,7 +162,8 @@ def test_where_the_files_are(tmp_path: Path) -> None:
     (tmp_path / "a.h5").write_bytes(bytes(12_340_000))
     (tmp_path / "empty.h5").touch()
     screen = Said()
-    print_summary(screen, RunState.new(1.0), SpecimenConfig(), tmp_path, ["a line"], with_report=True)
+    state = RunState.new(1.0)
+    print_summary(screen, state, finished(state), tmp_path, ["a line"], with_report=True)
     assert screen.lines[0] == "" and screen.lines[-2:] == ["a line", f"files: {tmp_path} (a.h5; 12 MB)"]
     assert file_lines(tmp_path) == [f"  {tmp_path / 'a.h5'}  (12.3 MB)"]
 
