@@ -29,7 +29,7 @@ from live.commands.options import (
 from live.commands.signals import signals
 from live.ui.terminal.screen import TerminalScreen
 
-OUTPUT = ("axis", "standard", "zero", "lag")
+OUTPUT = ("axis", "standard", "test", "zero", "lag")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

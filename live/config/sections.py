@@ -288,6 +288,9 @@ class SpecimenConfig:
         Option("axis"))
     standard: str = key(choice("iso6892", "iso527", "astm-d3039", "free"), "iso6892",
         "standard of the evaluation; free: only modulus_between", Option("standard", expert=True))
+    test: str = key(choice(AUTO, "tensile", "compression", "cyclic", "relaxation", "creep"), AUTO,
+        "kind of the test; strengths and extensions are those of a tensile one; auto: found from its course",
+        Option("test", expert=True))
     modulus_between: tuple[float, float] = key(STRAINS, (0.0005, 0.0025),
         "strain interval of the modulus in a free evaluation")
     zero: str = key(choice("raw", "toe", "preload"), "raw",

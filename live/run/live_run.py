@@ -216,7 +216,7 @@ class LiveRun:
         unwritten = self._recording is not None and self._recording.failed is not None
         lossy = frame_counts.loss or self._outputs.failed or unwritten
         lossy = lossy or self._run_state.health.without_force_s > OLD_S
-        return 5 if lossy or not frame_counts.adds_up or not self._run_state.history.has_values else 0
+        return 5 if lossy or not frame_counts.adds_up or not self._run_state.history.ends_with_values else 0
 
     def _take(self, frame: Frame) -> None:
         health = self._run_state.health

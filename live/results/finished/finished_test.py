@@ -24,10 +24,11 @@ from analysis.evaluate import (
 from live.config.sections import SpecimenConfig
 from live.pipeline.measurement import AXIAL, TimeStep
 from live.pipeline.run_state import RunState
-from live.results.figures import tensile_options
+from live.results.figures import lag_of, tensile_options
 from live.results.run_folder import RunFolder
 
 NO_VALUE = "no ZOI has a value in the last burst"
+_NO_READINGS = "no readings of a load cell are there"
 REGION = ("exx", "eyy", "exy")
 
 
@@ -85,7 +86,7 @@ class FinishedTest:
             specimen,
             history.axis(specimen.axis),
             samples,
-            lag_of(Track(history.column("t"), history.along(specimen.axis)[0]), samples),
+            lag_of(history, loads, specimen),
             loads.lag_s,
             reference_N,
             gauges.get(AXIAL, {}),
@@ -108,7 +109,9 @@ class FinishedTest:
             run.specimen,
             run.load_axis,
             samples if recorded else at_bursts,
-            lag_of(Track(at_bursts.t, run.axial_strain), samples),
+            find_lag(Track(at_bursts.t, run.axial_strain), samples)
+            if recorded
+            else Figure.none(_NO_READINGS),
             float(corrected) if isinstance(corrected, int | float) else 0.0,
             reference_force(run.events),
             run.gauges[AXIAL].described if AXIAL in run.gauges else {},
@@ -139,13 +142,6 @@ def reference_force(events: list[Event]) -> float:
     """The force at the first reference, N; NaN where no event has it."""
     forces = [event.data.get("force_N") for event in events if event.kind is EventKind.REFERENCE]
     return float(forces[0]) if forces and forces[0] is not None else math.nan
-
-
-def lag_of(strain: Track, samples: Track) -> Figure:
-    """The lag of the load behind the frames, s, found from the test itself."""
-    return (
-        find_lag(strain, samples) if len(samples.t) else Figure.none("no readings of a load cell are there")
-    )
 
 
 def _stored_at_end(run: RunFolder) -> dict[str, GaugeValue]:

@@ -20,6 +20,7 @@ MODULES = (
     "live/run/two_cameras.py",
     "live/config/sides.py",
     "live/run/alarms.py",
+    "live/setup/check/disk.py",
     "live/setup/check/verdict.py",
     "live/setup/region.py",
     "live/ui/web/page_controller.py",
