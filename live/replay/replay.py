@@ -32,7 +32,7 @@ from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
 from live.pipeline.run_state import FrameCounts, RunState
 from live.pipeline.screen import Screen
-from live.pipeline.timed.force_watch import ForceWatch
+from live.pipeline.timed.force_watch import with_force_watch
 from live.replay.forces import read_forces
 from live.replay.opening import open_session_source, prepare_replay
 from live.replay.parts import StoredResults
@@ -206,8 +206,7 @@ def _run(
         source.start,
         deferred=request.final_folder is not None,
     )
-    watch = [ForceWatch(run_state)] if run_state.with_load else []
-    made = [*consumers(about, run_state), *watch]
+    made = with_force_watch(consumers(about, run_state), run_state)
     outputs = Outputs(made, run_state.loads, event_log, run_state.history)
     began, work = time.perf_counter(), prefetch(bursts)
     failures = BurstFailures(run_state, folder)

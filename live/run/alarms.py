@@ -273,7 +273,7 @@ class AlarmWatch(Consumer):
         """Check what is due by itself: age, force, machine, and whether two cameras still have values."""
         values = {**self._values.read(), **self._machine(self._clock())}
         if self._values.now.figure(BURST).state is not FigureState.ENDED:
-            self._check(values, math.nan)
+            self._check(values, None)
         self._check_lost()
         return EVERY_S
 
@@ -282,7 +282,8 @@ class AlarmWatch(Consumer):
         self._check_lost()
         return f"{self._count} came" if self._count else "none came"
 
-    def _check(self, values: Mapping[str, float], stamp: float) -> None:
+    def _check(self, values: Mapping[str, float], stamp: float | None) -> None:
+        """Judge all; ``stamp`` is the time of what the values are from, None: of each figure."""
         for alarm in self._alarms:
             channel = alarm.config.channel
             figure, value = self._values.now.of_channel(channel), values.get(channel, math.nan)
@@ -292,7 +293,8 @@ class AlarmWatch(Consumer):
                 instead = f"{words}: {figure.state}"
             text = alarm.message(value, instead)
             if changed:
-                self._changed(alarm, None if instead else value, stamp, text)
+                t = self._clock() - figure.age if stamp is None and figure.known else stamp
+                self._changed(alarm, None if instead else value, math.nan if t is None else t, text)
             elif alarm.on and instead:
                 self._active.renew(alarm.name, text)
 

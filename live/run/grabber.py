@@ -149,6 +149,10 @@ class Grabber:
         )
         self._plan, self._on_frame, self._on_burst = plan, on_frame, on_burst
         self._health = run_state.health
+        self._health.recorded = not camera.info.live
+        if camera.info.fps:  # the usual intervals until they are known
+            self._health.frames.usual_s = 1 / camera.info.fps
+            run_state.history.arrivals.usual_s = plan.burst / camera.info.fps
         self.references: queue.SimpleQueue[ReferenceBurst] = queue.SimpleQueue()
         self.bursts: LatestQueue[SummedBurst] = LatestQueue(
             waits=not camera.info.live,

@@ -23,7 +23,7 @@ from live.pipeline.latency import LatencyMonitor
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.pipeline.timed.figure import OLD_S
-from live.pipeline.timed.force_watch import ForceWatch
+from live.pipeline.timed.force_watch import with_force_watch
 from live.results.finished.figures_file import finished
 from live.results.finished.finished_test import reference_force
 from live.results.writer import write_results
@@ -78,7 +78,6 @@ class LiveRun:
         on_burst = self._take_burst if recording is not None and recording.takes_bursts else None
         self.grabber = Grabber(self._rig.camera, self._plan, run_state, self._take, on_burst)
         run_state.health.began_t, self._hinted = time.monotonic(), False
-        self._expect(run_state)
         self._has_recorded = self.recording
         memory = memory_of_measured(self._rig.camera.info, self._plan)
         self._burst_queue = BurstQueue(self.grabber, run_state.frame_counts, self._idle, memory)
@@ -88,14 +87,6 @@ class LiveRun:
         self._measure_thread = MeasureThread(
             prepared, run_state, outputs, self._burst_queue, latency, self._show
         )
-
-    def _expect(self, run_state: RunState) -> None:
-        """The usual intervals of frames and bursts until they are known."""
-        camera, health = self._rig.camera.info, run_state.health
-        health.recorded = not camera.live
-        if camera.fps:
-            health.frames.usual_s = 1 / camera.fps
-            run_state.history.arrivals.usual_s = self._plan.burst / camera.fps
 
     # -- what may be called from other threads ------------------------------------------------
 
@@ -341,8 +332,7 @@ def run_prepared(
     for line in prepared.announcement():
         screen.print(line)
     about = RunInfo(prepared.config, prepared.folder, rig.camera.info, grid, prepared.start, stop.request)
-    watch = [ForceWatch(run_state)] if run_state.with_load else []
-    made = [*consumers(about, run_state), *watch]
+    made = with_force_watch(consumers(about, run_state), run_state)
     outputs = Outputs(made, run_state.loads, run_state.event_log, run_state.history)
     code = _with_outputs(prepared, run_state, outputs, screen, stop, on_start)
     test = finished(

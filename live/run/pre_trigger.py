@@ -137,6 +137,7 @@ class PreTriggerBuffer:
         self._recorder.sample(sample)
         if abs(sample.force) > self._above_N and not self.on:
             self._switch_on(f"the force is above {self._above_N:g} N")
+        self._watch_force()
 
     def _watch_force(self) -> None:
         """A force that is not known is not one below the trigger: switch on where it is lost or beyond its range."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from acquire.events import Event, EventKind, Level
 from live.pipeline.consumer import Consumer
@@ -52,3 +53,8 @@ class ForceWatch(Consumer):
     def _emit(self, t: float, text: str, level: Level) -> None:
         data = {"without_force": self._count}
         self._run_state.event_log.record(Event(t, EventKind.LOST, "force", text, level, data))
+
+
+def with_force_watch(consumers: Sequence[Consumer], run_state: RunState) -> list[Consumer]:
+    """``consumers``, and the watch where there is a load cell."""
+    return [*consumers, *([ForceWatch(run_state)] if run_state.with_load else [])]

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+import time
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from live.config.sides import BACK, FRONT
 from live.pipeline.measurement import AXIAL, TimeStep
 from live.pipeline.run_state import RunState
+from live.pipeline.snapshot import BURST
+from live.pipeline.timed.figure import LACKING
 from live.results.sides.together import JointStrain, longest_gap, newest
 
 LATE_S = 1.0
@@ -20,7 +23,8 @@ LATE_S = 1.0
 class JointChannels:
     """The channels of front and back together (``live.config.channels.JOINT_CHANNELS``); for any thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
         self._states: Mapping[str, RunState] = {}
         self._live = False
         self._last_t = -math.inf  # the newest instant of both so far
@@ -36,7 +40,7 @@ class JointChannels:
         """
         if not self._states or self.lost:
             return {}
-        strains = newest(self._states[FRONT], self._states[BACK])
+        strains = newest(self._states[FRONT], self._states[BACK], self._clock())
         found = {"mean_time_s": strains[AXIAL].t - start} if AXIAL in strains else {}
         for name, one in strains.items():
             channel = name if name == AXIAL else f"gauge_{name}"
@@ -51,6 +55,8 @@ class JointChannels:
         for side, state in self._states.items():
             if state.health.camera_failed:
                 return f"the camera of the {side} has failed"
+            if state.snapshot(self._clock()).figure(BURST).state in LACKING:
+                return f"the {side} gives no strains"
         steps = {side: state.history.time_steps for side, state in self._states.items()}
         if not self._live or not all(steps.values()):
             return ""
@@ -59,7 +65,7 @@ class JointChannels:
         limit = max(LATE_S, *(longest_gap(np.array([s.t for s in one[-3:]])) for one in steps.values()))
         if _went_on(steps[ahead], ends[late]) > limit:
             return f"the {late} gives no strains"
-        joint = newest(self._states[FRONT], self._states[BACK])
+        joint = newest(self._states[FRONT], self._states[BACK], self._clock())
         if AXIAL in joint:
             self._last_t = joint[AXIAL].t
         since = _went_on(steps[late], self._last_t)

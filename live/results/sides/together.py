@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import math
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple, TextIO
@@ -28,6 +29,7 @@ from live.config.sections import SpecimenConfig
 from live.config.sides import SIDES
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.pipeline.run_state import RunState
+from live.pipeline.snapshot import BURST
 from live.results.figures import beyond_scatter, headline, tensile_options
 from live.results.run_folder import RunFolder
 from live.results.sides.folder import shift_s
@@ -163,9 +165,16 @@ class JointStrain(NamedTuple):
     t: float
 
 
-def newest(front: RunState, back: RunState) -> dict[str, JointStrain]:
-    """The axial strain and each gauge at the newest instant that both sides have; none once a camera has failed."""
+def newest(front: RunState, back: RunState, now: float | None = None) -> dict[str, JointStrain]:
+    """The axial strain and each gauge at the newest instant that both sides have.
+
+    None once a camera has failed, and where the bursts of a side are not live at ``now`` (s, monotonic; None: this
+    moment).
+    """
     if front.health.camera_failed or back.health.camera_failed:
+        return {}
+    now = time.monotonic() if now is None else now
+    if not all(state.snapshot(now).figure(BURST).known for state in (front, back)):
         return {}
     one, other = _recent(front), _recent(back)
     if not one or not other:

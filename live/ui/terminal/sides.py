@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from live.config.sides import FRONT, SIDES
+from live.config.sides import BACK, FRONT
 from live.pipeline.screen import Screen
 from live.ui.terminal.status_line import sides_line
 
@@ -40,7 +40,7 @@ class SidesScreen:
 
         self._snapshots[name] = snapshot
         sides = {side: state.snapshot(snapshot.t) for side, state in self._states.items()} or self._snapshots
-        both = newest(*(self._states[side] for side in SIDES)) if FRONT in self._states else {}
+        both = newest(self._states[FRONT], self._states[BACK], snapshot.t) if FRONT in self._states else {}
         values = {name: (one.mean, one.bending, one.sigma) for name, one in both.items()}
         self.screen.status(sides_line(sides, values, self.screen.width, words))
 

@@ -39,7 +39,7 @@ class SidesPanel:
         if now >= self._due:
             self._figures = side_figures(figures_of(self._states, self._specimen), self._specimen)
             self._due = max(now + FIGURES_S, self._now() + 10 * (self._now() - now))
-        strains = newest(self._states[FRONT], self._states[BACK]) if FRONT in self._states else {}
+        strains = newest(self._states[FRONT], self._states[BACK], now) if FRONT in self._states else {}
         return {
             "strains": [
                 {"name": name, "mean": one.mean, "bending": one.bending, "sigma": one.sigma}

@@ -8,6 +8,7 @@ import pytest
 
 from live.pipeline.run_state import RunState
 from live.results.sides.channels import JointChannels
+from live.results.sides.together import newest
 from tests.live.made_up import START, make_measurement
 
 STRAIN, BENT = 1e-3, 2e-4
@@ -84,3 +85,19 @@ def test_a_camera_that_fails_leaves_no_value_at_once(failed: str) -> None:
     joint = both(**states)
     states[failed].health.camera_failed = True
     assert (joint.read(START), joint.lost) == ({}, f"the camera of the {failed} has failed")
+
+
+def test_two_cameras_that_stall_together_leave_no_value() -> None:
+    now = [START + 0.8]
+    states = {name: side(STRAIN, range(8)) for name in ("front", "back")}
+    joint = JointChannels(lambda: now[0])
+    joint.attach(states, live=True)
+    for state in states.values():
+        state.health.state = "REC"
+    assert joint.lost == "" and joint.read(START)["mean_axial"] == pytest.approx(STRAIN)
+    now[0] = START + 3.0
+    assert (joint.read(START), joint.lost) == ({}, "the front gives no strains")
+    assert newest(states["front"], states["back"], now[0]) == {}
+    for state in states.values():
+        state.health.paused = True
+    assert (joint.read(START), joint.lost) == ({}, "")

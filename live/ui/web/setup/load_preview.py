@@ -19,6 +19,7 @@ from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.printable import brief, printable
 from acquire.system import lower_priority
 from live.pipeline.latency import OUTPUT
+from live.pipeline.timed.figure import OLD_S
 from live.setup.check.verdict import CheckLine
 from live.setup.devices import open_load
 from live.ui.web.setup.config_draft import ConfigDraft
@@ -27,7 +28,7 @@ log = logging.getLogger(__name__)
 
 KEPT_S, SHOWN_S = 5.0, 0.5
 """Of the samples: for noise and check, and for the force that is shown."""
-SILENT_S, RETRY_S = 2.0, 1.0
+SILENT_S, RETRY_S = OLD_S, 1.0
 """Silence that is a fault; delay before the load cell is opened again."""
 NONE = "none:"
 
