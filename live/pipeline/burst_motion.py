@@ -15,6 +15,7 @@ import numpy as np
 
 from acquire.frame import Burst
 from analysis.field import CommonError, StrainField
+from analysis.optics.plane import affine_values
 
 CERTAIN = 3.0
 """A change of the strain rate is one beyond so many of its standard uncertainties."""
@@ -52,12 +53,8 @@ class BurstMotion:
                 unexplained = max(unexplained, 1 - CERTAIN**2 * noise / off**2)
         if not unexplained:
             return field
-        affine = (_affine(seen.field) * share for share, seen in zip(shares, (*before, here), strict=True))
+        affine = (
+            affine_values(seen.field) * share for share, seen in zip(shares, (*before, here), strict=True)
+        )
         error = CommonError(np.nan_to_num(sum(affine))[None], np.array([[unexplained]]))
         return replace(field, common=error.beside(field.common))
-
-
-def _affine(field: StrainField) -> np.ndarray:
-    """(6, R, C): u, du_dx, du_dy, v, dv_dx, dv_dy of each ZOI."""
-    half = len(field.parameters) // 2
-    return np.concatenate([field.parameters[:3], field.parameters[half : half + 3]])

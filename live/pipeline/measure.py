@@ -27,6 +27,7 @@ from analysis.optics import (
     choose_model,
     trouble,
 )
+from live.pipeline.burst_motion import BurstMotion
 from live.pipeline.guards import Guard
 from live.pipeline.measurement import Measurement, PlateReading
 from live.pipeline.reference import Correction, averaged, unchanged
@@ -261,7 +262,7 @@ def measure(
     Measurement
         One for each burst, in order.
     """
-    number = 0
+    number, motion = 0, BurstMotion()
     for item in bursts:
         if isinstance(item, NewReference):
             tracker.renew_on_demand(corrections.sensor(item.burst))
@@ -269,6 +270,7 @@ def measure(
         began = timer()
         whole = tracker.measure(corrections.sensor(item))
         field, of_plates, of_lens = corrections.applied(whole, item, strain)
+        field = motion.apply(field, item)
         took = timer() - began
         measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, of_plates)
         measurement = replace(measurement.with_lens(of_lens), as_measured=whole)
