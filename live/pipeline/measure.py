@@ -21,13 +21,13 @@ from analysis.field import part_of
 from analysis.optics import (
     ASSUMED_TILT,
     SCALE,
+    BurstMotion,
     LensCorrection,
     PlateFit,
     ShutterCorrection,
     choose_model,
     trouble,
 )
-from live.pipeline.burst_motion import BurstMotion
 from live.pipeline.guards import Guard
 from live.pipeline.measurement import Measurement, PlateReading
 from live.pipeline.reference import Correction, averaged, unchanged
@@ -270,7 +270,7 @@ def measure(
         began = timer()
         whole = tracker.measure(corrections.sensor(item))
         field, of_plates, of_lens = corrections.applied(whole, item, strain)
-        field = motion.apply(field, item)
+        field = motion.apply(field, item.t, item.duration)
         took = timer() - began
         measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, of_plates)
         measurement = replace(measurement.with_lens(of_lens), as_measured=whole)

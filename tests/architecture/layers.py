@@ -100,7 +100,6 @@ NEVER = {
 }  # fmt: skip
 # The measuring path of live and replay: no thread, file, device or clock.
 MEASURING = (
-    "live.pipeline.burst_motion",
     "live.pipeline.measure",
     "live.pipeline.measurement",
     "live.pipeline.reference",

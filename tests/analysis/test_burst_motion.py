@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from analysis.evaluate import AreaStrain
 from analysis.field import StrainField
-from live.pipeline.burst_motion import BurstMotion
-from tests.live.made_up import START, make_grid, make_measurement
+from analysis.optics import BurstMotion
+from tests.live.made_up import START, make_grid
 
 GRID, RATE, PERIOD = make_grid(), 2e-4, 0.4
 SIGMA = 1e-8
@@ -27,10 +25,9 @@ def measured(strain: float, sigma: float = SIGMA, large: float = 3.0) -> StrainF
 def sigmas(strains: list[float], duration: float, sigma: float = SIGMA, large: float = 1.0) -> list[float]:
     """Of eyy of the region, of bursts of these mean strains."""
     motion, found = BurstMotion(), []
-    burst = make_measurement(0).burst
     for k, strain in enumerate(strains):
-        at = replace(burst, t=START + PERIOD * k, duration=duration)
-        area = AreaStrain.of(motion.apply(measured(strain, sigma, large), at))
+        field = motion.apply(measured(strain, sigma, large), START + PERIOD * k, duration)
+        area = AreaStrain.of(field)
         assert area is not None
         found.append(area.sigma("eyy"))
     return found
@@ -59,9 +56,9 @@ def test_without_it_the_interval_would_be_too_small() -> None:
 
 
 def test_each_zoi_has_its_own_share_of_it() -> None:
-    motion, burst = BurstMotion(), make_measurement(0).burst
+    motion = BurstMotion()
     for k, strain in enumerate((0.0, 0.0, 1e-5)):
-        field = motion.apply(measured(strain), replace(burst, t=START + PERIOD * k, duration=0.3))
+        field = motion.apply(measured(strain), START + PERIOD * k, 0.3)
     found = field.sigma("eyy")
     assert found[2, 2] == pytest.approx(3e-5, rel=0.01) and found[2, 1] == pytest.approx(1e-5, rel=0.01)
 
