@@ -31,7 +31,7 @@ from live.config.loading import Config
 from live.config.values import AUTO
 from live.pipeline.consumer import Consumer
 from live.pipeline.measurement import AXIAL, Measurement
-from live.results.figures import evaluate, tensile_table
+from live.results.figures import tensile_table
 from live.results.folder import check_folder
 from live.run.outcome import Outcome
 from live.setup.compiling import compile_ahead
@@ -314,7 +314,7 @@ def compare(
     # Without a measured instant nothing is wrong: the machine was too slow, and E is not known.
     agreed = _print_strain(np.array(ratios), np.array(errors), print_line) or not ratios
     _print_force(outcome, specimen, print_line)
-    figures = evaluate(outcome.run_state.history, outcome.run_state.loads, config.specimen)
+    figures = outcome.test.figures
     there = specimen.E, specimen.nu
     # In an uneven field (the hole) the strain of the region is not that of a specimen without it.
     if figures.E.known and last is not None and AXIAL not in config.gauges:

@@ -14,8 +14,10 @@ from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind, EventSink, Level
 from acquire.frame import Burst
 from acquire.system import lower_priority
+from live.pipeline.burst_failures import BurstFailures
 from live.pipeline.consumer_thread import Outputs
 from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample
+from live.pipeline.measure import NewReference
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import ReferenceBurst, ReferenceMotion, motion_between
 from live.pipeline.run_state import RunState
@@ -232,7 +234,17 @@ class MeasureThread:
     def _measure(self, ready: PreparedKernel) -> None:
         event_log = self._run_state.event_log
         guard = SmearGuard(event_log.record)
-        for m in ready.measurements(self._burst_queue.bursts(), self._run_state.loads, event_log.record):
+        failures = BurstFailures(self._run_state, self._prepared.folder)
+
+        def failed(number: int, item: Burst | NewReference, error: Exception) -> None:
+            failures(number, item, error)
+            if isinstance(item, Burst):
+                event_log.record(
+                    _measured(item)
+                )  # replay --as-measured tries it too, and is as far as this run
+
+        bursts, loads = self._burst_queue.bursts(), self._run_state.loads
+        for m in ready.measurements(bursts, loads, event_log.record, failed):
             self._run_state.frame_counts.add(measured=m.burst.n)
             event_log.record(_measured(m.burst))
             m = self._timed(m)
