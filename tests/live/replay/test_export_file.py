@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import io
+import math
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from acquire.errors import DataError
 from live.config.sections import LoadConfig
 from live.replay import export_text
 from live.replay.export_file import Export, read_export
-from tests.live.replay.exports import EXPORTS, TIMES
+from tests.live.replay.exports import EXPORTS, TIMES, comma, thousands
 
 
 def read(data: bytes | str, **options: Any) -> Export:
