@@ -26,7 +26,7 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     def compiled(function: Callable[..., Any]) -> Any:
         dispatcher = numba.njit(**options)(function)
         with contextlib.suppress(AttributeError):  # numba's own affair, or nothing is kept
-            dispatcher._cache._cache_file.__class__ = CheckedFile
+            dispatcher._cache._cache_file.__class__ = KeptFile
         return dispatcher
 
     return compiled
@@ -38,7 +38,7 @@ class _Pieces(list[bytes]):
     write = list.append
 
 
-class CheckedFile(IndexDataCacheFile):  # type: ignore[misc]
+class KeptFile(IndexDataCacheFile):  # type: ignore[misc]
     """Index and data of one function; what is not whole is as if it were not there."""
 
     def _load_index(self) -> dict[Any, str]:

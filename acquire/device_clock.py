@@ -20,6 +20,7 @@ TURNS_S = (2**32 * 1e-6, 2**32 * 1e-3)  # after which counters of 32 bits begin 
 PIECE_S, WINDOW_S = 0.5, 60.0  # the least delayed arrival of each piece of the window is kept
 KNOWN, KEPT = 8, 16  # pieces: from which the rate is known, and which are kept however old they are
 TICK_S = 2e-3  # of the coarsest clock that is usual, and of USB
+NEAR_PART = 0.3  # more than one beat of a latency timer of 16 ms with a clock that is 0.1 % wrong: 16 s
 DRIFT_S = 15.0  # from which on the drift is told
 
 Point = tuple[float, float]  # device's time, offset of the host's from it, s
@@ -49,7 +50,7 @@ class DeviceClock:
 
     Arrivals are never early: host minus device lies on or above a straight line, whose slope is the rate of the
     device's clock. The slope is an edge of the lower convex hull of the least delayed arrivals (as that of Moon,
-    Skelly, Towsley, INFOCOM 1999, doi:10.1109/INFCOM.1999.749287): the one that a quarter of them is nearest to, so
+    Skelly, Towsley, INFOCOM 1999, doi:10.1109/INFCOM.1999.749287): the one of the newer half that most are near to, so
     that neither a time of load nor its end bends it. From each of these arrivals the offset may have risen by that
     slope and what it may be wrong by, and before it is known by ``rate_limit``; the least of that is the offset. So a
     time lies between the true one and that of the arrival wherever the rate is within its bound.
@@ -192,9 +193,10 @@ class DeviceClock:
 
 
 def _best_edge(points: Sequence[Point]) -> tuple[float, float]:
-    """The slope of the edge of the lower convex hull that a quarter of the points is nearest to, and how near, s.
+    """The slope of that edge of the lower convex hull which ``NEAR_PART`` of the points are nearest to; how near, s.
 
-    Points have ascending times. Delays of a time of load, before or after, make edges that few points are near to.
+    Points have ascending times. Delays of a time of load, before or after, make edges that few points are near to. Of
+    the older half no edge counts: slopes rise from edge to edge, and a time too early is worse than one too late.
     """
     hull: list[Point] = []
     for x, y in points:
@@ -202,11 +204,12 @@ def _best_edge(points: Sequence[Point]) -> tuple[float, float]:
             hull.pop()
         hull.append((x, y))
     times, offsets = np.array(points).T
-    quarter, best = len(points) // 4, (math.inf, 0.0)
+    near, best = int(NEAR_PART * len(points)), (math.inf, 0.0)
     for left, right in pairwise(hull):
-        slope = _slope(left, right)
-        above = offsets - left[1] - slope * (times - left[0])
-        best = min(best, (float(np.partition(above, quarter)[quarter]), slope))
+        if right[0] >= (times[0] + times[-1]) / 2:
+            slope = _slope(left, right)
+            above = offsets - left[1] - slope * (times - left[0])
+            best = min(best, (float(np.partition(above, near)[near]), slope))
     return best[1], best[0]
 
 

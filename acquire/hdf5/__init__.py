@@ -27,7 +27,7 @@ from acquire.hdf5.declared import (
     read_scalar,
     stored_rows,
 )
-from acquire.hdf5.disk import DiskSync, FlushTimer, forecast, free_bytes, network_share
+from acquire.hdf5.disk import DiskSync, FileWatch, FlushTimer, forecast, free_bytes, network_share
 from acquire.hdf5.pictures import COMPRESSED, PictureReader, PictureStack, compile_loops
 from acquire.hdf5.tables import (
     NO_UNIT,
@@ -46,6 +46,7 @@ __all__ = [
     "NO_UNIT",
     "Declared",
     "DiskSync",
+    "FileWatch",
     "FlushTimer",
     "GrowingDataset",
     "JsonField",

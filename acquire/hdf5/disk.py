@@ -74,6 +74,41 @@ KEPT_BYTES = 8 << 20
 _CANNOT = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP)
 
 
+class FileWatch:
+    """Notices that a file that is written here was removed, or cut, by somebody else.
+
+    Parameters
+    ----------
+    path : Path
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._file = path, os.open(path, os.O_RDONLY)
+        found = os.fstat(self._file)
+        self._links, self._size = found.st_nlink, found.st_size
+
+    def check(self) -> None:
+        """To be called before a write: raises OSError where the file is not as ``wrote`` has left it.
+
+        Where it is whole, but has another name now, that is FileNotFoundError.
+        """
+        found = os.fstat(self._file)
+        if found.st_nlink < self._links:
+            raise OSError(errno.EIO, "somebody has removed it")
+        if found.st_size < self._size:
+            raise OSError(errno.EIO, f"somebody has cut it to {found.st_size} of {self._size} bytes")
+        if not self._path.exists():
+            raise FileNotFoundError(errno.ENOENT, "somebody has renamed it")
+
+    def wrote(self) -> None:
+        """To be called after a write."""
+        self._size = os.fstat(self._file).st_size
+
+    def close(self) -> None:
+        """Close its own descriptor."""
+        os.close(self._file)
+
+
 class FlushTimer:
     """When the next flush is due.
 

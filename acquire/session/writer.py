@@ -26,6 +26,7 @@ from acquire.events import Event
 from acquire.frame import Burst, Frame
 from acquire.hdf5 import (
     DiskSync,
+    FileWatch,
     FlushTimer,
     GrowingDataset,
     PictureStack,
@@ -66,6 +67,8 @@ class SessionWriter(Closing):
     unflushed_frames : int
         Frames, those of bursts among them, that were taken and are not flushed yet; after a failure, those
         that are lost by it.
+    is_gone : bool
+        Somebody else has removed, cut or renamed the file.
 
     Raises
     ------
@@ -93,11 +96,12 @@ class SessionWriter(Closing):
         self._held_events: list[np.ndarray[Any, Any]] = []
         self._line_end = 0
         self.unflushed_frames = 0
-        self._written_bytes = 0
+        self._written_bytes, self._taken, self.is_gone = 0, 0, False
         self._file: h5py.File | None = _create(
             self.path, lambda file: layout.create(file, recorded, checksum)
         )
         self._to_disk = DiskSync(self.path)
+        self._watch = FileWatch(self.path)
         try:
             with self._guarded() as file:
                 self._find_datasets(file["entry"])
@@ -196,6 +200,7 @@ class SessionWriter(Closing):
         self._open_file()
         self._written_bytes += size
         self.unflushed_frames += frames
+        self._taken += frames
         self._pace.wrote()
         try:
             self.flush_when_due()
@@ -261,6 +266,7 @@ class SessionWriter(Closing):
             self._file = None
             file.close()
             self._to_disk.close()
+            self._watch.close()
             if self._to_disk.failure is not None:
                 raise self._to_disk.failure
 
@@ -268,6 +274,7 @@ class SessionWriter(Closing):
         file, self._file = self._file, None
         if file is not None:
             abandon_file(file)
+            self._watch.close()
         self._to_disk.close()
 
     def _open_file(self) -> h5py.File:
@@ -279,14 +286,30 @@ class SessionWriter(Closing):
     def _guarded(self, *, keep_rows: bool = False) -> Iterator[h5py.File]:
         file = self._open_file()
         try:
+            self._watch_file()
             yield file
+            if self._file is not None:
+                self._watch.wrote()
         except (OSError, RuntimeError) as error:
-            if keep_rows:  # a disk that is full for a picture may still take the rows before it
+            if (
+                keep_rows and not self.is_gone
+            ):  # a disk that is full for a picture may still take the rows before it
                 with suppress(OSError, RuntimeError):
                     self._bring(file)
             # Datasets may now differ in length; going on would put rows beside the wrong frames.
             self._abandon()
-            raise DataError(_write_failure(self.path, error)) from error
+            words = f"{self.path}: {reason(error)}; start a new test, and keep other programs from its folder"
+            raise DataError(words if self.is_gone else _write_failure(self.path, error)) from error
+
+    def _watch_file(self) -> None:
+        """Raise OSError where somebody else has removed, cut or renamed the file; a renamed one has its frames."""
+        try:
+            self._watch.check()
+        except OSError as error:
+            self.is_gone = True
+            if not isinstance(error, FileNotFoundError):
+                self.unflushed_frames = self._taken
+            raise
 
 
 def _create(path: Path, declare: Callable[[h5py.File], object]) -> h5py.File:

@@ -224,7 +224,7 @@ class NewReference:
 
 
 Timer = Callable[[], float]
-OnFailure = Callable[[int, "Burst | NewReference", Exception], object]
+OnFailure = Callable[[int, Burst | NewReference, Exception], object]
 """Called with the number of a burst, the burst or the new reference before it, and what measuring it raised."""
 
 

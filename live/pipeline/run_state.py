@@ -30,12 +30,12 @@ class FrameCounts:
     reference, measured, skipped, left_out : int
         Part of the reference burst; of a measured burst; of a burst that a newer one replaced or that
         came while measuring was paused; of no complete burst, or damaged.
-    failed : int
-        Of a burst that could not be measured (``live.pipeline.burst_failures``).
     lost : int
         Frames that the camera or its connection lost, or that came damaged.
     load_samples, load_lost : int
         Samples of the load cell; samples that were missing when the test ended.
+    failed : int
+        Frames of bursts that could not be measured (``live.results.folder``).
     without_force : int
         Measured bursts whose force is not known although there is a load cell.
     """
@@ -48,10 +48,10 @@ class FrameCounts:
     measured: int = 0
     skipped: int = 0
     left_out: int = 0
-    failed: int = 0
     lost: int = 0
     load_samples: int = 0
     load_lost: int = 0
+    failed: int = 0
     without_force: int = 0
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False, compare=False)
 

@@ -24,6 +24,7 @@ from live.replay.export_numbers import (
     EMPTY,
     NUMBERISH,
     decimal_mark,
+    is_value,
     numbers_in,
     time_of_day,
     two_readings,
@@ -220,7 +221,7 @@ class _Reader:
             self._other = f"line {line}: another table begins ({', '.join(filter(None, texts))[:60]!r})"
         elif self._other:
             self._n_unread += 1
-        elif at is not None or NUMBERISH.fullmatch(key) or (not key and force is not None and value):
+        elif at is not None or is_value(key) or (not key and force is not None and value):
             bad = value if force is None else key
             shown = self._table.separator.join(row)[:60]
             raise DataError(

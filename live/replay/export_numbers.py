@@ -29,6 +29,11 @@ EMPTY = ("", "nan", "-", "--", "---", "n/a", "#n/a", "#nv", "null", "1.#qnan", "
 """Cells without a force, in lower case."""
 
 
+def is_value(cell: str) -> bool:
+    """Whether a cell is a number or a time in any form."""
+    return bool(NUMBERISH.fullmatch(cell) or CLOCK.fullmatch(cell))
+
+
 def vote(cell: str) -> str:
     """The decimal mark that a number proves; "?" where three digits may be thousands; "" without a mark."""
     body = re.sub(f"[-+\u2212{_BETWEEN_THOUSANDS}]|[eE].*", "", cell)
@@ -37,8 +42,8 @@ def vote(cell: str) -> str:
         return max(marks, key=body.rfind)
     mark = next(iter(marks), "")
     head, *tails = body.split(mark) if mark else [body]
-    if len(tails) > 1:
-        return "," if mark == "." else "."
+    if len(tails) > 1:  # 1.149.200, but not 25.11.2026
+        return (set(".,") - {mark}).pop() if all(len(tail) == 3 for tail in tails) else ""
     if tails and len(tails[0]) == 3 and 1 <= len(head) <= 3 and head[0] != "0" and "e" not in cell.lower():
         return "?"
     return mark

@@ -21,7 +21,7 @@ from live.replay.export_headings import (
     newtons_of,
     plain_unit,
 )
-from live.replay.export_numbers import CLOCK, EMPTY, NUMBERISH
+from live.replay.export_numbers import EMPTY, NUMBERISH, is_value
 from live.replay.export_text import HEAD, Rows, encoding_of, lines_of, split_rows
 
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", "  ": "blanks", " ": "blanks"}
@@ -257,7 +257,7 @@ class _Search:
 
 
 def _has_value(row: Sequence[str]) -> bool:
-    return any(NUMBERISH.fullmatch(cell) or CLOCK.fullmatch(cell) for cell in row)
+    return any(map(is_value, row))
 
 
 def _is_units(row: Sequence[str]) -> bool:

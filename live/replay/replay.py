@@ -26,7 +26,6 @@ from acquire.opencv.images import picture_times
 from acquire.printable import counted
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
-from live.pipeline.burst_failures import LOG, BurstFailures
 from live.pipeline.consumer import Compose, RunInfo
 from live.pipeline.consumer_thread import Outputs
 from live.pipeline.event_log import EventLog
@@ -42,7 +41,7 @@ from live.replay.session import session_path
 from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Work, check_window, prefetch
 from live.results.finished.figures_file import finished
 from live.results.finished.finished_test import FinishedTest
-from live.results.folder import check_folder, make_folder
+from live.results.folder import LOG, BurstFailures, check_folder, make_folder
 from live.results.writer import write_results
 from live.setup.devices import open_rig
 from live.setup.pictures import with_film, with_mask

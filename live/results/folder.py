@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import os
 import platform
+import traceback
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from acquire.errors import ConfigError
+from acquire.events import Event, EventKind
+from acquire.frame import Burst
 from acquire.printable import printable
 from live import VERSION
+from live.pipeline.measure import NewReference
+from live.pipeline.run_state import RunState
 
 FILES = ("session.h5", "mask.png", "strain.h5", "strain.csv", "view.rrd", "config.json", "figures.json")
 _PACKAGES = ("numpy", "scipy", "numba", "opencv-python-headless", "h5py", "rerun-sdk", "pyserial")
+
+LOG = "errors.log"
+"""In the folder of the run: the traceback of each burst that failed."""
+MAX_TRACEBACKS = 100
 
 
 def versions() -> dict[str, str]:
@@ -96,3 +106,48 @@ def make_folder(wanted: str | None, now: datetime.datetime) -> Path:
 def _unused(folder: Path) -> Path:
     tries = [folder, *(folder.with_name(f"{folder.name}-{n}") for n in range(2, 1000))]
     return next(f for f in tries if not f.exists())
+
+
+class BurstFailures:
+    """Accounts for the bursts of one run that failed; ``measure`` calls it.
+
+    Parameters
+    ----------
+    run_state : RunState
+        Its frame counts take their frames as ``failed``; each gives an event.
+    folder : Path
+        Of the run; takes ``LOG``.
+
+    Attributes
+    ----------
+    count : int
+        Bursts that failed so far.
+    """
+
+    def __init__(self, run_state: RunState, folder: Path) -> None:
+        self._run_state, self._path = run_state, folder / LOG
+        self.count = 0
+
+    def __call__(self, number: int, item: Burst | NewReference, error: Exception) -> None:
+        """Take burst ``number`` (from 0), or a new reference before it, and what was raised."""
+        self.count += 1
+        burst, what = (
+            (item, f"burst {number + 1}") if isinstance(item, Burst) else (item.burst, "the new reference")
+        )
+        frames = f"frames {burst.first_index} to {burst.last_index}"
+        text = (
+            f"{what} ({frames}) could not be measured, the next one is: {type(error).__name__}: {error};"
+            f" {self._path.name} has the details"
+        )
+        if self.count <= MAX_TRACEBACKS:
+            trace = "".join(traceback.format_exception(error))
+            with (
+                contextlib.suppress(OSError),
+                self._path.open("a", encoding="utf-8", errors="replace") as file,
+            ):
+                file.write(f"{what} ({frames}), {burst.t:.3f} s\n{trace}\n")
+        if isinstance(item, Burst):
+            self._run_state.frame_counts.add(failed=burst.n)
+        data = {"first": burst.first_index, "last": burst.last_index, "n": burst.n, "number": number}
+        event = Event(burst.t, EventKind.MEASUREMENT, "measurement", text, "error", data)
+        self._run_state.event_log.record(event)

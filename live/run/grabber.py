@@ -12,7 +12,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from acquire.burst import PictureMemory, SumAccumulator, SummedBurst, nothing_cl
 from acquire.camera import Camera, missing_at_end
 from acquire.errors import PhasedicError
 from acquire.events import EventKind, RateLimiter
-from acquire.frame import Burst, CameraInfo, Frame
+from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.printable import counted
 from live.config.loading import Config
 from live.pipeline.queues import LatestQueue
@@ -99,6 +99,14 @@ def memory_of_measured(camera: CameraInfo, plan: GrabPlan) -> PictureMemory:
     return memory
 
 
+def _of_size(frame: Frame, camera: CameraInfo) -> Frame:
+    """The frame; a black one that is marked as damaged where its picture is not of the camera's size."""
+    if frame.image.shape == (camera.height, camera.width):
+        return frame
+    black = frozen(np.zeros((camera.height, camera.width), frame.image.dtype))
+    return replace(frame, image=black, damaged=True)
+
+
 class Grabber:
     """Runs the camera in its own thread.
 
@@ -155,6 +163,7 @@ class Grabber:
         self._accumulator = SumAccumulator(plan.burst, memory=self._memory)
         self._unassigned, self.time_is_over = 0, False
         self._limiter, self._unreported = RateLimiter(), 0
+        self._damage_limiter, self._damaged, self._damage_told = RateLimiter(), 0, False
         self.begun_t = self.arrived_t = math.nan
         self._first_t: float | None = None
         self._last_t: float | None = None
@@ -219,9 +228,11 @@ class Grabber:
         self.arrived_t = time.monotonic()
         if self._first_t is None:
             self.begun_t = self.arrived_t
-        self._frame_counts.add(grabbed=1, lost=frame.lost_before)
+        frame = _of_size(frame, self._camera.info)
+        self._frame_counts.add(grabbed=1, lost=frame.lost_before + frame.damaged)
         if frame.lost_before:
             self._report_loss(frame)
+        self._report_damage(frame)
         self._rate(frame)
         self._on_frame(frame)
         self._unassigned += 1
@@ -245,6 +256,24 @@ class Grabber:
         data = {"count": self._unreported, "before": frame.index}
         self._event_log.emit(EventKind.LOST, self._camera.info.address, text, "warning", data)
         self._unreported = 0
+
+    def _report_damage(self, frame: Frame) -> None:
+        """Emit that damaged pictures begin, at most every two seconds, and then that they have ended."""
+        if frame.damaged:
+            self._damaged += 1
+            if not self._damage_told and self._damage_limiter.due(frame.t):
+                self._damage_told = True
+                self._emit_damage(
+                    f"pictures come damaged from frame {frame.index} on; they count as lost", 1, frame
+                )
+        elif self._damage_told:
+            text = f"whole pictures again from frame {frame.index} on, {counted(self._damaged, 'frame')} came damaged"
+            self._emit_damage(text, self._damaged, frame)
+            self._damaged, self._damage_told = 0, False
+
+    def _emit_damage(self, text: str, count: int, frame: Frame) -> None:
+        data = {"count": count, "before": frame.index, "damaged": True}
+        self._event_log.emit(EventKind.LOST, self._camera.info.address, text, "warning", data)
 
     def _feed_reference(self, taker: ReferenceTaker, frame: Frame) -> None:
         reference = taker.add(frame)

@@ -36,7 +36,7 @@ from live.run.outcome import Outcome, StopSignal
 from live.run.pre_trigger import PreTriggerBuffer
 from live.run.prepared_run import PreparedRun, new_run_state, set_up
 from live.run.recorder import open_recording
-from live.setup.devices import Rig, open_rig
+from live.setup.devices import Rig, check_load_sign, open_rig
 
 _ARMED = "; nothing is recorded until the command start"
 _SILENT_S = 1.0
@@ -313,6 +313,7 @@ def run_live(
         The start failed; whatever was recorded by then is closed and readable.
     """
     stop, run_state = stop or StopSignal(), new_run_state(config, screen)
+    check_load_sign(config.load)
     rig = open_rig(
         config.camera.address,
         config.load.address,

@@ -14,13 +14,13 @@ from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind, EventSink, Level
 from acquire.frame import Burst
 from acquire.system import lower_priority
-from live.pipeline.burst_failures import BurstFailures
 from live.pipeline.consumer_thread import Outputs
 from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample
 from live.pipeline.measure import NewReference
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import ReferenceBurst, ReferenceMotion, motion_between
 from live.pipeline.run_state import RunState
+from live.results.folder import BurstFailures
 from live.run.burst_queue import BurstQueue
 from live.run.prepared_run import PreparedRun
 from live.setup.prepared import PreparedKernel

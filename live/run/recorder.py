@@ -241,6 +241,7 @@ class Recorder:
             self._guarded(lambda: self._writer.write_clock(ClockPair.now()))
         if now > self._next_disk:
             self._next_disk = now + DISK_EVERY_S
+            self._guarded(self._writer.flush)  # a file that is gone is noticed where nothing is written, too
             self._check_disk(now - self._began)
 
     def _check_disk(self, elapsed_s: float) -> None:

@@ -54,6 +54,7 @@ LAYERS = {
     **ANALYSIS,
     "hw_mocks": "acquire acquire.camera acquire.load_cell",
     "live": "",  # the version
+    "live.__main__": "live.cli",
     **{
         layer: " ".join(
             [

@@ -15,9 +15,9 @@ from acquire.frame import Burst
 from acquire.load_cell.load_log import LoadLog
 from acquire.session import Session
 from live.cli import main
-from live.pipeline.burst_failures import LOG, MAX_TRACEBACKS, BurstFailures
 from live.pipeline.measure import NewReference, Tracker, measure
 from live.pipeline.run_state import RunState
+from live.results.folder import LOG, MAX_TRACEBACKS, BurstFailures
 from tests.live.made_up import make_measurement
 
 SIM = "sim:uniform?lockstep=yes&seconds=2&fps=10&width=160&height=128&bits=12"

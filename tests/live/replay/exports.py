@@ -175,7 +175,9 @@ EXPORTS: dict[str, Made] = {
     "unit behind a comma": Made(_simple("Time, s,Load, kN", lambda t, f: f"{t},{f / 1e3:.7f}")),
     "unit by underscore": Made(_simple("time_s,load_kN", lambda t, f: f"{t},{f / 1e3:.7f}")),
     "exponents": Made(_simple("Time (s),Load (N)", lambda t, f: f"{t:.6E},{f:.6E}"), tolerance=1e-6),
-    "quoted decimal commas": Made(_simple('"Time (s)","Load (N)"', lambda t, f: comma(f'"{t}"|"{f}"').replace("|", ","))),
+    "quoted decimal commas": Made(
+        _simple('"Time (s)","Load (N)"', lambda t, f: '"' + comma(f"{t}") + '","' + comma(f"{f}") + '"')
+    ),
     "the force is a channel": Made(_simple("Time (s);Ch 1 [N];Ch 2 [mm]", lambda t, f: f"{t};{f};0")),
     "footer of results": Made(
         _simple("Zeit [s];Kraft [N]", _german, tail="\r\nMaximum;7153\r\nNummer;Fmax [N]\r\n99;7153\r\n100;1\r\n")
@@ -193,7 +195,8 @@ EXPORTS: dict[str, Made] = {
         _simple("A;B;C", lambda t, f: f"{f};0;{t}"), given={"column": "1,3", "unit": "N,s"}
     ),
     "commas for everything, given": Made(
-        _simple("Time (s),Load (N)", lambda t, f: comma(f"{t:.1f}") + "," + comma(f"{f:.4f}")), given={"decimal": "comma"}
+        _simple("Time (s),Load (N)", lambda t, f: comma(f"{t:.1f}") + "," + comma(f"{f:.4f}")),
+        given={"decimal": "comma"},
     ),
     "whole seconds and three decimals, given": Made(
         _simple("Time (ms);Load (kN)", lambda t, f: f"{1e3 * t:.0f};{1 + f / 1e4:.3f}"),
@@ -202,7 +205,8 @@ EXPORTS: dict[str, Made] = {
     ),
     # -- refused --------------------------------------------------------------------------------
     "groups of three digits": Made(
-        _simple("Time (s);Load (N)", lambda t, f: f"{10 * t:.0f};{thousands(f, '.', digits=0)}"), refused="--load-decimal"
+        _simple("Time (s);Load (N)", lambda t, f: f"{10 * t:.0f};{thousands(f, '.', digits=0)}"),
+        refused="--load-decimal",
     ),
     "groups of three digits beside decimal times": Made(
         _simple("Time (s);Load (N)", lambda t, f: f"{t};{thousands(f, '.', digits=0)}"), refused="--load-decimal"

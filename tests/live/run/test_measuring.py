@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -152,12 +153,12 @@ def test_each_measurement_is_counted_told_passed_on_and_shown(monkeypatch: pytes
     state.event_log.add_listener(events.append)
     made = [make_measurement(k) for k in range(2)]
     made[1] = replace(made[1], burst=replace(made[1].burst, motion_px=0.3))
-    ready: Any = SimpleNamespace(measurements=lambda bursts, loads, on_event: iter(made))
+    ready: Any = SimpleNamespace(measurements=lambda *given: iter(made))
     queue: Any = SimpleNamespace(bursts=lambda: None, fps=80.0)
     outputs: Any = SimpleNamespace(add=lambda m: order.append((m.number, round(m.time_step.latency_s, 6))))
     monitor: Any = SimpleNamespace(check=lambda sample, period_s: order.append(period_s) or "", p95_s=0.2)
-    nothing: Any = None
-    MeasureThread(nothing, state, outputs, queue, monitor, lambda: order.append("shown"))._measure(ready)
+    prepared: Any = SimpleNamespace(folder=Path())
+    MeasureThread(prepared, state, outputs, queue, monitor, lambda: order.append("shown"))._measure(ready)
     assert order == [(0, 0.465), "shown", 0.1, (1, 0.365), "shown", 0.1]
     assert state.frame_counts.measured == 16
     assert [(event.kind, event.data.get("first")) for event in events] == [

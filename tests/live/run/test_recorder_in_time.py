@@ -117,6 +117,9 @@ class ClockWriter(FakeBurstWriter):
     def write_clock(self, pair: Any) -> None:
         self.clocks += 1
 
+    def flush(self) -> None:
+        pass
+
 
 def test_clocks_are_compared_each_minute_and_the_disk_each_five_seconds(
     monkeypatch: pytest.MonkeyPatch,

@@ -113,7 +113,8 @@ def _draw(reader: Reader, scene: ViewScene, channel: ReplyChannel, max_MiB: floa
                 if (grown := memory_MiB()) > max_MiB:
                     channel.send(Kind.FULL, memory_MiB=round(grown))
                     return
-        scene.end()
+        if trouble := scene.end():
+            channel.notify(f"the view's file lacks its end, is the disk full? ({trouble})")
         channel.send(Kind.ENDED)
     finally:
         scene.end()

@@ -105,14 +105,14 @@ class ViewScene:
         self._outlines(self._setup.grid)
         self._region(self._setup.grid)
 
-    def end(self) -> None:
-        """Draw the last figures, send what waits, and close the sinks."""
+    def end(self) -> str:
+        """Draw the last figures, send what waits, and close the sinks; what failed, in words."""
         if (last := self._newest) is not None:
             self._draw_figures(last, [sink for sink in self._sinks if sink.lacks("figures", last.t)])
-        for sink in self._sinks:
+        sinks, self._sinks = self._sinks, []
+        for sink in sinks:
             sink.send_rows()
-            sink.close()
-        self._sinks = []
+        return "; ".join(filter(None, [sink.close() for sink in sinks]))
 
     # -- pictures and maps ------------------------------------------------------------------
 

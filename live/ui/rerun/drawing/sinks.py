@@ -131,10 +131,15 @@ class RerunSink:
             times, *values = np.array(rows, np.float64).T
             self.stream.send_columns(path, [rr.TimeColumn("time", duration=times)], _columns(path, values))
 
-    def close(self) -> None:
-        """Send everything, and close the stream."""
-        self.stream.flush(timeout_sec=_FLUSH_S)
-        self.stream.disconnect()
+    def close(self) -> str:
+        """Send everything, and close the stream; why that failed, as on a full disk, else nothing."""
+        try:
+            self.stream.flush(timeout_sec=_FLUSH_S)
+        except RuntimeError as error:
+            return str(error)
+        finally:
+            self.stream.disconnect()
+        return ""
 
 
 def _columns(path: str, values: Sequence[Any]) -> Any:

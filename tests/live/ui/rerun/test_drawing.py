@@ -31,7 +31,7 @@ from live.ui.rerun.drawing.shapes import (
     thinned,
     with_heads,
 )
-from live.ui.rerun.drawing.sinks import Rates, RerunSink, write
+from live.ui.rerun.drawing.sinks import ALL, Rates, RerunSink, write
 from live.ui.rerun.messages import PictureMessage, ViewSetup, ViewTarget, row_of
 from tests.live.made_up import START, figures, make_field, make_frame, make_grid, make_measurement
 
@@ -372,3 +372,19 @@ def test_the_curve_rises_with_the_force() -> None:
     )
     first, last = np.asarray(drawn["curve/line"].strips.as_arrow_array().to_pylist()[0])
     assert first[1] == pytest.approx(1) and last[1] < 0.3 and last[0] > first[0]
+
+
+def test_a_stream_that_cannot_be_ended_says_why() -> None:
+    """As on a full disk: the thread of rerun that writes has ended."""
+
+    class Full:
+        ended = False
+
+        def flush(self, timeout_sec: float) -> None:
+            raise RuntimeError("File-writer thread shut down prematurely")
+
+        def disconnect(self) -> None:
+            self.ended = True
+
+    stream = Full()
+    assert RerunSink(stream, ALL).close() == "File-writer thread shut down prematurely" and stream.ended

@@ -15,6 +15,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
+from live.results.summary import summary_lines
 from live.ui.terminal.summary import brief_lines, print_summary, trouble_lines
 from tests.live.made_run import PULLED, finished, force_of
 from tests.live.made_up import make_measurement
@@ -104,3 +105,36 @@ def test_a_load_that_is_more_than_five_degrees_off_its_axis_is_told(degrees: flo
     lines = [line for line in lines_of(run_state) if "largest strain" in line]
     assert len(lines) == shown
     assert not shown or f"largest strain {-degrees:g} degrees off y (clockwise)" in lines[0]
+
+
+def without_values(run_state: RunState, *numbers: int) -> RunState:
+    """The same run, whose time steps of these numbers have no value at all."""
+    changed = RunState.new(0.5, specimen=SECTION)
+    for k, step in enumerate(run_state.history.time_steps):
+        nothing = dict.fromkeys(("exx", "eyy", "exy", "sigma_eyy"), math.nan) | {
+            "n_valid": 0,
+            "gauges": {},
+        }
+        changed.history.add(replace(step, **nothing, refused="9 LOST") if k in numbers else step)
+    return changed
+
+
+def test_the_end_is_that_of_the_last_burst() -> None:
+    strains = (0.0, 1e-3, 2e-3, 3e-3)
+    whole = run_of(strains, SpecimenConfig(axis="y"), loads=False)
+    for step in whole.history.time_steps:
+        assert step.n_valid > 0
+    torn = without_values(whole, 2, 3)
+    assert whole.history.ends_with_values and not torn.history.ends_with_values and torn.history.has_values
+    n_zoi = torn.history.time_steps[-1].n_zoi
+    lines = brief_lines(torn, finished(torn))
+    assert lines[0] == f"measured 4 bursts, 0 of {n_zoi} ZOIs valid in the last (9 LOST)"
+    assert lines[1] == f"strain along y at the end: no value, 0 of {n_zoi} valid"
+    assert lines[2].startswith("the last burst with a value is 2 of 4: +1,000 \u00b1 ")
+    assert any(
+        f"last strain of the region: no value, 0 of {n_zoi} ZOIs valid" in x
+        for x in summary_lines(torn, finished(torn))
+    )
+    back = without_values(whole, 1, 2)
+    found_again = brief_lines(back, finished(back))
+    assert found_again[1].startswith("strain along y at the end: +3,000 \u00b1 ")
