@@ -3,9 +3,11 @@
 ``plane`` is the apparent motion of a rigid plane in pictures, ``layout`` places the ZOIs of plates beside those of the
 specimen, ``plates`` measures the apparent motion on them. ``keystone`` names
 what motion off the plane shows without them. ``shutter`` removes
-what reading line by line adds, for the time that ``readout`` finds; ``lens`` the distortion, which ``shifts`` finds.
+what reading line by line adds, for the time that ``readout`` finds; ``burst_motion`` is the error of an uneven motion
+during a burst; ``lens`` the distortion, which ``shifts`` finds.
 """
 
+from analysis.optics.burst_motion import BurstMotion
 from analysis.optics.keystone import Keystone, alike, keystones
 from analysis.optics.layout import Box, PlateLayout, without_plates
 from analysis.optics.lens import LENS_NAMES, LensCorrection, LensModel, LensReading, strain_of_shift
@@ -23,6 +25,7 @@ __all__ = [
     "SCALE",
     "ApparentMotion",
     "Box",
+    "BurstMotion",
     "ChosenModel",
     "Keystone",
     "LensCorrection",

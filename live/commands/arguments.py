@@ -19,7 +19,7 @@ from live.commands.exit_codes import EXIT_CODES
 # Shown at the end of the help of each command; a test parses them all.
 EXAMPLES = {
     "run": "phasedic run --camera '/dev/video0?format=Y12&fps=30' --load '/dev/ttyUSB0?protocol=ascii&unit=N' --report",
-    "demo": "phasedic demo --specimen hole --seconds 20",
+    "demo": "phasedic demo --specimen hole",
     "init": "phasedic init --camera '/dev/video0?format=Y12&fps=30' --section 20,2",
     "scale": "phasedic scale --camera /dev/video0 --points 100,200,900,200 --length 25",
     "lens": "phasedic lens 'board/*.png' --checkerboard 9x6 --square 10 --out lens.toml",

@@ -58,6 +58,7 @@ RATE_BURSTS, LEAD_S, LONGEST_WAIT_S = 6, 0.5, 120.0
 """Bursts that give the rate of this machine; s from then to the pull, and from the start to it at the longest."""
 SLOW_FPS, SMALL = 5.0, {"width": 320, "height": 256, "hole": 30, "cell": 48}
 """Below this rate of the whole picture, a quarter of it is taken: half of all lengths."""
+SMALL_LOAD_RATE = 20.0  # 1/s, then
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,7 +78,7 @@ def command(arguments: argparse.Namespace) -> int:
     check_folder(config.output.dir)
     # All that the next commands need too: 8-bit pictures, and a batch.
     compile_ahead(PICTURE_KINDS, phase=True, show=screen.status)
-    config = replace(config, camera=replace(config.camera, address=fitting(config.camera.address)))
+    config = fitting(config)
     collector, operator = MeansCollector(), Operator(config.output.seconds)
     # The whole picture is specimen: it is only looked at where gauges are to be placed.
     with located(config, screen.print) if config.measure.gauges == AUTO else nullcontext(config) as config:
@@ -89,15 +90,20 @@ def command(arguments: argparse.Namespace) -> int:
     return code if code == 1 else outcome.exit_code or code
 
 
-def fitting(address: str) -> str:
-    """The address with a smaller picture where this machine is slow, and the rate is not given."""
+def fitting(config: Config) -> Config:
+    """The rig with a smaller picture and fewer forces where this machine is slow, and the rate is not given."""
     from hw_mocks.sim_camera import fps_on_this_machine
 
+    address = config.camera.address
     parsed = parse_address(address)
-    if ("fps", "auto") in parsed.settings and fps_on_this_machine(parsed) < SLOW_FPS:
-        for key, value in SMALL.items():
-            address = with_setting(address, key, value)
-    return address
+    if ("fps", "auto") not in parsed.settings or fps_on_this_machine(parsed) >= SLOW_FPS:
+        return config
+    for key, value in SMALL.items():
+        address = with_setting(address, key, value)
+    load = with_setting(config.load.address, "rate", SMALL_LOAD_RATE)
+    return replace(
+        config, camera=replace(config.camera, address=address), load=replace(config.load, address=load)
+    )
 
 
 def _defaults(arguments: argparse.Namespace) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from analysis.field import part_of
 from analysis.optics import (
     ASSUMED_TILT,
     SCALE,
+    BurstMotion,
     LensCorrection,
     PlateFit,
     ShutterCorrection,
@@ -266,7 +267,7 @@ def measure(
     Measurement
         One for each burst, in order, but for those that failed.
     """
-    number = -1
+    number, motion = -1, BurstMotion()
     for item in bursts:
         number += isinstance(item, Burst)
         try:
@@ -276,6 +277,7 @@ def measure(
             began = timer()
             whole = tracker.measure(corrections.sensor(item))
             field, of_plates, of_lens = corrections.applied(whole, item, strain)
+            field = motion.apply(field, item.t, item.duration)
             took = timer() - began
             measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, of_plates)
             measurement = replace(measurement.with_lens(of_lens), as_measured=whole)

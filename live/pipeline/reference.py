@@ -100,7 +100,7 @@ def prepare(
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class ReferenceMotion:
     """The motion of the picture from one half of the reference burst to the other.
 
     Attributes
@@ -128,7 +128,7 @@ class Motion:
 
 def motion_between(
     kernel: PhaseKernel, first: Burst, second: Burst, correct: Correction = unchanged
-) -> Motion:
+) -> ReferenceMotion:
     """The motion of the picture from one half of the reference burst to the other."""
     first, second = correct(first), correct(second)
     # A start without a search: a still picture has not moved, and the test can begin sooner.
@@ -138,12 +138,12 @@ def motion_between(
     motion = np.hypot(b.u - a.u, b.v - a.v)
     found, usable = np.isfinite(motion), ~np.isin(a.status, (Status.NOT_MEASURED, Status.NO_PATTERN))
     if not found.sum() > MIN_FOUND * usable.sum():
-        return Motion(math.nan)
+        return ReferenceMotion(math.nan)
     changes = []
     for name in ("exx", "eyy"):
         (before, sigma), (after, sigma_after) = a.mean(name, found), b.mean(name, found)
         changes.append((after - before, math.hypot(sigma, sigma_after)))
-    return Motion(float(np.median(motion[found])), *max(changes, key=lambda change: abs(change[0])))
+    return ReferenceMotion(float(np.median(motion[found])), *max(changes, key=lambda change: abs(change[0])))
 
 
 def repetition_text(period: NDArray[np.float64]) -> str:

@@ -18,7 +18,7 @@ from live.pipeline.consumer_thread import Outputs
 from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample
 from live.pipeline.measure import NewReference
 from live.pipeline.measurement import Measurement
-from live.pipeline.reference import Motion, ReferenceBurst, motion_between
+from live.pipeline.reference import ReferenceBurst, ReferenceMotion, motion_between
 from live.pipeline.run_state import RunState
 from live.results.folder import BurstFailures
 from live.run.burst_queue import BurstQueue
@@ -80,7 +80,7 @@ class ReferenceSelector:
         self._report(reference.burst, motion)
         return ready
 
-    def _another(self, motion: Motion, attempt: int) -> ReferenceBurst | None:
+    def _another(self, motion: ReferenceMotion, attempt: int) -> ReferenceBurst | None:
         """The next reference; None where the run ends, or where one that moved must be used.
 
         A reference that cannot be measured is never used: the next one is tried until one is good.
@@ -99,7 +99,7 @@ class ReferenceSelector:
             self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "error")
         return self._burst_queue.retake_reference()
 
-    def _report(self, burst: Burst, motion: Motion) -> None:
+    def _report(self, burst: Burst, motion: ReferenceMotion) -> None:
         force, n = self._run_state.loads.mean(burst.t - burst.duration / 2, burst.t + burst.duration / 2)
         data = {
             "first": burst.first_index,
@@ -116,10 +116,10 @@ class ReferenceSelector:
         )
 
 
-def _motion(ready: PreparedKernel, reference: ReferenceBurst) -> Motion:
+def _motion(ready: PreparedKernel, reference: ReferenceBurst) -> ReferenceMotion:
     """The motion within the burst; NaN where it cannot be measured, and then it is not still."""
     if reference.halves is None:
-        return Motion(0.0)
+        return ReferenceMotion(0.0)
     return motion_between(ready.kernel, *reference.halves, ready.plan.correct)
 
 
@@ -130,7 +130,7 @@ def _or_none(value: float) -> float | None:
 class SmearGuard:
     """Checks the motion during each measured burst; an event when smear begins and when it ends.
 
-    Motion v during T multiplies the contrast at wave number k by |sinc(k v T / 2)|: negligible up to
+    ReferenceMotion v during T multiplies the contrast at wave number k by |sinc(k v T / 2)|: negligible up to
     0.05 px. The motion is estimated with each burst (``acquire.burst.accumulate``).
 
     Parameters

@@ -262,9 +262,14 @@ def test_the_picture_is_as_large_as_the_machine_renders(
     fps: float, width: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("hw_mocks.sim_camera.fps_on_this_machine", lambda address: fps)
-    settings = dict(parse_address(demo.fitting("sim:hole?fps=auto&bits=12")).settings)
+    auto, given = (
+        load_config(None, {"camera.address": f"sim:hole?fps={rate}&bits=12", "load.address": "sim:"})
+        for rate in ("auto", "10")
+    )
+    settings = dict(parse_address(demo.fitting(auto).camera.address).settings)
     assert settings.get("width") == width and settings.get("hole") == (width and "30")
-    assert demo.fitting("sim:hole?fps=10") == "sim:hole?fps=10"
+    assert demo.fitting(auto).load.address == ("sim:?rate=20" if width else "sim:")
+    assert demo.fitting(given) == given
 
 
 def figures_of(modulus: Figure) -> Any:

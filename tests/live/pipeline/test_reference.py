@@ -11,7 +11,7 @@ import pytest
 from acquire.events import Event, EventKind
 from analysis import Roi, Status, StrainField, ZoiGrid
 from live.pipeline.measure import Tracker, _share
-from live.pipeline.reference import Motion, averaged, motion_between, repetition_text
+from live.pipeline.reference import ReferenceMotion, averaged, motion_between, repetition_text
 from tests.live.made_up import START, make_field, make_grid, make_measurement
 
 GRID = ZoiGrid.cover(Roi(0, 0, 176, 32), 32, 16)  # ten side by side
@@ -74,8 +74,8 @@ def test_zois_without_a_pattern_do_not_count() -> None:
 def test_a_reference_is_pulled_beyond_five_sigma_and_twenty_micrometres_a_metre(
     strain: float, sigma: float, pulled: bool
 ) -> None:
-    assert Motion(0.01, strain, sigma).pulled is pulled
-    assert not Motion(0.01).pulled
+    assert ReferenceMotion(0.01, strain, sigma).pulled is pulled
+    assert not ReferenceMotion(0.01).pulled
 
 
 def test_the_noise_of_a_mean_has_at_least_that_of_the_rounding() -> None:

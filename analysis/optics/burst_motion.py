@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acquire.frame import Burst
 from analysis.field import CommonError, StrainField
+from analysis.optics.plane import affine_values
 
 CERTAIN = 3.0
 """A change of the strain rate is one beyond so many of its standard uncertainties."""
@@ -34,11 +34,11 @@ class BurstMotion:
     def __init__(self) -> None:
         self._before: list[_Seen] = []
 
-    def apply(self, field: StrainField, burst: Burst) -> StrainField:
-        """``field`` with the error in common to all its ZOIs; as it is where its burst has no duration."""
-        here = _Seen(burst.t, field, {name: field.mean(name) for name in STRAINS})
+    def apply(self, field: StrainField, t: float, duration: float) -> StrainField:
+        """``field`` of a burst at ``t`` with this error, common to its ZOIs; as it is without a ``duration`` (s)."""
+        here = _Seen(t, field, {name: field.mean(name) for name in STRAINS})
         before, self._before = self._before, [*self._before[-1:], here]
-        if burst.duration <= 0 or len(before) < 2 or not before[0].t < before[1].t < here.t:
+        if duration <= 0 or len(before) < 2 or not before[0].t < before[1].t < here.t:
             return field
         ahead = (here.t - before[1].t) / (before[1].t - before[0].t)
         shares = (ahead, -1 - ahead, 1.0)  # of the three: how far the last is off a straight line
@@ -52,12 +52,8 @@ class BurstMotion:
                 unexplained = max(unexplained, 1 - CERTAIN**2 * noise / off**2)
         if not unexplained:
             return field
-        affine = (_affine(seen.field) * share for share, seen in zip(shares, (*before, here), strict=True))
+        affine = (
+            affine_values(seen.field) * share for share, seen in zip(shares, (*before, here), strict=True)
+        )
         error = CommonError(np.nan_to_num(sum(affine))[None], np.array([[unexplained]]))
         return replace(field, common=error.beside(field.common))
-
-
-def _affine(field: StrainField) -> np.ndarray:
-    """(6, R, C): u, du_dx, du_dy, v, dv_dx, dv_dy of each ZOI."""
-    half = len(field.parameters) // 2
-    return np.concatenate([field.parameters[:3], field.parameters[half : half + 3]])
