@@ -11,16 +11,18 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any, Self
 
 from acquire.addresses import Address
 from acquire.closing import Closing
-from acquire.device_clock import DeviceClock
+from acquire.device_clock import ClockUnit, DeviceClock
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.protocols.base import Reading
 from acquire.serial_line.clock import ArrivalRate, ArrivalTimes
+from acquire.serial_line.echo import Echo
 from acquire.serial_line.link import FloodGuard, Link, LinkContext, LoadWatch, Opener
 from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling
@@ -76,6 +78,7 @@ class SerialCell(Closing):
             DeviceClock(),
             ArrivalRate(),
         )
+        self._unit = ClockUnit()  # of the device's own time
         self._last_t = -math.inf  # of the last sample
         self._last_read = math.nan
         self._watch, self._flood = (
@@ -87,7 +90,8 @@ class SerialCell(Closing):
         self._skipped = 0  # bytes, in floods
         self._waited = True  # for the bytes of the last round
         context = LinkContext(opener, clock, self._stop, self._sleep)
-        self._link = Link(settings.line, context, self._report, lambda: self._watch.last_words(clock()))
+        echo = Echo(self._parser, self._report) if settings.mode == "poll" else None
+        self._link = Link(settings.line, context, self._report, lambda: self._watch.last_words(clock()), echo)
         try:
             self._command("start")
             self._wait_for_first()
@@ -200,7 +204,7 @@ class SerialCell(Closing):
         self._rest()
         began = self._clock()
         data = self._link.receive(BLOCK)
-        self._last_read = self._clock()
+        self._last_read = self._link.arrived if data else self._clock()
         self._waited = self._last_read - began > 1e-3
         readings = self._feed(data)
         if not data or self._last_read - self._polled > ANSWER_S:
@@ -235,6 +239,7 @@ class SerialCell(Closing):
         if not readings:
             return []
         times = [self._times.began(reading.start) for reading in readings]
+        readings = self._in_milliseconds(readings, times[-1])
         stamps = [(r.device_ms, t) for r, t in zip(readings, times, strict=True) if r.device_ms is not None]
         waited = self._flood.late
         if not waited:  # messages of unknown age cannot tie the device's clock
@@ -247,6 +252,20 @@ class SerialCell(Closing):
         else:
             late = self._pace.late(times)
         return [self._sample(*one) for one in zip(readings, times, late, strict=True)]
+
+    def _in_milliseconds(self, readings: list[Reading], arrived: float) -> list[Reading]:
+        """The readings with the device's own time in ms, whatever it counts; without it where it is no clock."""
+        count = readings[-1].device_ms
+        if count is not None and not self._flood.late and (text := self._unit.look(count, arrived)):
+            self._report("warning", text)
+            self._device = DeviceClock()
+        ms = self._unit.ms
+        if ms == 1.0:
+            return readings
+        return [
+            replace(r, device_ms=None if ms is None or r.device_ms is None else r.device_ms * ms)
+            for r in readings
+        ]
 
     def _sample(self, reading: Reading, t: float, late: bool) -> LoadSample:
         if reading.device_ms is not None and self._device.tied:
@@ -271,7 +290,7 @@ class SerialCell(Closing):
         data = self._settings.commands.get(name)
         if data is None or (name in ("start", "stop") and self._settings.mode != "stream"):
             return False
-        return self._link.write(data)
+        return self._link.write(data, polls=self._settings.mode == "poll")
 
     def tare(self, *, force: bool = False) -> None:
         """Make the present load zero; done, or refused, by the reading thread at its next round."""

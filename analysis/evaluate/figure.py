@@ -23,7 +23,7 @@ class Figure:
     why : str
         Why it cannot be had; of a value, a remark, mostly none.
     qualifier : str
-        Words that belong before the number, as ``AT_LEAST`` of a bound; mostly none.
+        What kind of a number it is, as "film" of a compressed film, or ``AT_LEAST`` of a bound; mostly none.
     """
 
     value: float
@@ -64,6 +64,12 @@ class Figure:
     def over(self, other: float) -> Figure:
         """The figure in another unit: divided by a positive number."""
         return replace(self, value=self.value / other, low=self.low / other, high=self.high / other)
+
+    def limited(self, share: float, qualifier: str) -> Figure:
+        """The figure with a limit of error beyond its interval, a ``share`` of its value."""
+        beyond = share * abs(self.value)
+        words = self.qualifier or (qualifier if self.known else "")
+        return replace(self, low=self.low - beyond, high=self.high + beyond, qualifier=words)
 
     def minus(self, other: float, sigma: float = 0.0) -> Figure:
         """``other``, of standard uncertainty ``sigma``, taken away."""

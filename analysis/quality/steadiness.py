@@ -39,6 +39,8 @@ class Steadiness:
     seconds : float, s
     rate : float or None, 1/s
         Of the series; None without times.
+    sigma_drift : float
+        Standard uncertainty of ``drift``; NaN where it is not known.
     """
 
     drift: float
@@ -47,6 +49,7 @@ class Steadiness:
     frequency: float | None
     seconds: float
     rate: float | None
+    sigma_drift: float = math.nan
 
     @property
     def vibration(self) -> float:
@@ -77,7 +80,8 @@ def steadiness(times: ArrayLike, values: ArrayLike, noise: float = 0.0) -> Stead
     rms = math.sqrt(float(rest @ rest) / (len(x) - 2))
     peak = main_frequency(t, rest) if timed else None
     rate = 1 / float(np.median(np.diff(t))) if timed else None
-    return Steadiness(float(slope), rms, noise, peak, span, rate)
+    sigma = max(rms, noise) / math.sqrt(float(((place - place.mean()) ** 2).sum()))
+    return Steadiness(float(slope), rms, noise, peak, span, rate, sigma)
 
 
 def main_frequency(times: Floats, values: Floats) -> float | None:

@@ -20,7 +20,7 @@ from acquire.session import Session
 from live.config.loading import Config, from_dict, settings_in
 from live.pipeline.measure import NewReference
 from live.replay.burst_index import BurstStore, open_store
-from live.replay.pictures import reference_from
+from live.replay.pictures import reference_from, reference_words
 from live.replay.source import ReplayRequest, ReplaySource, Window, Work
 
 LIVE_ONLY = ("output", "record", "operate", "strain_out", "alarm")
@@ -102,8 +102,19 @@ def session_source(session: Session, request: ReplayRequest, config: Config, pat
         found = _all_after(stored, after, n, window, request.numbers)
     start = ClockPair(session.start_monotonic, session.start_utc)
     bursts = window.part(found.bursts)
+    numbers = session.indices if len(session) else session.burst_column("last_index")
+    words = reference_words(request, reference, len(numbers), last=int(numbers[-1]) if len(numbers) else None)
     return ReplaySource(
-        session.camera, reference, bursts, loads, start, events, samples, found.expected, found.times
+        session.camera,
+        reference,
+        bursts,
+        loads,
+        start,
+        events,
+        samples,
+        found.expected,
+        found.times,
+        words=words,
     )
 
 

@@ -40,6 +40,7 @@ _REMARKED = ("E", "nu", *_FLOW)
 
 _PLAIN, _PERCENT, _MPA, _GPA, _KN = ("", 1.0), ("%", 0.01), ("MPa", 1e6), ("GPa", 1e9), ("kN", 1e3)
 _STRENGTH_SUFFIXES = dict(zip(_STRENGTHS, ("p0.1", "p0.2", "p1", "eH", "eL", "m"), strict=True))
+NO_READINGS = "no readings of a load cell are there"
 LAG_MATTERS_S = 0.005  # and beyond its own uncertainty: to correct a smaller one changes no figure
 _SMALL_KN = 2.0  # below it forces are shown in N
 
@@ -148,6 +149,7 @@ def tensile_options(specimen: SpecimenConfig) -> TensileOptions:
         _times(specimen.force_error_percent, 0.01),
         _times(specimen.section_error_percent, 0.01) if specimen.area_m2 else None,
         _times(specimen.strain_error_um_m, 1e-6),
+        _times(specimen.film_error_percent, 0.01),
     )
     if specimen.zero == "preload" and specimen.area_m2 is not None:
         return TensileOptions(standard, "preload", specimen.preload_MPa * 1e6, limits, specimen.test)
@@ -171,15 +173,15 @@ def lag_of(history: History, loads: LoadLog, specimen: SpecimenConfig) -> Figure
     """The lag of the load behind the frames, s, found from the test itself."""
     t, force = loads.arrays()
     if not len(t):
-        return Figure.none("no readings of a load cell")
-    if loads.by_name:
+        return Figure.none(NO_READINGS)
+    if loads.by_picture:
         return Figure.none("each force was given for a picture: there is none")
     return find_lag(Track(history.column("t"), history.along(specimen.axis)[0]), Track(t, force))
 
 
 def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
     """``lag_of`` as text; nothing without a load, or where there can be none."""
-    if not len(loads.arrays()[0]) or loads.by_name:
+    if not len(loads.arrays()[0]) or loads.by_picture:
         return []
     lag = lag_of(history, loads, specimen)
     if not lag.known:
@@ -209,6 +211,17 @@ def sharpness_line(blur: Sequence[float], sigma: Sequence[float]) -> list[str]:
         return []
     largest = max(known, key=lambda one: abs(one.px))
     return [f"sharpness since the reference: {largest.text} at most, {known[-1].text} in the last picture"]
+
+
+def film_line(specimen: SpecimenConfig) -> list[str]:
+    """The limit of error of strains of a compressed film; nothing for others."""
+    limit = specimen.film_error_percent
+    if not limit:
+        return []
+    return [
+        f"strains of a compressed film: not better than {limit:g} %, beside ± (the codec holds motion back; record"
+        " MJPG, FFV1 or pictures)"
+    ]
 
 
 def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:

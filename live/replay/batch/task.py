@@ -203,7 +203,7 @@ def _replayed(task: Task, staging: Path, on_progress: OnProgress) -> BatchRow:
     with (staging / LOG_FILE).open("w", encoding="utf-8") as file:
         screen, began = _LogScreen(file, on_progress), time.monotonic()
         done = replay(task.request(staging), screen, threading.Event())
-        for line in [*summary_lines(done.run_state, done.config.specimen), *done.lines]:
+        for line in [*summary_lines(done.run_state, done.test), *done.lines]:
             screen.print(line)
     on_progress(screen.last)
     before = sum(_seconds(Path(chunk)) for chunk in task.chunks)

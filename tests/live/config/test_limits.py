@@ -74,7 +74,7 @@ OTHERS = {
     "strain_out": {"tcp": None, "udp": None, "serial": None, "format": "json", "channels": None},
     "view": {"enabled": True, "rrd": True, "spawn": True, "scale": "symmetric", "light": False},
     "specimen": {
-        "axis": "auto", "standard": "iso6892", "modulus_between": (0.0005, 0.0025), "zero": "raw",
+        "axis": "auto", "standard": "iso6892", "test": "auto", "modulus_between": (0.0005, 0.0025), "zero": "raw",
     },
     "output": {"dir": None, "report": False},
 }  # fmt: skip
@@ -111,6 +111,7 @@ def test_no_key_is_left_out_here() -> None:
     assert rest == OTHERS
     assert dataclasses.asdict(AlarmConfig()) == {
         "channel": "", "above": None, "below": None, "hysteresis": 0.0, "name": "", "end": False, "line": "",
+        "end_on_unknown": False,
     }  # fmt: skip
     assert PlateConfig().box is None
     assert (DEFAULT_BURST, DEFAULT_REFERENCE_BURST) == (4, 32)

@@ -23,7 +23,7 @@ from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.map_view import MapView
 from live.ui.web.page_consumer import PageConsumer
 from live.ui.web.run_result import peaks, run_result
-from tests.live.made_run import E_PA, PULLED, THICKNESS_MM, WIDTH_MM, YIELD, force_of
+from tests.live.made_run import E_PA, PULLED, THICKNESS_MM, WIDTH_MM, YIELD, finished, force_of
 from tests.live.made_up import START, make_frame, make_grid, make_measurement
 
 LINE = {"gauges.long": {"kind": "line", "start": [64, 20], "end": [64, 70]}}
@@ -218,7 +218,7 @@ def test_the_lines_over_the_curve_are_in_si_units() -> None:
         state.loads.append(LoadSample(START + 0.1 * k, force_of(strain)))
         state.history.add(make_measurement(k, strain).time_step)
     state.loads.close()
-    result = run_result(state, specimen, Path("runs/a"), "interrupted")
+    result = run_result(state, finished(state, specimen), Path("runs/a"), "interrupted")
     assert (result["folder"], result["words"]) == (str(Path("runs/a")), "interrupted")
     elastic, offset, proof, highest = result["lines"]
     (x0, y0), (x1, y1) = elastic["points"]
