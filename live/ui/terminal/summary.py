@@ -84,7 +84,9 @@ def _figures(test: FinishedTest) -> list[str]:
         return ["E is not known: no force is known (--load)"]
     odd = doubts(findings(test))
     why = figures.E.why + "; the first line above says what to look at" * bool(odd)
-    return list(dict.fromkeys([f"E is not known: {why}", *figure_lines(figures, specimen)[:1], *figures.notes]))
+    return list(
+        dict.fromkeys([f"E is not known: {why}", *figure_lines(figures, specimen)[:1], *figures.notes])
+    )
 
 
 def _remarks(run_state: RunState, test: FinishedTest) -> Iterator[str]:
