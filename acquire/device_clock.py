@@ -10,13 +10,17 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
+
+import numpy as np
 
 LATE_S = 5.0  # a device that stays late for so long has set its clock back
 TURNS_S = (2**32 * 1e-6, 2**32 * 1e-3)  # after which counters of 32 bits begin again: micros(), millis()
-PIECE_S, WINDOW_S = 0.5, 90.0  # the least delayed arrival of each piece of the window is kept
+PIECE_S, WINDOW_S = 0.5, 60.0  # the least delayed arrival of each piece of the window is kept
 KNOWN, KEPT = 8, 16  # pieces: from which the rate is known, and which are kept however old they are
-TICK_S = 1e-3  # of the coarsest clock that is usual
+TICK_S = 2e-3  # of the coarsest clock that is usual, and of USB
+NEAR_PART = 0.3  # more than one beat of a latency timer of 16 ms with a clock that is 0.1 % wrong: 16 s
 DRIFT_S = 15.0  # from which on the drift is told
 
 Point = tuple[float, float]  # device's time, offset of the host's from it, s
@@ -45,9 +49,9 @@ class DeviceClock:
     """Ties a device's milliseconds to the host's clock.
 
     Arrivals are never early: host minus device lies on or above a straight line, whose slope is the rate of the
-    device's clock. The slope is an edge of the lower convex hull of the least delayed arrivals (Moon, Skelly, Towsley,
-    INFOCOM 1999, doi:10.1109/INFCOM.1999.749287, have the same line by linear programming); the edge a quarter from the
-    newest, so that earlier delays soon count no longer. From each of these arrivals the offset may have risen by that
+    device's clock. The slope is an edge of the lower convex hull of the least delayed arrivals (as that of Moon,
+    Skelly, Towsley, INFOCOM 1999, doi:10.1109/INFCOM.1999.749287): the one of the newer half that most are near to, so
+    that neither a time of load nor its end bends it. From each of these arrivals the offset may have risen by that
     slope and what it may be wrong by, and before it is known by ``rate_limit``; the least of that is the offset. So a
     time lies between the true one and that of the arrival wherever the rate is within its bound.
 
@@ -173,11 +177,8 @@ class DeviceClock:
             points.popleft()
         if len(points) < KNOWN:
             return
-        span = points[-1][0] - points[0][0]
-        (x, y), (x1, y1) = _edge(points, points[-1][0] - span / 4)
-        self._rate = (y1 - y) / (x1 - x)
-        above = sum(offset - y - self._rate * (device - x) for device, offset in points) / len(points)
-        self._rise = self._rate + (above + TICK_S) / span
+        self._rate, above = _best_edge(points)
+        self._rise = self._rate + (2 * above + TICK_S) / (points[-1][0] - points[0][0])
         self._offset = min(offset + self._rise * (self._last - device) for device, offset in points)
 
     @property
@@ -191,17 +192,29 @@ class DeviceClock:
         return math.sqrt(self._square / self._count) if self._count else math.nan
 
 
-def _edge(points: Sequence[Point], at: float) -> tuple[Point, Point]:
-    """The edge of the lower convex hull below ``at``; the points have ascending times."""
+def _best_edge(points: Sequence[Point]) -> tuple[float, float]:
+    """The slope of that edge of the lower convex hull which ``NEAR_PART`` of the points are nearest to; how near, s.
+
+    Points have ascending times. Delays of a time of load, before or after, make edges that few points are near to. Of
+    the older half no edge counts: slopes rise from edge to edge, and a time too early is worse than one too late.
+    """
     hull: list[Point] = []
     for x, y in points:
-        while len(hull) > 1 and (hull[-1][0] - hull[-2][0]) * (y - hull[-2][1]) <= (x - hull[-2][0]) * (
-            hull[-1][1] - hull[-2][1]
-        ):
+        while len(hull) > 1 and _slope(hull[-2], (x, y)) <= _slope(hull[-2], hull[-1]):
             hull.pop()
         hull.append((x, y))
-    right = next(k for k in range(1, len(hull)) if hull[k][0] >= at)
-    return hull[right - 1], hull[right]
+    times, offsets = np.array(points).T
+    near, best = int(NEAR_PART * len(points)), (math.inf, 0.0)
+    for left, right in pairwise(hull):
+        if right[0] >= (times[0] + times[-1]) / 2:
+            slope = _slope(left, right)
+            above = offsets - left[1] - slope * (times - left[0])
+            best = min(best, (float(np.partition(above, near)[near]), slope))
+    return best[1], best[0]
+
+
+def _slope(left: Point, right: Point) -> float:
+    return (right[1] - left[1]) / (right[0] - left[0])
 
 
 class ClockUnit:
@@ -216,12 +229,12 @@ class ClockUnit:
     UNITS: ClassVar = {1.0: "milliseconds", 1e-3: "microseconds", 1e3: "seconds"}
     SOON_S, NEAR = 0.25, 1.25  # from when on a pace tells the unit, and how near it must be
     SURE_S, SURE = 10.0, 1.05  # and so for good
-    GIVE_UP_S = 3.0
+    AGREE, GIVE_UP_S = 3, 3.0
 
     def __init__(self) -> None:
         self.ms: float | None = 1.0
         self._first: tuple[float, float] | None = None
-        self._begun = math.inf
+        self._begun, self._near = math.inf, 0  # looks in a row that agree
         self._found = self._sure = self._fine = False
 
     def look(self, count: float, arrived: float) -> str:
@@ -243,8 +256,9 @@ class ClockUnit:
             self._sure = elapsed >= self.SURE_S and _near(pace * self.ms, self.SURE)
             return self._refuse(pace) if not self._sure and elapsed > 2 * self.SURE_S else ""
         unit = next((ms for ms in self.UNITS if elapsed >= self.SOON_S and _near(pace * ms, self.NEAR)), None)
-        if unit is None:
-            return self._refuse(pace) if arrived - self._begun > self.GIVE_UP_S else ""
+        self._near = 0 if unit is None else self._near + 1
+        if unit is None or self._near < self.AGREE:
+            return self._refuse(pace) if not self._near and arrived - self._begun > self.GIVE_UP_S else ""
         changed, self.ms, self._found = unit != self.ms, unit, True
         if unit == 1e3 and not self._fine:
             self.ms = None

@@ -19,16 +19,15 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquire.addresses import Address, Options
 from acquire.closing import Closing
 from acquire.errors import DeviceError
 from acquire.events import EventSink, device_event
-from acquire.frame import CameraInfo, CameraSetting, Clock, Frame, frozen
+from acquire.frame import CameraInfo, CameraSetting, Clock, Frame
 from hw_mocks.faults import CAMERA_FAULTS, FaultPlan, Planned, parse_faults, plan_frames
 from hw_mocks.optics import Optics, take_optics
-from hw_mocks.scene import Exposer, Scene, Sensor, take_sensor
+from hw_mocks.scene import Exposer, Scene, Sensor, rendered_fps, take_sensor, upper_half
 from hw_mocks.specimen import VirtualSpecimen, take_specimen
 
 log = logging.getLogger(__name__)
@@ -36,8 +35,6 @@ POLL_S = 0.1
 FORMATS = {8: "GREY", 10: "Y10", 12: "Y12", 16: "Y16"}
 AUTO_FPS = (30.0, 25.0, 20.0, 15.0, 10.0, 5.0)
 """What fps=auto chooses from."""
-RENDER_SHARE = 0.4
-"""Of one core that rendering may take then."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -313,17 +310,10 @@ class SimCamera(Closing):
 
     def _shoot(self, planned: Planned) -> Frame:
         image, damaged = self._exposer.expose(self._scene.render(planned.t)), planned.fate == "damaged"
-        image = _half(image) if damaged else image
+        image = upper_half(image) if damaged else image
         t = self._start() + planned.t
         raw = t if self.specimen.nominal else t + self._settings.exposure_s / 2
         return Frame(image, planned.index, t, self.info.clock, 0, self.info.bits, raw, damaged)
-
-
-def _half(image: NDArray[Any]) -> NDArray[Any]:
-    """The upper half; the rest never came."""
-    torn = image.copy()
-    torn[image.shape[0] // 2 :] = 0
-    return frozen(torn)
 
 
 def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpecimen) -> SimCamera:
@@ -347,29 +337,17 @@ def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpec
     settings = _take_camera(options)
     options.done()
     if _automatic(options) and not specimen.nominal:
-        most = rendered_fps(specimen, settings)
+        most = rendered_fps(settings.scene(specimen), settings.sensor)
         fps = next((fps for fps in AUTO_FPS if fps <= most), AUTO_FPS[-1])
         settings = replace(settings, fps=fps, unhurried=True)
     return SimCamera(specimen, settings, address.text, on_event)
 
 
-def rendered_fps(specimen: VirtualSpecimen, settings: SimCameraSettings) -> float:
-    """The rate at which rendering leaves most of the machine to the measurement, 1/s."""
-    scene = settings.scene(specimen)
-    exposer = Exposer(settings.sensor, (specimen.height, specimen.width), 0)
-    exposer.expose(scene.render(0.0))  # compiles
-    taken = []
-    for t in np.linspace(0, specimen.duration_s, 6):
-        begin = time.perf_counter()
-        exposer.expose(scene.render(float(t)))
-        taken.append(time.perf_counter() - begin)
-    return RENDER_SHARE / float(np.median(taken))
-
-
 def fps_on_this_machine(address: Address) -> float:
     """The rate at which this machine renders the pictures of an address with ease, 1/s."""
     options = Options(address)
-    return rendered_fps(take_specimen(options), _take_camera(options))
+    specimen, settings = take_specimen(options), _take_camera(options)
+    return rendered_fps(settings.scene(specimen), settings.sensor)
 
 
 def _automatic(options: Options) -> bool:

@@ -33,12 +33,12 @@ class LoadLog:
         Between samples further apart than this the force is not known.
     lag_s : float, s
         By which samples are stamped later than the load they show; taken off by ``force_at``.
-    by_picture : bool
+    by_name : bool
         Each force was given for a frame: there are no times that could lag.
     """
 
-    def __init__(self, max_gap_s: float = 0.25, lag_s: float = 0.0, *, by_picture: bool = False) -> None:
-        self._max_gap_s, self.lag_s, self.by_picture = max_gap_s, lag_s, by_picture
+    def __init__(self, max_gap_s: float = 0.25, lag_s: float = 0.0, *, by_name: bool = False) -> None:
+        self._max_gap_s, self.lag_s, self.by_name = max_gap_s, lag_s, by_name
         self._t = array("d")
         self._force = array("d")
         self._zeros: list[tuple[float, float]] = []

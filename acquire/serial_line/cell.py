@@ -11,7 +11,6 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any, Self
 
 from acquire.addresses import Address
@@ -21,7 +20,7 @@ from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.protocols.base import Reading
-from acquire.serial_line.clock import ArrivalRate, ArrivalTimes
+from acquire.serial_line.clock import ArrivalRate, ArrivalTimes, in_milliseconds
 from acquire.serial_line.echo import Echo
 from acquire.serial_line.link import FloodGuard, Link, LinkContext, LoadWatch, Opener
 from acquire.serial_line.ports import open_port
@@ -73,12 +72,8 @@ class SerialCell(Closing):
         self._busy = threading.Lock()
         self._parser = settings.parser
         self._scaling = Scaling(settings, self._report)
-        self._times, self._device, self._pace = (
-            ArrivalTimes(settings.byte_time_s),
-            DeviceClock(),
-            ArrivalRate(),
-        )
-        self._unit = ClockUnit()  # of the device's own time
+        self._times, self._pace = ArrivalTimes(settings.byte_time_s), ArrivalRate()
+        self._device, self._unit = DeviceClock(), ClockUnit()  # of the device's own time, where it sends one
         self._last_t = -math.inf  # of the last sample
         self._last_read = math.nan
         self._watch, self._flood = (
@@ -239,7 +234,11 @@ class SerialCell(Closing):
         if not readings:
             return []
         times = [self._times.began(reading.start) for reading in readings]
-        readings = self._in_milliseconds(readings, times[-1])
+        arrived = math.nan if self._flood.late else times[-1]
+        readings, told = in_milliseconds(self._unit, readings, arrived)
+        if told:
+            self._report("warning", told)
+            self._device = DeviceClock()
         stamps = [(r.device_ms, t) for r, t in zip(readings, times, strict=True) if r.device_ms is not None]
         waited = self._flood.late
         if not waited:  # messages of unknown age cannot tie the device's clock
@@ -252,20 +251,6 @@ class SerialCell(Closing):
         else:
             late = self._pace.late(times)
         return [self._sample(*one) for one in zip(readings, times, late, strict=True)]
-
-    def _in_milliseconds(self, readings: list[Reading], arrived: float) -> list[Reading]:
-        """The readings with the device's own time in ms, whatever it counts; without it where it is no clock."""
-        count = readings[-1].device_ms
-        if count is not None and not self._flood.late and (text := self._unit.look(count, arrived)):
-            self._report("warning", text)
-            self._device = DeviceClock()
-        ms = self._unit.ms
-        if ms == 1.0:
-            return readings
-        return [
-            replace(r, device_ms=None if ms is None or r.device_ms is None else r.device_ms * ms)
-            for r in readings
-        ]
 
     def _sample(self, reading: Reading, t: float, late: bool) -> LoadSample:
         if reading.device_ms is not None and self._device.tied:

@@ -23,7 +23,7 @@ class Figure:
     why : str
         Why it cannot be had; of a value, a remark, mostly none.
     qualifier : str
-        What kind of a number it is, as "film" of a compressed film, or ``AT_LEAST`` of a bound; mostly none.
+        What kind of a number it is: ``AT_LEAST`` of a bound, "film" of a compressed film; mostly none.
     """
 
     value: float

@@ -83,7 +83,7 @@ class LoadConfig:
         Option("load-column", "NAME"))
     decimal: str | None = key(choice("point", "comma"), None,
         "decimal mark of a file, where it can be read in two ways", Option("load-decimal"))
-    sign: int = key(SIGN, 1, "-1: the force is negative in tension", Option("load-sign", "SIGN"))
+    sign: int = key(SIGN, 1, "-1: the force of a file or recording is negative in tension", Option("load-sign", "SIGN"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -213,6 +213,11 @@ class History:
         """Whether any ZOI had a value at any time step."""
         return bool(self.column("n_valid").any())
 
+    @property
+    def ends_with_values(self) -> bool:
+        """Whether any ZOI had a value at the last time step."""
+        return bool(self.column("n_valid")[-1:].any())
+
     def column(self, name: str) -> Array:
         """One quantity over time, (N,) float64."""
         return self.time_steps.column(name)

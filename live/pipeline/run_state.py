@@ -30,8 +30,10 @@ class FrameCounts:
     reference, measured, skipped, left_out : int
         Part of the reference burst; of a measured burst; of a burst that a newer one replaced or that
         came while measuring was paused; of no complete burst, or damaged.
+    failed : int
+        Of a burst that could not be measured (``live.pipeline.burst_failures``).
     lost : int
-        Frames that the camera or its connection lost.
+        Frames that the camera or its connection lost, or that came damaged.
     load_samples, load_lost : int
         Samples of the load cell; samples that were missing when the test ended.
     without_force : int
@@ -46,6 +48,7 @@ class FrameCounts:
     measured: int = 0
     skipped: int = 0
     left_out: int = 0
+    failed: int = 0
     lost: int = 0
     load_samples: int = 0
     load_lost: int = 0
@@ -65,14 +68,14 @@ class FrameCounts:
     @property
     def adds_up(self) -> bool:
         """Whether every grabbed frame is counted once for measuring, and once for recording where that was on."""
-        used = self.reference + self.measured + self.skipped + self.left_out
+        used = self.reference + self.measured + self.skipped + self.left_out + self.failed
         stored = self.recorded + self.unrecorded + self.thinned
         return used == self.grabbed and stored in (0, self.grabbed)
 
     @property
     def loss(self) -> bool:
         """Whether frames, or load samples at the end, are missing for good."""
-        return self.lost > 0 or self.unrecorded > 0 or self.load_lost > 0
+        return max(self.lost, self.unrecorded, self.load_lost, self.failed) > 0
 
     @property
     def skipped_share(self) -> float:
@@ -85,9 +88,10 @@ class FrameCounts:
         share = f" ({self.skipped_share:.1%})" * (self.skipped > 0)
         load = f" / load samples lost {self.load_lost}" * (self.load_lost > 0)
         load += f" / bursts without a force {self.without_force}" * (self.without_force > 0)
+        failed = f" / failed {self.failed}" * (self.failed > 0)
         return (
             f"grabbed {self.grabbed} / recorded {self.recorded} / measured {self.measured}"
-            f" / skipped {self.skipped}{share} / lost {self.lost}{load}"
+            f" / skipped {self.skipped}{share}{failed} / lost {self.lost}{load}"
             f"  (reference {self.reference}, left over {self.left_out}, not recorded {self.unrecorded}"
             f"{on_purpose}; {'adds up' if self.adds_up else 'DOES NOT ADD UP'})"
         )
@@ -198,10 +202,11 @@ class RunState:
             health.machine(now) | {FORCE: self.force(now, step)} | strains_at(now, health, self.history, step)
         )
         if ended:
-            figures = {name: figure.but(FigureState.ENDED) for name, figure in figures.items()}
-        if not self.with_load:
-            del figures[FORCE]
-        elif self.specimen.area_m2:
+            there = (
+                (name, figure) for name, figure in figures.items() if figure.state is not FigureState.NONE
+            )
+            figures = {name: figure.but(FigureState.ENDED) for name, figure in there}
+        if self.specimen.area_m2 and FORCE in figures:
             figures[STRESS] = figures[FORCE].scaled(1 / self.specimen.area_m2)
         return Snapshot(
             t=now,
@@ -224,4 +229,4 @@ class RunState:
 
     def force(self, now: float, step: TimeStep | None = None) -> TimedFigure:
         """The force at ``now`` (s, monotonic): the newest of the load cell, of recorded pictures that of ``step``."""
-        return force_at(now, self.health, self.loads, step)
+        return force_at(now, self.health, self.loads, step) if self.with_load else TimedFigure()

@@ -91,7 +91,7 @@ class Snapshot:
             for name, figure in self.figures.items()
             if name not in (STRESS, BURST, *_OF_REGION)
         )
-        return tuple(dict.fromkeys(filter(None, (*self.alarms, *self.faults, *lacking))))
+        return tuple(dict.fromkeys(filter(None, (*self.alarms, *lacking, *self.faults))))
 
     @property
     def lost(self) -> int:

@@ -7,9 +7,8 @@ Nothing is guessed: what has two readings is refused with the option that settle
 from __future__ import annotations
 
 import math
-import re
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import BinaryIO, Literal
 
@@ -20,11 +19,18 @@ from acquire.errors import DataError
 from acquire.printable import counted
 from live.config.sections import LoadConfig
 from live.replay.export_headings import name_and_unit, newtons_of, seconds_per
-from live.replay.export_table import (
+from live.replay.export_numbers import (
     CLOCK,
     EMPTY,
     NUMBERISH,
-    Rows,
+    decimal_mark,
+    is_value,
+    numbers_in,
+    time_of_day,
+    two_readings,
+    vote,
+)
+from live.replay.export_table import (
     Table,
     blocks,
     cell_of,
@@ -32,15 +38,10 @@ from live.replay.export_table import (
     is_heading,
     is_remark,
 )
+from live.replay.export_text import Rows
 
 MAX_ROWS, MAX_NAMES = 20_000_000, 1_000_000
 _MARKS = {"point": ".", "comma": ","}
-_BETWEEN_THOUSANDS = " \u00a0\u2009\u202f'\u2019"
-_GROUPED = re.compile(
-    rf"(?>[-+]?(?:\d{{1,3}}(?:[,{_BETWEEN_THOUSANDS}]\d{{3}})+|\d+)(?:\.\d*)?(?:[eE][-+]?\d+)?\n)*+"
-)
-_PLAIN = str.maketrans("", "", "0123456789+-.eE\n")
-_NO_GROUPS = str.maketrans("", "", "," + _BETWEEN_THOUSANDS)
 _HALF_DAY_S, _DAY_S = 43_200.0, 86_400.0
 _UNIX_S, _UNIX_MS = 1e8, 1e11  # from 1973 on
 
@@ -89,53 +90,13 @@ def read_export(file: BinaryIO, where: str, given: LoadConfig) -> Export:
         No text, no table, what has two readings, a cell that is no number, times that do not rise, too many rows.
     """
     table = find_table(file, where, given)
-    mark = _decimal_mark((rows for _, rows in blocks(file, table, where)), table, where, given)
+    mark = _MARKS.get(given.decimal or "") or decimal_mark(
+        (rows for _, rows in blocks(file, table, where)), table.key if table.by_name else None, where
+    )
     reader = _Reader(table, mark, where, given)
     for line, rows in blocks(file, table, where):
         reader.take(line, rows)
     return reader.export()
-
-
-# -- the form of the numbers --------------------------------------------------------------------
-
-
-def _vote(cell: str) -> str:
-    """The decimal mark that a number proves; "?" where three digits may be thousands; "" without a mark."""
-    body = re.sub(f"[-+\u2212{_BETWEEN_THOUSANDS}]|[eE].*", "", cell)
-    marks = set(body) & {".", ","}
-    if len(marks) == 2:
-        return max(marks, key=body.rfind)
-    mark = next(iter(marks), "")
-    head, *tails = body.split(mark) if mark else [body]
-    if len(tails) > 1:
-        return "," if mark == "." else "."
-    if tails and len(tails[0]) == 3 and 1 <= len(head) <= 3 and head[0] != "0" and "e" not in cell.lower():
-        return "?"
-    return mark
-
-
-def _decimal_mark(parts: Iterable[Rows], table: Table, where: str, given: LoadConfig) -> str:
-    """The decimal mark of the file, from the first part of it that proves one; raises DataError where none does."""
-    if given.decimal is not None:
-        return _MARKS[given.decimal]
-    doubtful = ""
-    named = table.key if table.by_name else None
-    for rows in parts:
-        for cell in (c for row in rows for k, c in enumerate(row) if ("." in c or "," in c) and k != named):
-            vote = _vote(cell) if NUMBERISH.fullmatch(cell.strip()) else ""
-            if vote in (".", ","):
-                return vote
-            doubtful = doubtful or cell * (vote == "?")
-    if doubtful:
-        raise _two_readings(where, doubtful)
-    return "."
-
-
-def _two_readings(where: str, cell: str) -> DataError:
-    return DataError(
-        f"{where}: {cell!r} has two readings, {re.sub('[.,]', '.', cell)} and {re.sub('[.,]', '', cell)}; give"
-        " --load-decimal point or comma"
-    )
 
 
 # -- rows to numbers ----------------------------------------------------------------------------
@@ -147,7 +108,6 @@ class _Reader:
     def __init__(self, table: Table, mark: str, where: str, given: LoadConfig) -> None:
         self._table, self._mark, self._where, self._given = table, mark, where, given
         self._decimal = "comma" if mark == "," else "point"
-        self._to_point = str.maketrans({"\u2212": "-"} | ({".": ",", ",": "."} if mark == "," else {}))
         self._names: list[str] = []
         self._times, self._forces = array("d"), array("d")
         self._kinds: dict[int | None, dict[str, str]] = {table.force: {}, table.key: {}}
@@ -238,18 +198,7 @@ class _Reader:
         return None if times is None or None in times else (times, forces)  # type: ignore[return-value]
 
     def _numbers(self, cells: Sequence[str]) -> Sequence[float] | None:
-        """The cells as numbers; None where one is none."""
-        text = "\n".join(cells).translate(self._to_point)
-        if text.translate(_PLAIN):
-            groups = set(text) & set("," + _BETWEEN_THOUSANDS)
-            if len(groups) > 1 or not _GROUPED.fullmatch(text + "\n"):
-                return None
-            text = text.translate(_NO_GROUPS)
-        try:
-            numbers = array("d", map(float, text.split("\n")))
-        except ValueError:
-            return None
-        return numbers if np.isfinite(numbers).all() else None
+        return numbers_in(cells, self._mark)
 
     def _number(self, cell: str) -> float | None:
         numbers = self._numbers([cell])
@@ -272,11 +221,12 @@ class _Reader:
             self._other = f"line {line}: another table begins ({', '.join(filter(None, texts))[:60]!r})"
         elif self._other:
             self._n_unread += 1
-        elif at is not None or NUMBERISH.fullmatch(key) or (not key and force is not None and value):
+        elif at is not None or is_value(key) or (not key and force is not None and value):
             bad = value if force is None else key
+            shown = self._table.separator.join(row)[:60]
             raise DataError(
-                f"{self._where}: line {line}: {bad[:40]!r} in {','.join(row)[:60]!r} is not a number with a decimal"
-                f" {self._decimal}; mend it, or give --load-decimal point or comma"
+                f"{self._where}: line {line}: {bad[:40]!r} in {shown!r} is not a number with a decimal {self._decimal};"
+                " mend it, or give --load-decimal point or comma"
             )
         else:
             self._n_texts += 1
@@ -284,24 +234,14 @@ class _Reader:
 
     def _time(self, cell: str) -> float | None:
         """A number, or seconds since midnight."""
-        if self._is_clock and cell[2:3] == cell[5:6] == ":" and cell[8:9] in ".,":
-            hour, minute, second = cell[:2], cell[3:5], cell[6:].replace(",", ".")
-            if (hour + minute + second.replace(".", "", 1)).isdecimal():
-                return 3600.0 * int(hour) + 60.0 * int(minute) + float(second)
-        clock = CLOCK.fullmatch(cell)
         if not self._forces and not self._is_clock:
-            self._is_clock = clock is not None
+            self._is_clock = CLOCK.fullmatch(cell) is not None
         if not self._is_clock:
             return self._number(cell)
-        if clock is None:
-            return None
-        date, h, m, s, point, fraction, half = clock.groups()
-        if (h is None and fraction is None) or (point == ":" and len(fraction) != 3):
-            return None  # 12:30 and 12:30:15:04 have several readings
+        date, seconds = time_of_day(cell)
         if date:
             self._dates.add(date)
-        hours = int(h or 0) % (12 if half else 1000) + 12 * (half in ("p", "P"))
-        return 3600.0 * hours + 60.0 * int(m) + float(f"{s}.{fraction or 0}")
+        return seconds
 
     def _add_times(self, lines: Sequence[int], times: Array) -> None:
         """Add times, s or in the unit of the file; raises DataError with the line where they do not rise."""
@@ -330,9 +270,9 @@ class _Reader:
             if self._mark not in cell:
                 if "plain" not in kinds and "." not in cell and "," not in cell and self._number(cell):
                     kinds["plain"] = cell
-            elif NUMBERISH.fullmatch(cell) and (vote := _vote(cell)) in ("?", self._mark):
-                kinds["three" if vote == "?" else "clear"] = cell
-                if vote != "?":
+            elif NUMBERISH.fullmatch(cell) and (proven := vote(cell)) in ("?", self._mark):
+                kinds["three" if proven == "?" else "clear"] = cell
+                if proven != "?":
                     return
 
     # -- the whole ------------------------------------------------------------------------------
@@ -344,7 +284,7 @@ class _Reader:
             raise DataError(f"{self._where}: holds no forces")
         for kinds in self._kinds.values():
             if self._given.decimal is None and kinds.keys() >= {"three", "plain"} and "clear" not in kinds:
-                raise _two_readings(self._where, kinds["three"])
+                raise two_readings(self._where, kinds["three"])
         if self._dates and len(self._dates) != self._days + 1:
             raise DataError(
                 f"{self._where}: the dates do not fit the times of the day; give times in seconds: time_s"
@@ -375,7 +315,13 @@ class _Reader:
     def _taken(self, forces: Array, clock: str) -> str:
         t = self._table
         low, high = _shown(np.nanmin(forces)), _shown(np.nanmax(forces))
-        kind = "times of the day" if self._is_clock else self._time_unit or "s"
+        kind = (
+            "times of the day"
+            if clock == "clock"
+            else "h:min:s"
+            if self._is_clock
+            else self._time_unit or "s"
+        )
         kind = f" ({'Unix times' if clock == 'unix' else kind})" if not t.by_name else ""
         against = f" against {t.name(t.key)}{kind}" if t.key is not None else ""
         return (

@@ -1,16 +1,12 @@
-"""The table of forces in the text file of a testing machine, spreadsheet or logger, read in blocks.
+"""Where the table of forces is in a text file: separator, heading, units, columns; and its rows in blocks.
 
-Found by themselves: encoding, separator, heading (below a preamble or a block of results), row of units, decimal mark,
-groups of thousands, form of the times. A heading that is repeated, and lines of text between or below the rows, are
-left out. What has two readings is refused with the option that settles it (docs/load-cells.md).
+The heading may be below a preamble or a block of results, and have its units in a row below it. Two columns that could
+be the force are refused with the option that settles it (docs/load-cells.md).
 """
 
 from __future__ import annotations
 
-import codecs
 import csv
-import io
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import BinaryIO
@@ -25,38 +21,13 @@ from live.replay.export_headings import (
     newtons_of,
     plain_unit,
 )
+from live.replay.export_numbers import EMPTY, NUMBERISH, is_value
+from live.replay.export_text import HEAD, Rows, encoding_of, lines_of, split_rows
 
-_HEAD, _BLOCK, _LONGEST = (
-    1 << 18,
-    1 << 20,
-    1 << 20,
-)  # characters: searched for the table, read at once, of a line
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", "  ": "blanks", " ": "blanks"}
-_MAGIC = {
-    b"PK\x03\x04": "a workbook or an archive", b"\xd0\xcf\x11\xe0": "an Excel workbook", b"TDSm": "a TDMS file",
-    b"%PDF": "a PDF", b"\x89HDF": "an HDF5 file", b"\x1f\x8b": "compressed",
-}  # fmt: skip
-_BOMS = {
-    codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF32_LE: "utf-32", codecs.BOM_UTF32_BE: "utf-32",
-    codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16",
-}  # fmt: skip
-_CONTROL = re.compile(r"[\x00-\x08\x0e-\x19\x1c-\x1f\x7f]")
-_JAPANESE = re.compile("荷重|試験力|時間|時刻")
 _BETWEEN = 5  # lines of text and blanks between a heading and its rows, at most
 _SHORT = {"file", "time", "time_s", "t", "force", "F"}
 """Our own headings; with them a force without a unit is in newtons."""
-
-NUMBERISH = re.compile(r"[-+\u2212]?[.,]?\d[\d.,'\u2019 \u00a0\u2009\u202f]*(?:[eE][-+]?\d+)?")
-"""A number in any form, not yet read."""
-CLOCK = re.compile(
-    r"(?:(\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[T ]+)?(?:(\d{1,3}):)?(\d{1,2}):(\d{1,2})(?:([.,:])(\d+))?"
-    r"\s*(?:([AaPp])\.?[Mm]\.?|Z|UTC|[-+]\d\d:?\d\d)?"
-)
-"""Date, hours, minutes, seconds, mark, fraction, A or P of a time of the day or an elapsed one."""
-EMPTY = ("", "nan", "-", "--", "---", "n/a", "#n/a", "#nv", "null", "1.#qnan", "-1.#ind")
-"""Cells without a force, in lower case."""
-
-Rows = list[list[str]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,70 +83,6 @@ def is_remark(row: Sequence[str]) -> bool:
     return not any(row) or (row[0].startswith("#") and len(row[0]) > 1)
 
 
-# -- bytes to rows ------------------------------------------------------------------------------
-
-
-def _encoding(file: BinaryIO, where: str) -> str:
-    """The encoding by its mark, else the first that fits; raises DataError for what is no text."""
-    head = file.read(_HEAD)
-    for magic, kind in _MAGIC.items():
-        if head.startswith(magic):
-            raise DataError(f"{where}: is {kind}, no text; export the forces as CSV or text")
-    for bom, encoding in _BOMS.items():
-        if head.startswith(bom):
-            return encoding
-    zeros = [head[k::2].count(0) for k in (0, 1)]
-    found = "utf-8"
-    if max(zeros) > len(head) // 4 and min(zeros) == 0:
-        found = "utf-16-le" if zeros[1] else "utf-16-be"
-    elif _decoded(head, "utf-8") is None:
-        found = "cp932" if _JAPANESE.search(_decoded(head, "cp932") or "") else "cp1252"
-    if _CONTROL.search(head.decode(found, "replace")):
-        raise DataError(f"{where}: is binary, no text; export the forces as CSV or text")
-    return found
-
-
-def _decoded(head: bytes, encoding: str) -> str | None:
-    try:
-        return codecs.getincrementaldecoder(encoding)().decode(head)
-    except UnicodeDecodeError:
-        return None
-
-
-def _lines(file: BinaryIO, encoding: str, where: str) -> Iterator[list[str]]:
-    """All lines, some at once."""
-    file.seek(0)
-    text, left, count = io.TextIOWrapper(file, encoding, errors="replace"), "", 0
-    try:
-        while read := text.read(_BLOCK):
-            *lines, left = (left + read).split("\n")
-            count += len(lines)
-            if len(left) > _LONGEST:
-                raise DataError(f"{where}: line {count + 1} has more than {_LONGEST:,} characters; no table")
-            yield lines
-        if left:
-            yield [left]
-    finally:
-        text.detach()
-
-
-def _split(lines: list[str], separator: str) -> tuple[Rows, int | None]:
-    """A row for each line, and the line of a quote that goes on in the next one: its row has the place of the last."""
-    if separator[0] == " ":
-        parting = re.compile(rf"{separator}(?!\(|\[) *")  # not before a unit in brackets
-        lines, separator = [parting.sub("\t", line.strip()) for line in lines], "\t"
-    rows = list(csv.reader(lines, delimiter=separator))
-    if len(rows) == len(lines):
-        return rows, None
-    rows, broken, reader = [], None, csv.reader(lines, delimiter=separator)
-    for row in reader:
-        if len(rows) < reader.line_num - 1 and broken is None:
-            broken = len(rows)
-        rows += [[]] * (reader.line_num - 1 - len(rows))
-        rows.append(row)
-    return rows, broken
-
-
 def blocks(file: BinaryIO, table: Table, where: str) -> Iterator[tuple[int, Rows]]:
     """The rows of the table and what follows, in blocks: number of the first line, from 1, and a row for each line.
 
@@ -185,10 +92,10 @@ def blocks(file: BinaryIO, table: Table, where: str) -> Iterator[tuple[int, Rows
         A line is too long or has a quote that is not closed.
     """
     line = 0
-    for lines in _lines(file, table.encoding, where):
+    for lines in lines_of(file, table.encoding, where):
         skipped = max(0, table.first - line)
         try:
-            rows, broken = _split(lines[skipped:], table.separator)
+            rows, broken = split_rows(lines[skipped:], table.separator)
         except csv.Error as error:
             raise DataError(f"{where}: no table after line {line + skipped + 1}: {error}") from error
         if broken is not None:
@@ -209,11 +116,11 @@ def find_table(file: BinaryIO, where: str, given: LoadConfig) -> Table:
     DataError
         The file is no text, or has no such table, or two columns could be the force.
     """
-    encoding = _encoding(file, where)
+    encoding = encoding_of(file, where)
     lines: list[str] = []
-    for more in _lines(file, encoding, where):
+    for more in lines_of(file, encoding, where):
         lines += more
-        if sum(map(len, lines)) > _HEAD:
+        if sum(map(len, lines)) > HEAD:
             break
     lines = lines[:20_000]
     if not any(line.strip() and not line.startswith("#") for line in lines):
@@ -228,7 +135,7 @@ def find_table(file: BinaryIO, where: str, given: LoadConfig) -> Table:
                 reversed(found), key=search.length, default=None
             )  # of equal ones the nearest heading
             if longest and search.length(longest):
-                return longest
+                return search.check(next(t for t in found if t.heads == longest.heads))  # before a pause
             empty = empty or bool(found)
     if empty:
         raise DataError(f"{where}: holds no forces below their heading")
@@ -237,7 +144,7 @@ def find_table(file: BinaryIO, where: str, given: LoadConfig) -> Table:
 
 def _head_rows(lines: list[str], separator: str) -> Rows:
     try:
-        rows, _ = _split(lines, separator)
+        rows, _ = split_rows(lines, separator)
     except csv.Error:
         return []
     rows = [[] if is_remark(row) else [" ".join(cell.split()) for cell in row] for row in rows]
@@ -269,8 +176,8 @@ class _Search:
         below = [i for i in range(k + 1, min(k + 2 + _BETWEEN, len(self.rows))) if self.rows[i]]
         between = next((n for n, i in enumerate(below) if _has_value(self.rows[i])), 0)
         texts = [self.rows[i] for i in below[:between]]
-        called = [row for row in self.rows[:k] if row[:1] == ["Y_Unit_Label"]][-1:]  # LabVIEW
-        heads = self._with_units(self.rows[k], [*filter(_is_units, texts), *called])
+        labels = [["s", *row[1:]] for row in self.rows[:k] if row[:1] == ["Y_Unit_Label"]]  # LabVIEW
+        heads = self._with_units(self.rows[k], [*filter(_is_units, texts), *labels[-1:]])
         first = below[between] if below else len(self.rows)
         heads = self._fitting(heads, len(self.rows[first]) if below else len(heads))
         columns = self._columns(heads)
@@ -294,7 +201,8 @@ class _Search:
                 raise DataError(
                     f"{self.where}: {head!r} has the unit {unit!r} below it: which one? give --load-unit"
                 )
-            found.append(f"{head} [{unit}]" if unit and not own else head)
+            below = f"{head} [{unit}]"
+            found.append(below if not own and name_and_unit(below)[1] else head)
         return found
 
     def _fitting(self, heads: list[str], width: int) -> list[str]:
@@ -321,15 +229,21 @@ class _Search:
         if self.needs_key and not keys:
             return None
         forces = [given[0]] if given else find_columns(heads, "force")
-        if len(forces) > 1 or (len(keys) > 1 and forces):
-            twice, option = (forces, "FORCE") if len(forces) > 1 else (keys, "FORCE,TIME")
-            called = ", ".join(repr(heads[k]) for k in twice)
-            raise DataError(
-                f"{self.where}: {called}: which one? give --load-column {option}, by heading or number"
-            )
         if not forces or forces == keys:
             return None
         return forces[0], keys[0] if keys else None, bool(name)
+
+    def check(self, table: Table) -> Table:
+        """The same table; raises DataError where other columns could be the force or the time too."""
+        given = given_columns(table.heads, self.given.column) if self.given.column else None
+        for kinds, option in ((("force",), "FORCE"), (("name", "time", "clock"), "FORCE,TIME")):
+            called = next(filter(None, (find_columns(table.heads, kind) for kind in kinds)), [])
+            if len(called) > 1 and (given is None or (option != "FORCE" and given[1] is None)):
+                words = ", ".join(repr(table.heads[k]) for k in called)
+                raise DataError(
+                    f"{self.where}: {words}: which one? give --load-column {option}, by heading or number"
+                )
+        return table
 
     def length(self, table: Table) -> int:
         """The number of rows of values that follow its heading."""
@@ -343,7 +257,7 @@ class _Search:
 
 
 def _has_value(row: Sequence[str]) -> bool:
-    return any(NUMBERISH.fullmatch(cell) or CLOCK.fullmatch(cell) for cell in row)
+    return any(map(is_value, row))
 
 
 def _is_units(row: Sequence[str]) -> bool:

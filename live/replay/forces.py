@@ -54,7 +54,7 @@ class PlacedForces:
         """A closed log; a gap is at least three median steps of a table with times."""
         steps = np.diff(self.times)
         usual = math.inf if self.by_picture else 3 * float(np.median(steps)) if len(steps) else 0.0
-        log = LoadLog(max(load.max_gap_s, usual), load.lag_s, by_picture=self.by_picture)
+        log = LoadLog(max(load.max_gap_s, usual), load.lag_s, by_name=self.by_picture)
         log.extend(self.times, self.forces)
         log.close()
         return log

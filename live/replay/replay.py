@@ -21,9 +21,12 @@ from acquire.addresses import parse_address
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind, EventSink
+from acquire.frame import Burst
 from acquire.opencv.images import picture_times
+from acquire.printable import counted
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
+from live.pipeline.burst_failures import LOG, BurstFailures
 from live.pipeline.consumer import Compose, RunInfo
 from live.pipeline.consumer_thread import Outputs
 from live.pipeline.event_log import EventLog
@@ -208,10 +211,13 @@ def _run(
     made = [*consumers(about, run_state), *watch]
     outputs = Outputs(made, run_state.loads, event_log, run_state.history)
     began, work = time.perf_counter(), prefetch(bursts)
+    failures = BurstFailures(run_state, folder)
     try:
         _pass_on_recorded(source, outputs)
-        for m in measured(work, source.loads, run_state.event_log):
-            run_state.frame_counts.add(measured=m.burst.n, grabbed=m.burst.n, lost=m.burst.lost)
+        for m in measured(
+            _counted(work, run_state.frame_counts), source.loads, run_state.event_log, failures
+        ):
+            run_state.frame_counts.add(measured=m.burst.n)
             if outputs.wants_frames:
                 outputs.frame(picture_of(m.burst))
             screen.progress(outputs.add(m), m.number + 1, source.expected, time.perf_counter() - began)
@@ -228,14 +234,28 @@ def _run(
     left_out = source.count.left_out if source.count else 0
     cut_off = [e.text for e in event_log.events("warning") if "missing" in e.data and not stopping.is_set()]
     stopped = [f"{report.name} stopped: {report.failed}" for report in outputs.reports if report.failed]
-    lines = [*cut_off, *source.doubts, *stopped, *lines]
+    failed = f"{counted(failures.count, 'burst')} could not be measured; {folder / LOG} has the details"
+    lines = [*[failed] * (failures.count > 0), *cut_off, *source.doubts, *stopped, *lines]
     lossy = (
-        outputs.failed or bool(source.doubts) or not run_state.history.has_values or left_out > 0 or cut_off
+        outputs.failed
+        or bool(source.doubts)
+        or not run_state.history.ends_with_values
+        or left_out > 0
+        or cut_off
+        or failures.count
     )
     code = 130 if stopping.is_set() else 5 if lossy else 0
     at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
     test = finished(folder, config, run_state, code, at_reference)
     return Replayed(folder, run_state, config, code, test, tuple(lines), left_out)
+
+
+def _counted(work: Iterable[Work], frame_counts: FrameCounts) -> Iterator[Work]:
+    """The same bursts, their frames counted."""
+    for item in work:
+        if isinstance(item, Burst):
+            frame_counts.add(grabbed=item.n, lost=item.lost)
+        yield item
 
 
 def _with_final_folder(config: Config, folder: Path | None) -> Config:

@@ -40,7 +40,6 @@ _REMARKED = ("E", "nu", *_FLOW)
 
 _PLAIN, _PERCENT, _MPA, _GPA, _KN = ("", 1.0), ("%", 0.01), ("MPa", 1e6), ("GPa", 1e9), ("kN", 1e3)
 _STRENGTH_SUFFIXES = dict(zip(_STRENGTHS, ("p0.1", "p0.2", "p1", "eH", "eL", "m"), strict=True))
-NO_READINGS = "no readings of a load cell are there"
 LAG_MATTERS_S = 0.005  # and beyond its own uncertainty: to correct a smaller one changes no figure
 _SMALL_KN = 2.0  # below it forces are shown in N
 
@@ -173,15 +172,15 @@ def lag_of(history: History, loads: LoadLog, specimen: SpecimenConfig) -> Figure
     """The lag of the load behind the frames, s, found from the test itself."""
     t, force = loads.arrays()
     if not len(t):
-        return Figure.none(NO_READINGS)
-    if loads.by_picture:
+        return Figure.none("no readings of a load cell are there")
+    if loads.by_name:
         return Figure.none("each force was given for a picture: there is none")
     return find_lag(Track(history.column("t"), history.along(specimen.axis)[0]), Track(t, force))
 
 
 def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
     """``lag_of`` as text; nothing without a load, or where there can be none."""
-    if not len(loads.arrays()[0]) or loads.by_picture:
+    if not len(loads.arrays()[0]) or loads.by_name:
         return []
     lag = lag_of(history, loads, specimen)
     if not lag.known:

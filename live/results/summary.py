@@ -30,6 +30,14 @@ from live.results.finished.finished_test import FinishedTest
 _CARD_EVERY_S = 1.0  # of the test
 
 
+def valid_line(history: History) -> str:
+    """How many bursts were measured, and how many ZOIs have a value in the last of them."""
+    last = history.time_steps[-1]
+    refused = f" ({last.refused})" if last.refused else ""
+    words = f"{last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}"
+    return f"measured {len(history.time_steps)} bursts, {words}"
+
+
 def noise_line(history: History) -> str:
     """The noise of the picture and of the strain, typical of the run."""
     noise = history.column("noise_GL")
@@ -73,16 +81,15 @@ def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     valid = np.flatnonzero(history.column("n_valid"))
     if not valid.size:
         return [why_nothing(run_state)]
-    last, strains = history.time_steps[int(valid[-1])], history.column("largest")[valid]
+    last, strains = history.time_steps[-1], history.column("largest")[valid]
     largest = strains[np.argmax(np.abs(strains))]
-    refused = f" ({last.refused})" if last.refused else ""
     part = share_text(last.least_share)
+    means = f"exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
+    means = means if last.n_valid else f"no value, 0 of {last.n_zoi} ZOIs valid"
     lines = [
         *doubt_lines(test),
-        f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        "last strain of the region:"
-        f" exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
-        f"{f' {part}' if part else ''};"
+        valid_line(history),
+        f"last strain of the region: {means}{f' {part}' if part else ''};"
         f" largest of any ZOI {largest * 1e6:+.0f} µm/m",
         *film_line(specimen),
         noise_line(history),

@@ -36,7 +36,7 @@ from live.run.outcome import Outcome, StopSignal
 from live.run.pre_trigger import PreTriggerBuffer
 from live.run.prepared_run import PreparedRun, new_run_state, set_up
 from live.run.recorder import open_recording
-from live.setup.devices import Rig, open_rig
+from live.setup.devices import Rig, check_load_sign, open_rig
 
 _ARMED = "; nothing is recorded until the command start"
 _SILENT_S = 1.0
@@ -225,7 +225,7 @@ class LiveRun:
         unwritten = self._recording is not None and self._recording.failed is not None
         lossy = frame_counts.loss or self._outputs.failed or unwritten
         lossy = lossy or self._run_state.health.without_force_s > OLD_S
-        return 5 if lossy or not frame_counts.adds_up or not self._run_state.history.has_values else 0
+        return 5 if lossy or not frame_counts.adds_up or not self._run_state.history.ends_with_values else 0
 
     def _take(self, frame: Frame) -> None:
         health = self._run_state.health
@@ -313,6 +313,7 @@ def run_live(
         The start failed; whatever was recorded by then is closed and readable.
     """
     stop, run_state = stop or StopSignal(), new_run_state(config, screen)
+    check_load_sign(config.load)
     rig = open_rig(
         config.camera.address,
         config.load.address,

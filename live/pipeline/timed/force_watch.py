@@ -45,7 +45,7 @@ class ForceWatch(Consumer):
             why = self._run_state.loads.why_none_at(t)
             self._emit(
                 t,
-                f"measured bursts have no force since {self._newest_t - self._since:.1f} s: {why}",
+                f"no force for the bursts of the last {self._newest_t - self._since:.1f} s: {why}",
                 "warning",
             )
 

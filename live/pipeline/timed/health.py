@@ -129,7 +129,7 @@ def force_at(now: float, health: Health, loads: LoadLog, step: TimeStep | None) 
     newest, latest, lasts_s = loads.telling, loads.latest, health.readings.lasts_s
     began = TimedFigure.at(now, health.began_t, math.nan, lasts_s=lasts_s, why="nothing came yet")
     if newest is None and began.state is not FigureState.OLD:
-        return began.but(FigureState.NOT_YET)
+        return TimedFigure(state=FigureState.NOT_YET)
     found = began if newest is None else TimedFigure.at(now, newest.t, newest.force, lasts_s=lasts_s)
     beyond = (
         [] if newest is None else [state for flag, state in _STATE_OF_FLAG.items() if flag in newest.flags]

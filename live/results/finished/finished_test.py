@@ -24,10 +24,11 @@ from analysis.evaluate import (
 from live.config.sections import SpecimenConfig
 from live.pipeline.measurement import AXIAL, TimeStep
 from live.pipeline.run_state import RunState
-from live.results.figures import NO_READINGS, lag_of, tensile_options
+from live.results.figures import lag_of, tensile_options
 from live.results.run_folder import RunFolder
 
 NO_VALUE = "no ZOI has a value in the last burst"
+_NO_READINGS = "no readings of a load cell are there"
 REGION = ("exx", "eyy", "exy")
 
 
@@ -108,7 +109,9 @@ class FinishedTest:
             run.specimen,
             run.load_axis,
             samples if recorded else at_bursts,
-            find_lag(Track(at_bursts.t, run.axial_strain), samples) if recorded else Figure.none(NO_READINGS),
+            find_lag(Track(at_bursts.t, run.axial_strain), samples)
+            if recorded
+            else Figure.none(_NO_READINGS),
             float(corrected) if isinstance(corrected, int | float) else 0.0,
             reference_force(run.events),
             run.gauges[AXIAL].described if AXIAL in run.gauges else {},

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquire.errors import DataError
+from acquire.hdf5 import storable
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
 from live.results.budget import CameraView, budget_cells
@@ -95,7 +96,7 @@ def make_report(run: RunFolder, wanted: ReportRequest, screen: Screen) -> Report
         raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to report")
     content = _content(run, wanted, screen)
     for side in _SIDES:
-        text = page(f"{run.title}: phasedic report", _parts(content, wanted, side))
+        text = storable(page(f"{run.title}: phasedic report", _parts(content, wanted, side)))
         if len(text.encode()) < MAX_BYTES:
             break
     return Report(text, content.figures, content.test)

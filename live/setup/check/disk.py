@@ -46,8 +46,13 @@ def disk_lines(rate: float, config: Config) -> list[CheckLine]:
     except OSError as error:
         words = "connect the disk, or choose another with --out"
         return [CheckLine("disk", f"{folder}: cannot be asked ({error.strerror})", False, words)]
-    minutes = math.floor(free / rate / 60 * 10) / 10  # not more than there is
-    value = f"room for {minutes:.4g} min at this rate ({rate / 1e6:.3g} MB/s, {free / 1e9:.3g} GB free)"
-    test = f"the test takes {wanted_s / 60:.3g} min" if config.output.seconds else "10 min are the least"
-    advice = f"{test}: free some space, choose another disk with --out, or record less (--record bursts)"
-    return [CheckLine("disk", value, free / rate >= wanted_s, advice)]
+    minutes = math.floor(10 * free / rate / 60) / 10  # not more than there is
+    return [
+        CheckLine(
+            "disk",
+            f"room for {minutes:.4g} min at this rate ({rate / 1e6:.3g} MB/s, {free / 1e9:.3g} GB free)",
+            free / rate >= wanted_s,
+            f"too little for a test of {wanted_s / 60:.3g} min: free some space, choose another disk with --out,"
+            " or record less (--record bursts)",
+        )
+    ]

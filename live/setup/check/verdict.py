@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.quality.pattern import SPECKLE_RADIUS_PX
-from analysis.quality.steadiness import Steadiness, aliased, mains_of
+from analysis.quality.steadiness import Steadiness, aliased, mains_of, strain_drifts
 from live.setup.check.check_list import CheckFigures, median
 from live.setup.check.noise_floor import ZoiFloor
 from live.setup.check.sample import MIN_FRAMES
@@ -22,8 +22,6 @@ MIN_LIGHT = 0.3  # of full scale, 99th percentile
 MIN_CONTRAST = 0.05  # of full scale
 MAX_FLICKER, MAX_WITHOUT_PATTERN, MIN_SHARPNESS_RATIO = 0.01, 0.02, 0.7
 MAX_DILATATION = 5e-5  # common drift of exx and eyy
-MAX_DRIFT, CLEAR = 2e-5, 5.0
-"""Of the strain in the time of the check, and in units of its uncertainty: beyond both, the specimen is not at rest."""
 MAX_NOISE_PX = 0.05  # of one ZOI in one frame
 MAX_OVER_PREDICTED = 1.5  # measured over predicted noise
 DEFAULT_TARGET = 1e-3
@@ -232,12 +230,13 @@ def _motion(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
     if not math.isfinite(s.drift_px):
         yield CheckLine("drift", "not measured", f.zois.without_pattern < 1, "no ZOI can be followed")
         return
-    strain = max((s.exx, s.eyy), key=lambda one: (_drifts(one), abs(one.drift)))
+    pulled = [one for one in (s.exx, s.eyy) if strain_drifts(one.drift, one.sigma_drift)]
+    strain = max(pulled or (s.exx, s.eyy), key=lambda one: abs(one.drift))
     words = "keep specimen and camera still"
-    if _drifts(strain):
+    if pulled:
         words = "strain changes: stop the machine, take the load off, let the specimen rest, then check again"
     yield CheckLine("drift", f"{s.drift_px:.4f} px and {strain.drift * 1e6:+.0f} µm/m in {s.u.seconds:.3g} s",
-               s.drift_px <= max_px and not _drifts(strain), words)  # fmt: skip
+               s.drift_px <= max_px and not pulled, words)  # fmt: skip
     if s.dilatation:
         yield CheckLine("distance", f"exx and eyy drift alike, {s.dilatation * 1e6:+.0f} µm/m: it changes by"
                    f" {abs(s.dilatation):.1e} of the stand-off", abs(s.dilatation) < MAX_DILATATION,
@@ -254,10 +253,6 @@ def _motion(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
     shake = s.worse
     yield CheckLine("vibration", f"{_vibration(shake, 1, 'px', 4)}, {_vibration(s.worse_strain, 1e6, 'µm/m', 0)}",
                shake.vibration <= max_px, "a stiffer tripod, a quiet floor, no fan on the bench")  # fmt: skip
-
-
-def _drifts(strain: Steadiness) -> bool:
-    return abs(strain.drift) > MAX_DRIFT and abs(strain.drift) > CLEAR * strain.sigma_drift
 
 
 def _vibration(s: Steadiness, unit: float, name: str, digits: int) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from acquire.printable import counted
 from live.pipeline.consumer import ConsumerReport
 from live.pipeline.event_log import sentence
+from live.pipeline.history import History
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.results.figures import (
@@ -24,7 +25,7 @@ from live.results.figures import (
 )
 from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
-from live.results.summary import doubt_lines, file_lines, noise_line, summary_lines, why_nothing
+from live.results.summary import doubt_lines, file_lines, noise_line, summary_lines, valid_line, why_nothing
 from live.ui.terminal.status_line import strain_text
 
 SMALL_MB = 10.0  # below it with a decimal
@@ -55,33 +56,41 @@ def print_summary(
 def brief_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     """State, strain, E, nu and strengths or why they are not known, noise, and what is odd."""
     history, specimen = run_state.history, test.specimen
-    valid = np.flatnonzero(history.column("n_valid"))
-    if not valid.size:
+    if not history.has_values:
         return [why_nothing(run_state)]
-    last = history.time_steps[int(valid[-1])]
-    refused = f" ({last.refused})" if last.refused else ""
-    axis = history.axis(specimen.axis).axis
-    strain, sigma = last.axial(axis)
     lines = [
         *doubt_lines(test),
-        f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        f"strain along {axis} at the end: {strain_text(strain, sigma)} µm/m",
+        valid_line(history),
+        *_at_end(history, test.axis.axis),
         *film_line(specimen),
-        *_figures(test),
+        *_figures(run_state, test),
         noise_line(history),
         *_remarks(run_state, test),
     ]
     return [line.strip() for line in lines]
 
 
-def _figures(test: FinishedTest) -> list[str]:
+def _at_end(history: History, axis: str) -> list[str]:
+    """The strain of the last burst; where it has none, also of the last that has one."""
+    n, known = len(history.time_steps), np.flatnonzero(np.isfinite(history.along(axis)[0]))
+    texts = [f"{strain_text(*history.time_steps[int(k)].axial(axis))} µm/m" for k in known[-1:]]
+    if n - 1 in known[-1:]:
+        return [f"strain along {axis} at the end: {texts[0]}"]
+    last = history.time_steps[-1]
+    none = f"strain along {axis} at the end: no value, {last.n_valid} of {last.n_zoi} valid"
+    return [none, *(f"the last burst with a value is {known[-1] + 1} of {n}: {text}" for text in texts)]
+
+
+def _figures(run_state: RunState, test: FinishedTest) -> list[str]:
     figures, specimen = test.figures, test.specimen
     if figures.E.known:
         return [
             line for line in [*elastic_lines(figures, specimen), *plastic_lines(figures, specimen)] if line
         ]
     if not test.has_force:
-        return ["E is not known: no force is known (--load)"]
+        last_t = run_state.history.time_steps[-1].t
+        why = f"no burst has a force: {run_state.loads.why_none_at(last_t)}"
+        return [f"E is not known: {why if run_state.with_load else 'no force is known (--load)'}"]
     odd = doubts(findings(test))
     why = figures.E.why + "; the first line above says what to look at" * bool(odd)
     return list(

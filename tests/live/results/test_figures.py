@@ -203,7 +203,7 @@ def test_the_lag_of_the_load_is_told() -> None:
 
 def test_forces_of_pictures_have_no_lag() -> None:
     history, loads = kept(ramberg_osgood(), lag=0.15)
-    given = LoadLog(by_picture=True)
+    given = LoadLog(by_name=True)
     given.extend(*loads.arrays())
     assert lag_line(history, given, FLAT) == []
     assert lag_of(history, given, FLAT).why == "each force was given for a picture: there is none"

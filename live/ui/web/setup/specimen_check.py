@@ -169,10 +169,11 @@ class SpecimenCheck:
     def _check(self, frames: list[Frame], info: CameraInfo) -> None:
         edition, config = self._region.edition, self._region.config(self._folder)
         load = None if self._load is None else self._load.report()
-        figures = examine(frame_stack(frames, info), config, load)
+        stack = frame_stack(frames, info)
+        figures = examine(stack, config, load)
         shift = config.measure.reference_shift_px
         of_load = () if self._load is None else self._load.lines(load)
-        disk = disk_lines(write_rate(figures.stack, config), config)
+        disk = disk_lines(write_rate(stack, config), config)
         lines = [*check_lines(figures, None, shift), *disk, *of_load, self._gauge_line()]
         self._keep_figures(figures)
         self.values["checking"] = False

@@ -37,7 +37,7 @@ class Said(Screen):
 
 
 def run_of(strains: Sequence[float], specimen: SpecimenConfig = SECTION, *, loads: bool = True) -> RunState:
-    run_state = RunState.new(0.5, specimen=specimen)
+    run_state = RunState.new(0.5, specimen=specimen, with_load=loads)
     for k, strain in enumerate(strains):
         force = force_of(strain) if loads else math.nan
         measurement: Measurement = make_measurement(k, strain, force=force)
