@@ -28,7 +28,8 @@ from analysis.evaluate.gauges.readings import distance, facing
 from analysis.evaluate.lag import Track, find_lag
 from analysis.evaluate.programme import KINDS, Kind
 from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
-from analysis.evaluate.tensile import Span, StrainZero, TensileFigures, TensileOptions, ZeroBy, evaluate_test
+from analysis.evaluate.tensile import evaluate_test
+from analysis.evaluate.tensile_figures import Span, StrainZero, TensileFigures, TensileOptions, ZeroBy
 
 __all__ = [
     "AT_LEAST",

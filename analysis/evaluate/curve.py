@@ -307,12 +307,6 @@ def smoothed(values: Floats, half: int) -> Floats:
     return np.asarray((total[k + reach + 1] - total[k - reach]) / (2 * reach + 1))
 
 
-def running_median(values: Floats, half: int) -> Floats:
-    """Median over 2 ``half`` + 1 values, the ends repeated beyond them, (N,)."""
-    padded = np.pad(values, half, mode="edge")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1))
-
-
 def first_crossing(values: Floats, level: float, start: int = 0) -> float:
     """Where ``values`` first reach ``level`` from below, in samples; NaN where they never do, or begin above."""
     above = np.flatnonzero(values[start:] >= level)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.evaluate.curve import Curve, noise
 from analysis.evaluate.figure import Figure, quantile
-from analysis.evaluate.programme import Programme, reversals
+from analysis.evaluate.programme import KindOfTest, reversals
 
 Floats = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ def _too_little(strain: Track, force: Track, max_lag: float) -> str:
 def _turns_round(strain: Track, force: Track) -> str:
     """Why the course of the test gives no lag; empty where it may."""
     curve = Curve(strain.t, strain.values, np.interp(strain.t, force.t, force.values))
-    cyclic = Programme.of(curve).kind == "cyclic"
+    cyclic = KindOfTest.of(curve).kind == "cyclic"
     return "in a cyclic test a loop of the material looks like a lag" if cyclic else ""
 
 

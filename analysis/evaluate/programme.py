@@ -42,7 +42,7 @@ _SLOW = 0.8  # of the strain rate of the loading: a creep is slower
 
 
 @dataclass(frozen=True, slots=True)
-class Programme:
+class KindOfTest:
     """The kind of a test and its first rise.
 
     Attributes
@@ -60,7 +60,7 @@ class Programme:
     end: int | None = None
 
     @classmethod
-    def of(cls, curve: Curve, given: str = "auto") -> Programme:
+    def of(cls, curve: Curve, given: str = "auto") -> KindOfTest:
         """As ``given``, or found from the course of ``curve``."""
         found, how, end = _found(curve)
         if given == "auto":

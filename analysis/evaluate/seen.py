@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate.curve import Curve, Floats, broken_at, noise, running_median
+from analysis.evaluate.curve import Curve, Floats, broken_at, noise
 
 _USUAL, _STEEP = 75, 3.0  # percentile of the rises, and times those
 _SURE = 8.0  # standard deviations of the noise
@@ -79,6 +79,12 @@ def _stiffness(strain: Floats, level: Floats) -> float:
     rise = level[known][np.minimum(on, len(highest) - 1)] - level[known]
     run = highest[np.minimum(on, len(highest) - 1)] - highest
     return float(np.max(rise[inside] / run[inside], initial=0.0)) if span > 0 else 0.0
+
+
+def running_median(values: Floats, half: int) -> Floats:
+    """Median over 2 ``half`` + 1 values, the ends repeated beyond them, (N,)."""
+    padded = np.pad(values, half, mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1))
 
 
 @dataclass(frozen=True, slots=True)

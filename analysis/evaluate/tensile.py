@@ -7,9 +7,8 @@ strain is an option that the result names.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from analysis.evaluate.curve import Curve, Loading, first_crossing, noise, readi
 from analysis.evaluate.elastic import (
     FILM,
     MIN_POINTS,
-    ErrorLimits,
     FittedLine,
     between,
     chord,
@@ -28,10 +26,11 @@ from analysis.evaluate.elastic import (
 )
 from analysis.evaluate.figure import Figure
 from analysis.evaluate.flow import anisotropy, hardening
-from analysis.evaluate.programme import KINDS, Kind, Programme
+from analysis.evaluate.programme import KindOfTest
 from analysis.evaluate.rates import midway, seconds_of, strain_rate
 from analysis.evaluate.seen import Unseen, confirmed, unseen
-from analysis.evaluate.standards import STANDARDS, Standard
+from analysis.evaluate.shares import blur_share, lens_share
+from analysis.evaluate.standards import Standard
 from analysis.evaluate.strengths import (
     Yield,
     proof_strength,
@@ -40,130 +39,11 @@ from analysis.evaluate.strengths import (
     tensile_strength,
     yield_point,
 )
-
-ZeroBy = Literal["raw", "toe", "preload"]
+from analysis.evaluate.tensile_figures import Span, StrainZero, TensileFigures, TensileOptions
 
 _LINE = ("E", "E_chord", "nu")
 _OF_TENSION = ("Rp01", "Rp02", "Rp1", "ReH", "ReL", "Rm", "Agt", "Ag", "At", "A", "r", "n")
 _ROUNDS = 8
-BLUR_STRAIN = 30e-6 / 0.5**2
-"""Largest error of a strain by a change of sharpness, over the variance of the blur, 1/px^2 (docs/data/accuracy.md)."""
-_CLEAR_BLUR = 3.0  # standard uncertainties of the rise of that variance with the strain
-
-
-@dataclass(frozen=True, slots=True)
-class TensileOptions:
-    """How a test is evaluated.
-
-    Attributes
-    ----------
-    standard : Standard
-    zero : "raw", "toe" or "preload"
-        Strain counts as measured, from where the elastic line has no stress (toe compensation), or from
-        where the stress first reaches ``preload``.
-    preload : float, Pa
-    limits : ErrorLimits
-        Of what E is uncertain by beyond the scatter.
-    test : "auto" or one of ``KINDS``
-        The kind of the test: found from its course, or given.
-    """
-
-    standard: Standard = STANDARDS["iso6892"]
-    zero: ZeroBy = "raw"
-    preload: float = 0.0
-    limits: ErrorLimits = field(default_factory=ErrorLimits)
-    test: str = "auto"
-
-    def __post_init__(self) -> None:
-        if self.zero not in ("raw", "toe", "preload"):
-            raise ValueError(f"unknown zero {self.zero!r}; known: raw, toe, preload")
-        if self.test not in ("auto", *KINDS):
-            raise ValueError(f"unknown test {self.test!r}; known: auto, {', '.join(KINDS)}")
-        if self.zero == "preload" and not self.preload > 0:
-            raise ValueError("a zero at a preload needs that preload, in Pa above 0")
-
-
-@dataclass(frozen=True, slots=True)
-class StrainZero:
-    """The measured strain that counts as none, and how it was found, in words."""
-
-    strain: float
-    how: str
-
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """The elastic interval that was used: its strains (from zero), its stresses (Pa), and how many points."""
-
-    strain: tuple[float, float]
-    stress: tuple[float, float]
-    n: int
-
-
-@dataclass(frozen=True, slots=True)
-class TensileFigures:
-    """The figures of a tensile test; each has an interval, or the reason why it cannot be had.
-
-    Attributes
-    ----------
-    E, E_chord : Figure, Pa
-        By regression and by chord over ``span``.
-    r2 : float
-        Coefficient of determination of the regression; NaN without one.
-    nu : Figure
-    Rp01, Rp02, Rp1 : Figure, Pa
-        Proof strengths at 0.1, 0.2 and 1 % plastic strain.
-    ReH, ReL : Figure, Pa
-    Rm : Figure, Pa
-    Agt, Ag, At, A : Figure
-        Total and plastic strain at the highest stress, and at break; not in percent.
-    r, n : Figure
-        Plastic anisotropy and strain hardening; ``why`` has the interval.
-    rate_elastic, rate_plastic : Figure, 1/s
-        Strain rate over ``span``, and over the second half of the strain from there to the highest
-        stress; ``why`` holds it against the standard.
-    seconds : Figure, s
-        From the start of the loading to the break, or to the highest stress.
-    span : Span or None
-    zero : StrainZero
-    standard : str
-    budget : mapping of str to float
-        Relative standard uncertainties that the interval of E is made of, by their causes; empty without E.
-    strain, elastic_strain : str
-        What the strain of the curve is, and that of E and nu, in words.
-    kind : str
-        Of the test, one of ``KINDS``.
-    notes : tuple of str
-        What must be said of the test: its kind where it is no tensile one or given, forces left out, a gap.
-    """
-
-    E: Figure
-    E_chord: Figure
-    r2: float
-    nu: Figure
-    Rp01: Figure
-    Rp02: Figure
-    Rp1: Figure
-    ReH: Figure
-    ReL: Figure
-    Rm: Figure
-    Agt: Figure
-    Ag: Figure
-    At: Figure
-    A: Figure
-    r: Figure
-    n: Figure
-    rate_elastic: Figure
-    rate_plastic: Figure
-    seconds: Figure
-    span: Span | None
-    zero: StrainZero
-    standard: str
-    strain: str = ""
-    elastic_strain: str = ""
-    budget: Mapping[str, float] = field(default_factory=dict)
-    kind: Kind = "tensile"
-    notes: tuple[str, ...] = ()
 
 
 def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> TensileFigures:
@@ -183,7 +63,7 @@ def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> Tensil
     """
     options = options or TensileOptions()
     sure, notes = confirmed(curve)
-    programme = Programme.of(sure, options.test)
+    programme = KindOfTest.of(sure, options.test)
     if programme.why:
         found = _untensile(_evaluated(programme.first_rise(sure), options), programme.why)
     else:
@@ -306,9 +186,7 @@ def _with_line(
     slope = line_through(region, line.first, line.last) or line
     remark = not_uniform(loading, slope)
     strained = float(loading.course[line.last - 1] - loading.course[line.first])
-    shares = (
-        options.limits.shares(strained) | _lens_share(loading, line, strained) | _blur_share(loading, line)
-    )
+    shares = options.limits.shares(strained) | lens_share(loading, line, strained) | blur_share(loading, line)
     nu = _poisson(loading, slope, options.standard)
     figures = TensileFigures(
         E=slope.modulus(math.hypot(*shares.values())).remarked(remark),
@@ -338,34 +216,6 @@ def _with_line(
         standard=options.standard.name,
     )
     return figures if options.standard.flow else _without_flow(figures)
-
-
-def _lens_share(loading: Loading, line: FittedLine, strained: float) -> dict[str, float]:
-    """The largest uncertainty of the strain by a corrected lens in the elastic interval, over ``strained``.
-
-    All of it may come with the load: the error of a lens is the same in every picture of a motion.
-    """
-    sigma = loading.lens[line.first : line.last]
-    return {"lens": float(np.nanmax(sigma)) / strained} if np.isfinite(sigma).any() else {}
-
-
-def _blur_share(loading: Loading, line: FittedLine) -> dict[str, float]:
-    """What a change of sharpness that comes with the load may make of the strain; nothing where none is clear.
-
-    The error grows with the variance of the blur, to ``BLUR_STRAIN`` at most: a limit, as of ``ErrorLimits``.
-    """
-    part = slice(line.first, line.last)
-    blur, strain = loading.blur[part], loading.strain[part]
-    known = np.isfinite(blur)
-    n = int(known.sum())
-    if n < MIN_POINTS:
-        return {}
-    x, y = (values[known] - values[known].mean() for values in (strain, np.copysign(blur**2, blur)))
-    sxx = float(x @ x)
-    slope = float(x @ y) / sxx
-    rest = y - slope * x
-    sigma = math.sqrt(float(rest @ rest) / (n - 2) / sxx)
-    return {"blur": BLUR_STRAIN * abs(slope) / math.sqrt(3)} if abs(slope) > _CLEAR_BLUR * sigma else {}
 
 
 def _poisson(loading: Loading, line: FittedLine, standard: Standard) -> Figure:

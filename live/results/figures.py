@@ -172,7 +172,7 @@ def lag_of(history: History, loads: LoadLog, specimen: SpecimenConfig) -> Figure
     """The lag of the load behind the frames, s, found from the test itself."""
     t, force = loads.arrays()
     if not len(t):
-        return Figure.none("no readings of a load cell")
+        return Figure.none("no readings of a load cell are there")
     if loads.by_name:
         return Figure.none("each force was given for a picture: there is none")
     return find_lag(Track(history.column("t"), history.along(specimen.axis)[0]), Track(t, force))
@@ -289,7 +289,6 @@ def figure_lines(
     lines = elastic_lines(figures, specimen) or [line for line in [_known_texts(rows, _STRENGTHS)] if line]
     if not lines:
         return list(figures.notes)
-    lines += figures.notes
     if span is not None:
         low, high = span.strain
         lines.append(
@@ -309,12 +308,12 @@ def figure_lines(
 def plastic_lines(
     figures: TensileFigures, specimen: SpecimenConfig, length_mm: float | None = None
 ) -> list[str]:
-    """Extensions with the elongation, true stress and strain at the highest force, r and n; those that are known."""
+    """Notes on the test, extensions with the elongation, true stress and strain at the highest force, r and n."""
     rows = _rows(figures, specimen)
     extensions, flow = _known_texts(rows, _EXTENSIONS), _known_texts(rows, _FLOW)
     if extensions:
         extensions += _elongation(figures, length_mm or specimen.gauge_length_mm)
-    return [line for line in (extensions, _true_line(figures, specimen), flow) if line]
+    return [*figures.notes, *(line for line in (extensions, _true_line(figures, specimen), flow) if line)]
 
 
 def _true_line(figures: TensileFigures, specimen: SpecimenConfig) -> str:

@@ -14,7 +14,6 @@ from live.results.figures import tensile_options
 from live.results.run_folder import RunFolder
 
 Array = NDArray[np.float64]
-FIGURES = "figures.json"
 _BROKEN = 0.02  # of the highest force: below it there is no specimen any more
 
 

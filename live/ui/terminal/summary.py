@@ -93,7 +93,9 @@ def _figures(run_state: RunState, test: FinishedTest) -> list[str]:
         return [f"E is not known: {why if run_state.with_load else 'no force is known (--load)'}"]
     odd = doubts(findings(test))
     why = figures.E.why + "; the first line above says what to look at" * bool(odd)
-    return [f"E is not known: {why}", *figure_lines(figures, specimen)[:1]]
+    return list(
+        dict.fromkeys([f"E is not known: {why}", *figure_lines(figures, specimen)[:1], *figures.notes])
+    )
 
 
 def _remarks(run_state: RunState, test: FinishedTest) -> Iterator[str]:

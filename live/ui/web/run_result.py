@@ -79,7 +79,9 @@ def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str
         )
     if figures.E.known:
         found.append(_interval_of_e(figures))
-    return found
+    return found + [
+        {"name": "of the test", "text": note, "interval": "", "words": True} for note in figures.notes
+    ]
 
 
 def _interval_of_e(figures: TensileFigures) -> dict[str, Any]:

@@ -74,7 +74,7 @@ OTHERS = {
     "strain_out": {"tcp": None, "udp": None, "serial": None, "format": "json", "channels": None},
     "view": {"enabled": True, "rrd": True, "spawn": True, "scale": "symmetric", "light": False},
     "specimen": {
-        "axis": "auto", "standard": "iso6892", "modulus_between": (0.0005, 0.0025), "zero": "raw",
+        "axis": "auto", "standard": "iso6892", "test": "auto", "modulus_between": (0.0005, 0.0025), "zero": "raw",
     },
     "output": {"dir": None, "report": False},
 }  # fmt: skip

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquire.errors import ConfigError
 from acquire.events import Event, EventKind
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
-from analysis.evaluate import Figure
+from analysis.evaluate import KINDS, Figure
+from live.config.loading import load_config
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
@@ -26,9 +28,12 @@ from live.results.figures import (
     figure_lines,
     figure_text,
     lag_line,
+    lag_of,
     sharpness_line,
     tensile_options,
+    tensile_table,
 )
+from live.results.report.comparison import _summary as summary_of_rows
 from live.results.summary import latency_lines, noise_line, summary_lines
 from tests.analysis.curves import Truth, composite, noisy, ramberg_osgood
 from tests.live.made_run import finished
@@ -194,6 +199,32 @@ def test_the_lag_of_the_load_is_told() -> None:
     assert lag_line(history, LoadLog(), FLAT) == []
     (refused,) = lag_line(History(), loads, FLAT)
     assert "not known (0 frames have a strain" in refused
+
+
+def test_forces_of_pictures_have_no_lag() -> None:
+    history, loads = kept(ramberg_osgood(), lag=0.15)
+    given = LoadLog(by_name=True)
+    given.extend(*loads.arrays())
+    assert lag_line(history, given, FLAT) == []
+    assert lag_of(history, given, FLAT).why == "each force was given for a picture: there is none"
+
+
+def test_a_bound_is_shown_as_one_and_is_in_no_mean() -> None:
+    strength = Figure(62.5e6, 62.4e6, 62.6e6).at_least()
+    figures = replace(evaluate(*kept(ramberg_osgood()), FLAT), Rm=strength, notes=("no force is known",))
+    row = tensile_table(figures, stresses=True)["Rm"]
+    assert row.text == "at least 62.5 MPa" and row.figure.low == pytest.approx(62.4)
+    lines = figure_lines(figures, FLAT)
+    assert any("Rm = at least 62.5 MPa" in line for line in lines) and "no force is known" in lines
+    assert summary_of_rows([row, row])[2] == 0
+
+
+def test_the_kinds_of_a_test_are_those_of_the_evaluation() -> None:
+    for kind in KINDS:
+        config = load_config(None, {"specimen.test": kind})
+        assert tensile_options(config.specimen).test == kind
+    with pytest.raises(ConfigError, match="'auto', 'tensile'"):
+        load_config(None, {"specimen.test": "bend"})
 
 
 def test_the_direction_of_the_load_is_told() -> None:
