@@ -26,10 +26,19 @@ from acquire.addresses import Address, Options, expanded
 from acquire.camera import CameraBase
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import EventSink, device_event, ignore_event
+from acquire.files.jpeg import quantisation
 from acquire.files.order import AUTO, BY, in_order, masks
-from acquire.files.picture import FOREIGN, LOSSY, Source, check_regular, picture_source, read_picture_page
+from acquire.files.picture import (
+    FOREIGN,
+    LOSSY,
+    Source,
+    check_regular,
+    picture_source,
+    read_bytes,
+    read_picture_page,
+)
 from acquire.files.tiff import full_pages, tiff_pages
-from acquire.frame import CameraInfo, Frame, frozen
+from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, to_gray
 from acquire.opencv.image_metadata import read_stamps, taken_times
 
@@ -180,7 +189,7 @@ class ImageFiles(CameraBase):
             clock="nominal",
             fps=None if self._stamps else settings.fps,
             pixel_format=paths[0].suffix.lstrip(".").upper(),
-            controls={"files": len(paths), "gray": settings.gray, "stamps": settings.stamps},
+            controls={"files": len(paths), "gray": settings.gray, "stamps": settings.stamps} | self._steps(),
             warnings=tuple(self._warnings(first)),
             white_level=settings.white,
         )
@@ -249,6 +258,12 @@ class ImageFiles(CameraBase):
             raise DataError(
                 f"{path}: a value of {image.max()} does not fit into bits={self._bits}; give the camera's bits"
             )
+
+    def _steps(self) -> dict[str, Any]:
+        if self._usual.suffix.lower() not in LOSSY:
+            return {}
+        steps = quantisation(read_bytes(self._usual))
+        return {} if steps is None else {QUANTISATION: steps}
 
     def _warnings(self, first: NDArray[Any]) -> Iterator[str]:
         pages, taken = tiff_pages(self._usual), _pages_of(self._usual)
