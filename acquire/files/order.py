@@ -155,8 +155,7 @@ def _decided(
 
 
 def _stem(name: str) -> str:
-    path = PurePath(name)
-    return str(path.with_name(path.stem)) if path.stem else name
+    return name.removesuffix(PurePath(name).suffix)
 
 
 def _words(name: str) -> set[str]:
