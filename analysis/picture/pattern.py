@@ -173,7 +173,8 @@ def hidden_noise(image: ArrayLike, steps: Sequence[float]) -> float:
     square = np.bincount(ring.ravel(), table.ravel() ** 2) / np.bincount(ring.ravel())
     inside = (radius > wave[1]) & (radius < wave[-1])
     rounded = square[np.rint(16 * radius[inside]).astype(int)] / 25
-    return float(np.sqrt(np.maximum(power[inside], rounded).min(initial=power.max())))
+    bounds = np.maximum(power[inside], rounded)
+    return math.sqrt(float(bounds.min())) if bounds.size else 0.0
 
 
 def _corner_noise(radius: Floats, power: Floats) -> float:
