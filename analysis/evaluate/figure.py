@@ -8,6 +8,9 @@ from dataclasses import dataclass, replace
 CONFIDENCE = 0.95
 """Of all intervals here; they hold the scatter of strain and force, and that of E the stated limits of error."""
 
+AT_LEAST = "at least"
+"""Qualifier of a bound: what lies above it was not seen."""
+
 
 @dataclass(frozen=True, slots=True)
 class Figure:
@@ -20,7 +23,7 @@ class Figure:
     why : str
         Why it cannot be had; of a value, a remark, mostly none.
     qualifier : str
-        What kind of a number it is, as "film" of a compressed film; mostly none.
+        What kind of a number it is: ``AT_LEAST`` of a bound, "film" of a compressed film; mostly none.
     """
 
     value: float
@@ -45,9 +48,18 @@ class Figure:
         """Whether there is a value."""
         return math.isfinite(self.value)
 
+    @property
+    def is_bound(self) -> bool:
+        """Whether the value may be any above."""
+        return self.qualifier == AT_LEAST
+
     def remarked(self, words: str) -> Figure:
         """The figure with a remark, where it is known."""
         return replace(self, why=words) if self.known and words else self
+
+    def at_least(self) -> Figure:
+        """The figure as a bound, without an upper end, where it is known."""
+        return replace(self, high=math.inf, qualifier=AT_LEAST) if self.known else self
 
     def over(self, other: float) -> Figure:
         """The figure in another unit: divided by a positive number."""

@@ -12,6 +12,7 @@ from acquire.errors import ConfigError
 from acquire.system import cores
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import (
+    FORCES,
     OF_PICTURES,
     add_as_measured,
     add_config_file,
@@ -28,7 +29,7 @@ from live.commands.options import (
 from live.commands.signals import signals
 from live.ui.terminal.screen import TerminalScreen
 
-OUTPUT = ("axis", "standard", "zero", "lag")
+OUTPUT = ("axis", "standard", "test", "zero", "lag")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -54,6 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_picture_order(parser, dest="measure.order")
     add_options(parser, "measurement", *OF_PICTURES)
     add_options(parser, "evaluation", *OUTPUT)
+    add_options(parser, "files of forces", *FORCES)
     add_section(parser)
     add_metadata(parser)
     add_verbose(parser)

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import (
+    FORCES,
     OF_PICTURES,
     add_as_measured,
     add_measure,
+    add_options,
     add_picture_order,
     add_time_span,
     in_picture_order,
@@ -43,8 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_as_measured(parser)
     add_time_span(parser)
     add_picture_order(parser, dest="measure.order")
-    words = "forces by file or time_s: a CSV with a header such as file,force_kN"
+    words = "forces: the export of a testing machine, or a CSV with a header such as file,force_kN or time_s,force_N"
     parser.add_argument("--load", dest="forces", metavar="FILE.csv", help=words)
+    add_options(parser, "file of forces", *FORCES)
     add_measure(parser, measure=OF_PICTURES)
 
 
@@ -82,7 +85,7 @@ def _print(done: Replayed, screen: Screen, *, verbose: bool = False, with_report
     print_summary(
         screen,
         done.run_state,
-        done.config.specimen,
+        done.test,
         done.folder,
         done.lines,
         verbose=verbose,

@@ -79,10 +79,11 @@ def session_source(session: Session, request: ReplayRequest, config: Config, pat
             "--as-measured takes the references of the run; leave --reference out, or --as-measured"
         )
     loads = LoadLog(config.load.max_gap_s, config.load.lag_s)
-    samples = tuple(session.load_samples())
+    sign = config.load.sign
+    samples = tuple(replace(s, force=sign * s.force) if sign < 0 else s for s in session.load_samples())
     for sample in samples:
         loads.append(sample)
-    events = tuple(session.events())
+    events = tuple(_turned(event) if sign < 0 else event for event in session.events())
     for event in events:
         loads.take_event(event)
     loads.close()
@@ -116,6 +117,12 @@ def session_source(session: Session, request: ReplayRequest, config: Config, pat
         found.times,
         words=words,
     )
+
+
+def _turned(event: Event) -> Event:
+    """The event of a tare with its step in the other sign."""
+    step = event.data.get("step_N")
+    return event if step is None else replace(event, data={**event.data, "step_N": -step})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

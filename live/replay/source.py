@@ -37,7 +37,7 @@ class ReplayRequest:
     reference : str or None
         An image file as the reference, or the name of one of the pictures, in place of the first.
     forces : Path or None
-        A CSV with the forces (``live.replay.forces``).
+        A file with the forces (``live.replay.forces``).
     config_file : Path or None
     overrides : mapping of "section.key" to value
     numbers : range or None
@@ -96,6 +96,8 @@ class ReplaySource:
         Times of the bursts, where they are known before the bursts are read.
     count : PictureCount or None
         The pictures so far; None for a session, whose bursts have the number of lost frames.
+    doubts : tuple of str
+        What makes the result incomplete.
     words : str
         Which picture is the reference, which the last, and how many there are.
     """
@@ -110,6 +112,7 @@ class ReplaySource:
     expected: int | None = None
     times: NDArray[np.float64] | None = None
     count: PictureCount | None = None
+    doubts: tuple[str, ...] = ()
     words: str = ""
 
 

@@ -55,7 +55,7 @@ def as_csv(rows: Sequence[BatchRow]) -> bytes:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     writer.writerows([_cell(row.values[name]) for name in COLUMNS] for row in rows)
-    return text.getvalue().encode()
+    return text.getvalue().encode("utf-8", "backslashreplace")
 
 
 def as_parquet(rows: Sequence[BatchRow]) -> bytes | None:
