@@ -320,7 +320,7 @@ def picture_names(address: Address) -> list[tuple[str, int]]:
 
 
 def picture_times(address: Address) -> dict[str, float]:
-    """Name -> time (s) of each picture of ``files:...``, as ``open_files`` would stamp them.
+    """Name -> time (s) of each picture of ``files:...`` but masks, as ``open_files`` would stamp them.
 
     Raises
     ------
@@ -331,12 +331,13 @@ def picture_times(address: Address) -> dict[str, float]:
     """
     paths, settings = _found(address), _settings(address)
     stamps = _stamps(settings, paths)
+    ends = masks([path.name for path in paths])
     times = {path.name: stamps[k] if stamps else k / settings.fps for k, path in enumerate(paths)}
     if len(times) < len(paths) or any(len(_pages_of(path)) > 1 for path in paths):
         raise ConfigError(
             f"{address.text}: two pictures share a name, or one has several pages; give times in place of names"
         )
-    return times
+    return {name: t for name, t in times.items() if name not in ends}
 
 
 def open_files(address: Address, on_event: EventSink) -> ImageFiles:
