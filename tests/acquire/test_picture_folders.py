@@ -20,7 +20,7 @@ from acquire.files.jpeg import quantisation
 from acquire.files.tiff import full_pages
 from acquire.frame import QUANTISATION
 from acquire.opencv.image_metadata import taken_times
-from acquire.opencv.images import find_images, picture_names
+from acquire.opencv.images import find_images, picture_names, picture_times
 
 
 def picture(shape: tuple[int, int] = (12, 16), dtype: type = np.uint8) -> NDArray[Any]:
@@ -54,6 +54,7 @@ def test_a_mask_is_named_and_left_out(tmp_path: Path) -> None:
     assert [(frame.damaged, frame.t) for frame in frames] == [(False, 1.0), (False, 3.0), (True, 3.0)]
     assert "mask.png is a mask by its name (--mask" in told[0].text
     assert told[0].text.endswith("this picture is left out")
+    assert picture_times(parse_address(f"files:{tmp_path}")) == {"s1.png": 0.0, "s2.png": 1.0}
 
 
 @pytest.mark.parametrize("other", [picture((20, 16)), picture(dtype=np.uint16)])
