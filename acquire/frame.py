@@ -131,6 +131,10 @@ class CameraSetting:
     log: bool = False
 
 
+QUANTISATION = "quantisation"
+"""Among ``CameraInfo.controls``: steps of the 8 x 8 coefficients of compressed pictures by rows, GL."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraInfo:
     """What is known of a camera once it is open.

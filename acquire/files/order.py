@@ -155,8 +155,7 @@ def _decided(
 
 
 def _stem(name: str) -> str:
-    path = PurePath(name)
-    return str(path.with_name(path.stem)) if path.stem else name
+    return name.removesuffix(PurePath(name).suffix)
 
 
 def _words(name: str) -> set[str]:
@@ -214,7 +213,7 @@ def _key(pieces: Sequence[_Piece], rest: str, doubts: _Doubts, reading: _Reading
             len(parts) == 2 and (reading.decimal or piece.column not in doubts.points)
         )
         minus = piece.sign == "-" and (reading.signed or piece.column not in doubts.signs)
-        numbers = [Decimal(digits)] if as_one else [Decimal(part) for part in parts]
+        numbers = [Decimal(digits)] if as_one else [Decimal(part or 0) for part in parts]
         numbers[0] = -numbers[0] if minus else numbers[0]
         key += [piece.before, numbers[0]]
         for number in numbers[1:]:

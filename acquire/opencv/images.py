@@ -26,10 +26,19 @@ from acquire.addresses import Address, Options, expanded
 from acquire.camera import CameraBase
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import EventSink, device_event, ignore_event
+from acquire.files.jpeg import quantisation
 from acquire.files.order import AUTO, BY, in_order, masks
-from acquire.files.picture import FOREIGN, LOSSY, Source, check_regular, picture_source, read_picture_page
+from acquire.files.picture import (
+    FOREIGN,
+    LOSSY,
+    Source,
+    check_regular,
+    picture_source,
+    read_bytes,
+    read_picture_page,
+)
 from acquire.files.tiff import full_pages, tiff_pages
-from acquire.frame import CameraInfo, Frame, frozen
+from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, to_gray
 from acquire.opencv.image_metadata import read_stamps, taken_times
 
@@ -180,7 +189,7 @@ class ImageFiles(CameraBase):
             clock="nominal",
             fps=None if self._stamps else settings.fps,
             pixel_format=paths[0].suffix.lstrip(".").upper(),
-            controls={"files": len(paths), "gray": settings.gray, "stamps": settings.stamps},
+            controls={"files": len(paths), "gray": settings.gray, "stamps": settings.stamps} | self._steps(),
             warnings=tuple(self._warnings(first)),
             white_level=settings.white,
         )
@@ -250,6 +259,12 @@ class ImageFiles(CameraBase):
                 f"{path}: a value of {image.max()} does not fit into bits={self._bits}; give the camera's bits"
             )
 
+    def _steps(self) -> dict[str, Any]:
+        if self._usual.suffix.lower() not in LOSSY:
+            return {}
+        steps = quantisation(read_bytes(self._usual))
+        return {} if steps is None else {QUANTISATION: steps}
+
     def _warnings(self, first: NDArray[Any]) -> Iterator[str]:
         pages, taken = tiff_pages(self._usual), _pages_of(self._usual)
         if len(taken) < len(pages):
@@ -305,7 +320,7 @@ def picture_names(address: Address) -> list[tuple[str, int]]:
 
 
 def picture_times(address: Address) -> dict[str, float]:
-    """Name -> time (s) of each picture of ``files:...``, as ``open_files`` would stamp them.
+    """Name -> time (s) of each picture of ``files:...`` but masks, as ``open_files`` would stamp them.
 
     Raises
     ------
@@ -316,12 +331,13 @@ def picture_times(address: Address) -> dict[str, float]:
     """
     paths, settings = _found(address), _settings(address)
     stamps = _stamps(settings, paths)
+    ends = masks([path.name for path in paths])
     times = {path.name: stamps[k] if stamps else k / settings.fps for k, path in enumerate(paths)}
     if len(times) < len(paths) or any(len(_pages_of(path)) > 1 for path in paths):
         raise ConfigError(
             f"{address.text}: two pictures share a name, or one has several pages; give times in place of names"
         )
-    return times
+    return {name: t for name, t in times.items() if name not in ends}
 
 
 def open_files(address: Address, on_event: EventSink) -> ImageFiles:

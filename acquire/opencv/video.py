@@ -18,8 +18,9 @@ from acquire.camera import CameraBase
 from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
 from acquire.events import EventSink, device_event
+from acquire.files.jpeg import quantisation
 from acquire.files.picture import check_regular, is_utf8
-from acquire.frame import CameraInfo, Frame, frozen
+from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
 
 INTRA = {
@@ -29,6 +30,8 @@ INTRA = {
 }  # fmt: skip
 """Codecs, by their code in small letters, each of whose pictures stands alone; H.264, VP9 and all others do not."""
 FILM_WARNING = "compressed film: strain may be 10 % low; record MJPG, FFV1 or pictures"
+_AS_JPEG = ("mjpg", "jpeg", "mjpa", "avrn")
+_HEAD = 1 << 20  # bytes, with the tables of the first picture
 _COUNTED = ((0, b"RIFF"), (4, b"ftyp"))  # containers with the number of frames; others have but a duration
 _MOST_COUNTED = 50_000_000  # bytes that are read through to count frames
 
@@ -52,7 +55,7 @@ class VideoFile(CameraBase):
         if not is_utf8(path):
             raise DataError(f"{path}: OpenCV opens a video by its name, which must be UTF-8; rename it")
         with path.open("rb") as file:
-            self._head = file.read(16)
+            self._head = file.read(_HEAD)
         self._address, self._path, self._gray_plane, self._on_event = address, path, gray, on_event
         self._capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
@@ -61,6 +64,8 @@ class VideoFile(CameraBase):
         self._fps = self._capture.get(cv2.CAP_PROP_FPS) or 25.0
         code = _fourcc(int(self._capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF)
         inter_frame = code.lower() not in INTRA
+        table = quantisation(self._head) if code.lower() in _AS_JPEG else None
+        steps: dict[str, Any] = {QUANTISATION: table} if table else {}
         self.info = CameraInfo(
             address=address,
             name=path.name,
@@ -71,7 +76,7 @@ class VideoFile(CameraBase):
             clock="nominal",
             fps=self._fps,
             pixel_format=code,
-            controls={"gray": gray, "frames": self._count(), "inter_frame": inter_frame},
+            controls={"gray": gray, "frames": self._count(), "inter_frame": inter_frame} | steps,
             warnings=(FILM_WARNING,) * inter_frame + (WEBCAM_WARNING,),
         )
 

@@ -48,6 +48,8 @@ class PhaseKernel:
         None: taken from the spectrum of the reference.
     clipped : (H, W) bool, optional
         Saturated pixels of the reference; found from ``noise.saturation`` where that is given.
+    least_noise : float, GL
+        What is below it is no pattern (``hidden_noise`` of compressed pictures).
 
     Attributes
     ----------
@@ -73,12 +75,13 @@ class PhaseKernel:
         settings: KernelSettings | None = None,
         noise: Noise | None = None,
         clipped: NDArray[np.bool_] | None = None,
+        least_noise: float = 0.0,
     ) -> None:
         from analysis.picture.prefilter import room_for
 
         FORK_GUARD.check()
         image = as_image(reference, "the reference")
-        made = ReferencePicture.first(image, grid, settings or KernelSettings(), noise, clipped)
+        made = ReferencePicture.first(image, grid, settings or KernelSettings(), noise, clipped, least_noise)
         self.reference = replace(made, period=periods(made))
         self._rooms = [room_for(image.shape)]
         check_machine(self.settings, grid.size)

@@ -82,6 +82,8 @@ class PreparedReference:
         OK, NO_PATTERN or CLIPPED.
     blur : (A,) float32, px^4 per GL^2
         Variance of the blur for noise of variance 1 GL^2.
+    least_noise : float, GL
+        As given.
     bias : (A, P) float32
         See ``noise_bias``.
     """
@@ -103,6 +105,7 @@ class PreparedReference:
     level: NDArray[np.float64]
     status: NDArray[np.uint8]
     blur: NDArray[np.float32]
+    least_noise: float
     bias: NDArray[np.float32]
 
 
@@ -113,6 +116,7 @@ def prepare_reference(
     settings: KernelSettings,
     noise: NoiseModel | None,
     clipped: NDArray[np.bool_] | None = None,
+    least_noise: float = 0.0,
 ) -> PreparedReference:
     """Filter the reference and compute the normal matrix of each ZOI.
 
@@ -124,6 +128,8 @@ def prepare_reference(
         Of this image; None: taken from its spectrum.
     clipped : (H, W) bool, optional
         Saturated pixels.
+    least_noise : float, GL
+        What is below it is no pattern, however little noise there is.
     """
     mean = float(image.mean(dtype=np.float64))
     std = None if noise is None else float(np.sqrt(noise.variance(mean)))
@@ -139,7 +145,7 @@ def prepare_reference(
     share, over_noise = information(
         out.inverse[:-1], energy[:, :2].astype(np.float64), pattern.left_gradient, line
     )
-    status = _measurable(pattern, out.covariance, energy, rounding_variance(image))
+    status = _measurable(pattern, out.covariance, energy, max(rounding_variance(image), least_noise**2))
     unknown = share < least_information(len(line), settings.order)
     status[unknown | ~_shown(image, origins, line, energy, share)] = Status.NO_PATTERN
     if clipped is not None and clipped.any():
@@ -164,6 +170,7 @@ def prepare_reference(
         level=energy[:, 3].astype(np.float64) + mean,
         status=status,
         blur=out.blur,
+        least_noise=least_noise,
         bias=noise_bias(out.inverse[:-1], out.taken, pattern.own_noise, float(line.sum() ** 2), size),
     )
 

@@ -117,6 +117,7 @@ class ReferencePicture:
         settings: KernelSettings,
         noise: Noise | None,
         clipped: NDArray[np.bool_] | None,
+        least_noise: float = 0.0,
     ) -> ReferencePicture:
         """The reference of a test; parameters and what is raised as for ``PhaseKernel``."""
         check_fit(grid, image.shape)
@@ -127,7 +128,7 @@ class ReferencePicture:
         saturated = clipped_pixels(image, clipped, model)
         cleaned = without_impulses(image)
         whole = image if cleaned is None else cleaned
-        prepared = prepare_reference(whole, origins, grid.size, settings, model, saturated)
+        prepared = prepare_reference(whole, origins, grid.size, settings, model, saturated, least_noise)
         _check_pattern(prepared.status)
         return _laid_out(whole, grid, settings, model, prepared, cleaned is not None)
 
@@ -145,7 +146,9 @@ class ReferencePicture:
         saturated = clipped_pixels(image, clipped, model)
         cleaned = without_impulses(image)
         whole = image if cleaned is None else cleaned
-        prepared = prepare_reference(whole, placement.origins, size, settings, model, saturated)
+        prepared = prepare_reference(
+            whole, placement.origins, size, settings, model, saturated, self.prepared.least_noise
+        )
         gone = placement.status != Status.OK
         prepared = replace(prepared, status=np.where(gone, placement.status, prepared.status))
         made = _laid_out(whole, self.grid, settings, model, prepared, cleaned is not None, placement)
@@ -335,5 +338,5 @@ def _check_pattern(status: NDArray[np.uint8]) -> None:
     if np.all(status == Status.NO_PATTERN):
         raise PatternError(
             "the reference shows no pattern that could be followed in any ZOI; "
-            "check focus, exposure and speckle, or take larger ZOIs"
+            "check focus, exposure, speckle and compression, or take larger ZOIs"
         )

@@ -7,6 +7,7 @@ Everything comes from one picture. No displacement is estimated here; ``predicte
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -151,6 +152,29 @@ def noise_of_picture(image: ArrayLike) -> float:
     """
     picture = _picture(image)
     return _corner_noise(*radial_spectrum((picture - picture.mean()).astype(np.float32)))
+
+
+def hidden_noise(image: ArrayLike, steps: Sequence[float]) -> float:
+    """White noise that may have been in a picture before a codec took it out of the corners of its spectrum, GL.
+
+    Each ring of the spectrum bounds it: by its power, or, where that was rounded to nothing, by the largest noise that
+    is (99 % of values within half a step: a fifth of it). The lowest bound counts.
+
+    Parameters
+    ----------
+    image : (H, W), GL
+    steps : 64 floats, GL
+        Of the coefficients of blocks of 8 x 8 px, row by row (ITU-T T.81, A.3.4).
+    """
+    picture, table = _picture(image), np.reshape(steps, (8, 8)).astype(np.float64)
+    radius, power = radial_spectrum((picture - picture.mean()).astype(np.float32))
+    wave = np.arange(8) / 16  # cycles/px
+    ring = np.rint(16 * np.hypot(wave[:, None], wave)).astype(int)
+    square = np.bincount(ring.ravel(), table.ravel() ** 2) / np.bincount(ring.ravel())
+    inside = (radius > wave[1]) & (radius < wave[-1])
+    rounded = square[np.rint(16 * radius[inside]).astype(int)] / 25
+    bounds = np.maximum(power[inside], rounded)
+    return math.sqrt(float(bounds.min())) if bounds.size else 0.0
 
 
 def _corner_noise(radius: Floats, power: Floats) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -76,8 +76,11 @@ def prepare(
     stated_noise_GL: float | None,
     correct: Correction = unchanged,
     what: str = "the reference",
+    steps: Sequence[float] | None = None,
 ) -> tuple[PhaseKernel, float | None]:
     """The kernel on ``reference``, and the noise of one frame that goes with it.
+
+    ``steps`` are those of a compressed picture (``analysis.picture.pattern.hidden_noise``).
 
     Raises
     ------
@@ -89,12 +92,14 @@ def prepare(
         The machine measures a known pattern wrong.
     """
     from analysis import PhaseKernel
+    from analysis.picture.pattern import hidden_noise
 
     noise_GL = frame_noise(reference, stated_noise_GL)
     noise, sound = averaged(noise_GL, reference.n), correct(reference)
     try:
         with on_fit_machine():
-            return PhaseKernel(sound.mean, grid, settings, noise=noise, clipped=sound.clipped), noise_GL
+            least = hidden_noise(sound.mean, steps) if steps else 0.0
+            return PhaseKernel(sound.mean, grid, settings, noise, sound.clipped, least), noise_GL
     except ValueError as error:
         raise numerics_error(error, what) from error
 

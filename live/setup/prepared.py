@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.events import EventSink
-from acquire.frame import Burst, CameraInfo
+from acquire.frame import QUANTISATION, Burst, CameraInfo
 from acquire.load_cell import LoadLog
 from analysis.optics import LensCorrection, LensModel, PlateFit, ShutterCorrection
 from live.config.gauges import gauges_for
@@ -51,6 +51,8 @@ class MeasurePlan:
         Corrects the fixed pattern of the sensor in a burst.
     width, height : int, px
         Of the picture.
+    quantisation : 64 floats, GL, or None
+        ``CameraInfo.controls`` of compressed pictures.
     """
 
     config: Config
@@ -63,6 +65,7 @@ class MeasurePlan:
     correct: Correction
     width: int
     height: int
+    quantisation: Sequence[float] | None = None
 
     @classmethod
     def of(cls, config: Config, camera: CameraInfo, mask: NDArray[np.bool_] | None) -> MeasurePlan:
@@ -80,7 +83,10 @@ class MeasurePlan:
         plates = None if layout is None else PlateFit(layout, middle)
         lens = lens_for(config, camera.width, camera.height, grid if layout is None else layout.whole)
         settings, correct = kernel_settings(config), correction(config, camera)
-        return cls(config, mask, grid, gauges, plates, lens, settings, correct, camera.width, camera.height)
+        steps = camera.controls.get(QUANTISATION)
+        return cls(
+            config, mask, grid, gauges, plates, lens, settings, correct, camera.width, camera.height, steps
+        )
 
     @property
     def shutter(self) -> ShutterCorrection | None:
@@ -115,7 +121,8 @@ class MeasurePlan:
     def on(self, reference: Burst, what: str = "the reference") -> PreparedKernel:
         """The kernel on ``reference``, named ``what`` in errors; raises as ``live.pipeline.reference.prepare``."""
         stated = self.config.measure.noise_GL
-        kernel, noise_GL = prepare(reference, self.kernel_grid, self.settings, stated, self.correct, what)
+        grid, settings, steps = self.kernel_grid, self.settings, self.quantisation
+        kernel, noise_GL = prepare(reference, grid, settings, stated, self.correct, what, steps)
         return PreparedKernel(self, kernel, noise_GL)
 
 

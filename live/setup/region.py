@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError, DeviceError
 from acquire.events import Event, EventSink
-from acquire.frame import CameraInfo, Frame
+from acquire.frame import QUANTISATION, CameraInfo, Frame
 from live.config.loading import Config
 from live.config.values import ALL, AUTO
 from live.setup.devices import at_rest, open_rig
@@ -156,6 +156,16 @@ class FirstLook:
     camera: CameraInfo
 
     @property
+    def visible_noise(self) -> float | None:
+        """The noise of the picture, GL, with what a codec may have hidden; None: not known."""
+        steps = self.camera.controls.get(QUANTISATION)
+        if not steps:
+            return self.noise
+        from analysis.picture.pattern import hidden_noise
+
+        return max(self.noise or 0.0, hidden_noise(self.picture, steps))
+
+    @property
     def size(self) -> tuple[int, int]:
         """Width and height, px."""
         height, width = self.picture.shape
@@ -262,7 +272,7 @@ def located_on(
     ConfigError, DataError
         As ``region_of``; no ZOI fits, or too few for the gauges.
     """
-    region = region_of(config, first.picture, first.noise)
+    region = region_of(config, first.picture, first.visible_noise)
     if is_auto_region(config):
         print_line(f"{region.words} (--roi all or --roi X,Y,W,H choose another region)")
     return with_auto_gauges(region.config(config), region.grid(config, *first.size)), region.mask

@@ -93,7 +93,9 @@ def propose(
     """
     keys, auto_region = set(given), is_auto_region(config)
     region = region_of(
-        _with(config, zoi=ZOI_SIZES[-1]) if "measure.zoi" not in keys else config, first.picture, first.noise
+        _with(config, zoi=ZOI_SIZES[-1]) if "measure.zoi" not in keys else config,
+        first.picture,
+        first.visible_noise,
     )
     if "specimen.axis" not in keys:
         config = replace(config, specimen=replace(config.specimen, axis=_axis(region, auto_region)))
@@ -101,7 +103,7 @@ def propose(
         config = _with(config, zoi=_size(region, config, first))
     if "measure.step" not in keys:
         config = _with(config, step=max(1, config.measure.zoi // STEPS_PER_ZOI))
-    region = region_of(config, first.picture, first.noise)
+    region = region_of(config, first.picture, first.visible_noise)
     if "measure.gauges" not in keys:
         config = _with(config, gauges=AUTO)
     placed = with_auto_gauges(config, region.grid(config, *first.size))
@@ -110,8 +112,8 @@ def propose(
 
 def _plates(first: FirstLook, auto_region: bool) -> FoundPlates:
     """What looks like plates beside a specimen that was found."""
-    specimen = find_specimen(first.picture, first.noise) if auto_region else None
-    return FoundPlates() if specimen is None else find_plates(first.picture, specimen, first.noise)
+    specimen = find_specimen(first.picture, first.visible_noise) if auto_region else None
+    return FoundPlates() if specimen is None else find_plates(first.picture, specimen, first.visible_noise)
 
 
 def _with(config: Config, **values: int | str) -> Config:

@@ -261,7 +261,7 @@ class StampedVideo(FakeCapture):
 def test_times_of_a_video_that_does_not_count_on_go_on_by_its_rate(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "a.avi").touch()
+    (tmp_path / "a.avi").write_bytes(b"RIFF")
     monkeypatch.setattr(cv2, "VideoCapture", lambda *_: StampedVideo(0, 0, 0, 200, 200, 100))
     events: list[Event] = []
     with open_camera(f"video:{tmp_path}/a.avi", events.append) as camera:

@@ -48,6 +48,7 @@ NUMBERS: dict[str, tuple[float | None, float, float]] = {  # default, lowest, hi
     "specimen.force_error_percent": (None, 0, 100),
     "specimen.section_error_percent": (None, 0, 100),
     "specimen.strain_error_um_m": (None, 0, 1e5),
+    "specimen.film_error_percent": (None, 0, 100),
     "specimen.modulus_GPa": (None, 1e-6, 1e6),
     "specimen.nu": (None, 0, 0.5),
     "specimen.preload_MPa": (1.0, 1e-3, 1e5),
