@@ -21,7 +21,7 @@ from analysis.follow.renewal import taken
 from analysis.kernel.images import Noise, as_image, as_model, as_recorded, clipped_pixels
 from analysis.kernel.lines import mend
 from analysis.kernel.reference import ReferencePicture
-from analysis.kernel.repeating import periods
+from analysis.kernel.repeating import repetition
 from analysis.kernel.result import PredictedMotion, field_of
 from analysis.kernel.retry import retry_lost
 from analysis.kernel.settings import Estimator, KernelSettings
@@ -79,7 +79,7 @@ class PhaseKernel:
         FORK_GUARD.check()
         image = as_image(reference, "the reference")
         made = ReferencePicture.first(image, grid, settings or KernelSettings(), noise, clipped)
-        self.reference = replace(made, period=periods(made))
+        self.reference = replace(made, repetition=repetition(made))
         self._rooms = [room_for(image.shape)]
         check_machine(self.settings, grid.size)
 
