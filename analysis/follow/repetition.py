@@ -84,7 +84,7 @@ class Repetition:
         has = self.has[which]
         counted = has | ~has.any(axis=1, keepdims=True)
         shares = abs(away @ self.places.T) / np.sum(self.places**2, axis=1)
-        return np.where(counted, shares, 0.0).max(axis=1, initial=0.0)
+        return np.asarray(np.where(counted, shares, 0.0).max(axis=1, initial=0.0))
 
     def nearest(self, away: Floats, which: NDArray[np.intp]) -> Floats:
         """The shortest displacement (B, 2) at which ZOIs look the same as at ``away`` (B, 2), px."""
@@ -127,12 +127,12 @@ def side_peaks(
                 known = next((p for p in near if math.dist(p, peak) < 2), peak)
                 near[known] = near.get(known, False) | around
     yield from near.items()
-    known = Repetition(np.array(list(near), float).reshape(-1, 2), np.ones((1, len(near)), bool))
+    seen = Repetition(np.array(list(near), float).reshape(-1, 2), np.ones((1, len(near)), bool))
     for peak in _far_peaks(image, region, int(REACH * side)):
-        if np.hypot(*known.nearest(np.array([peak], float), np.zeros(1, np.intp))[0]) > SAME_PX:
+        if np.hypot(*seen.nearest(np.array([peak], float), np.zeros(1, np.intp))[0]) > SAME_PX:
             yield peak, np.ones(len(x), bool)
-            places = np.append(known.places, [peak], axis=0)
-            known = Repetition(places, np.ones((1, len(places)), bool))
+            places = np.append(seen.places, [peak], axis=0)
+            seen = Repetition(places, np.ones((1, len(places)), bool))
 
 
 def _far_peaks(image: Image, region: Roi, reach: int) -> list[tuple[int, int]]:

@@ -20,6 +20,7 @@ from analysis.field import Motion, StrainField, ZoiGrid
 from analysis.follow.renewal import taken
 from analysis.kernel.images import Noise, as_image, as_model, as_recorded, clipped_pixels
 from analysis.kernel.lines import mend
+from analysis.kernel.parts import coherent
 from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.repeating import repetition
 from analysis.kernel.result import PredictedMotion, field_of
@@ -186,13 +187,13 @@ class PhaseKernel:
                 solution = Solution(reference, image, model, reference.searched(image, room), room)
                 mend(solution)
                 retry_lost(solution, None, saturated)
-                return field_of(solution)
+                return coherent(field_of(solution))
             before, carried = self._before(start), self._carried_motion(start)
             predicted = before + carried.ahead
             solution = Solution(reference, image, model, reference.local(predicted), room)
             mend(solution)
             retry_lost(solution, reference.local(before), saturated)
-            return field_of(solution, PredictedMotion(predicted, carried))
+            return coherent(field_of(solution, PredictedMotion(predicted, carried)))
 
     @contextmanager
     def _room(self) -> Iterator[NDArray[np.float32]]:

@@ -1,0 +1,106 @@
+"""A measured field without ZOIs that stand out, and with the parts that it has come apart into.
+
+What a specimen does is coherent: a ZOI that was found elsewhere is not. Parts that are coherent in themselves and jump
+against each other, by more than strain as on both sides of the gap may make, have come apart: they share no strain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.field import PAIR_INDEX, Status, StrainField
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+PART = 0.1
+"""Share of the valid ZOIs that makes a part."""
+MIN_PAIRS = 3
+"""ZOIs that face each other across a gap from which on a jump is one."""
+_VARIANCES = [PAIR_INDEX[i, i] for i in range(6)]
+
+
+def coherent(field: StrainField) -> StrainField:
+    """The field without ZOIs that stand out, which are LOST, and with its parts where it has come apart."""
+    from analysis.compiled.loops import read_only
+    from analysis.follow.coherence import ALONE, label, stand_out
+
+    p, variance = read_only(_affine(field)), read_only(field.covariance)
+    step, out = float(field.grid.step), np.zeros(field.grid.shape, np.uint8)
+    stand_out(p, variance, step, read_only(field.ok), out)
+    alone = out == ALONE
+    if alone.any():
+        field = _without(field, alone)
+    # As a rule ZOIs on a crack have no value.
+    if out.any() or field.n_valid < field.grid.n_active:
+        labels = np.zeros(field.grid.shape, np.int32)
+        label(p, variance, step, read_only(field.ok), labels)
+        field = replace(field, parts=_parts(field, labels))
+    return field
+
+
+def _affine(field: StrainField) -> Floats:
+    """u, du_dx, du_dy, v, dv_dx, dv_dy, (6, R, C)."""
+    shape = field.grid.shape
+    whole = field.parameters.reshape(2, -1, *shape)[:, :3]
+    return np.ascontiguousarray(whole.reshape(6, *shape), np.float64)
+
+
+def _without(field: StrainField, alone: Bools) -> StrainField:
+    """The field with ZOIs (R, C) that are LOST."""
+    blur = field.blur
+    if blur is not None:
+        blur = blur.copy()
+        blur[0, alone] = np.nan
+    none = np.where(alone, np.float32(np.nan), np.float32(0))
+    return replace(
+        field,
+        parameters=field.parameters + none,
+        covariance=field.covariance + none,
+        covariance_reference=field.covariance_reference + none,
+        residual=field.residual + none,
+        blur=blur,
+        status=np.where(alone, np.uint8(Status.LOST), field.status),
+    )
+
+
+def _parts(field: StrainField, labels: NDArray[np.int32]) -> NDArray[np.uint8] | None:
+    """Numbers of the parts that have come apart, from 1, 0 beside them, (R, C); None where none have."""
+    counts = np.bincount(labels.ravel())
+    large = [k for k in range(1, len(counts)) if counts[k] >= PART * counts[1:].sum()]
+    parts = np.zeros(labels.shape, np.uint8)
+    for number, k in enumerate(large, 1):
+        parts[labels == k] = number
+    for number in range(2, len(large) + 1):
+        for other in range(1, number):
+            if not any(_jumps(field, parts, (other, number), way) for way in (1, 2)):
+                parts[parts == number] = other
+    return parts if len(np.unique(parts[parts > 0])) > 1 else None
+
+
+def _jumps(field: StrainField, parts: NDArray[np.uint8], two: tuple[int, int], way: int) -> bool:
+    """Whether two parts move against each other by more than strain may make, along x (``way`` 1) or y (2)."""
+    from analysis.follow.coherence import ALLOWED_PX, ALLOWED_SIGMAS
+
+    across, p = np.moveaxis(parts, -way, -1), np.moveaxis(_affine(field), -way, -1)
+    sigma = np.moveaxis(np.sqrt(field.covariance[_VARIANCES]), -way, -1)
+    line, at = np.nonzero(np.isin(across, two))
+    beside = np.flatnonzero((np.diff(line) == 0) & (np.diff(across[line, at].astype(int)) != 0))
+    if len(beside) < MIN_PAIRS:
+        return False
+    near, far = ((slice(None), line[k], at[k]) for k in (beside, beside + 1))
+    length = field.grid.step * (at[beside + 1] - at[beside])
+    moved, mean = p[far] - p[near], (p[near] + p[far]) / 2
+    strained = length * (abs(p[near]) + abs(p[far]))
+    doubt = ALLOWED_PX + ALLOWED_SIGMAS * np.hypot(sigma[near], sigma[far])
+    beyond = [
+        abs(moved[u] - length * mean[u + way])
+        - strained[u + way]
+        - doubt[u]
+        - length / 2 * (doubt[u + way] - ALLOWED_PX)
+        for u in (0, 3)
+    ]
+    return bool(np.median(beyond, axis=1).max() > 0)
