@@ -23,12 +23,13 @@ from analysis.evaluate.gauges.extensometers import (
 from analysis.evaluate.gauges.gauge import Gauge, GaugeValue, Parameter
 from analysis.evaluate.gauges.geometry import inside_polygon
 from analysis.evaluate.gauges.kinds import GAUGE_KINDS, AreaGauge, CircleGauge, StripGauge, ZoiGauge
-from analysis.evaluate.gauges.readings import distance, facing
+from analysis.evaluate.gauges.readings import COME_APART, distance, facing
 from analysis.evaluate.lag import Track, find_lag
 from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
 from analysis.evaluate.tensile import Span, StrainZero, TensileFigures, TensileOptions, ZeroBy, evaluate_test
 
 __all__ = [
+    "COME_APART",
     "CONFIDENCE",
     "GAUGE_KINDS",
     "MIN_STILL_INSTANTS",

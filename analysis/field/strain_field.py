@@ -231,12 +231,12 @@ class StrainField:
         """Number of ZOIs with a valid value."""
         return int(np.count_nonzero(self.ok))
 
-    def is_apart(self, where: NDArray[np.bool_] | None = None) -> bool:
-        """Whether the ZOIs ``where`` (R, C), by default all, belong to parts that have come apart."""
+    def n_parts(self, where: NDArray[np.bool_] | None = None) -> int:
+        """Parts that have come apart among the ZOIs ``where`` (R, C), by default all; 1 where none have."""
         if self.parts is None:
-            return False
+            return 1
         parts = self.parts if where is None else self.parts[where]
-        return len(np.unique(parts[parts > 0])) > 1
+        return max(len(np.unique(parts[parts > 0])), 1)
 
     def value(self, name: str) -> Floats:
         """A value by its name (see ``VALUES``), (R, C); read-only where it is one of the parameters.

@@ -143,7 +143,7 @@ def _lies_off(u: Any, variance: float, ok: Any, r: int, c: int) -> Any:
                     normal[j, k] += weight[i] * basis[i, j] * basis[i, k]
         for j in range(terms):
             normal[j, j] += 1e-6 * normal[0, 0]
-        fit = np.linalg.solve(normal, right)
+        fit[:] = np.linalg.solve(normal, right)
         left[:] = np.abs(value - basis @ fit)
         weight = 1.0 / np.maximum(left, _LEAST)
     allowed = ALLOWED_PX + ALLOWED_SIGMAS * math.sqrt(variance) + ALLOWED_SPREADS * np.median(left)

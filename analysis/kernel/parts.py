@@ -95,12 +95,9 @@ def _jumps(field: StrainField, parts: NDArray[np.uint8], two: tuple[int, int], w
     length = field.grid.step * (at[beside + 1] - at[beside])
     moved, mean = p[far] - p[near], (p[near] + p[far]) / 2
     strained = length * (abs(p[near]) + abs(p[far]))
-    doubt = ALLOWED_PX + ALLOWED_SIGMAS * np.hypot(sigma[near], sigma[far])
+    doubt = ALLOWED_SIGMAS * np.hypot(sigma[near], sigma[far])
     beyond = [
-        abs(moved[u] - length * mean[u + way])
-        - strained[u + way]
-        - doubt[u]
-        - length / 2 * (doubt[u + way] - ALLOWED_PX)
-        for u in (0, 3)
+        abs(moved[u] - length * mean[k]) - strained[k] - doubt[u] - length / 2 * doubt[k] - ALLOWED_PX
+        for u, k in ((0, way), (3, 3 + way))
     ]
     return bool(np.median(beyond, axis=1).max() > 0)

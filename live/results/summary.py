@@ -69,11 +69,10 @@ def summary_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
     largest = strains[np.argmax(np.abs(strains))]
     refused = f" ({last.refused})" if last.refused else ""
     part = share_text(last.least_share)
+    strain = f"exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
     lines = [
         f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        "last strain of the region:"
-        f" exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
-        f"{f' {part}' if part else ''};"
+        f"last strain of the region: {f'none, {last.apart}' if last.apart else strain}{f' {part}' if part else ''};"
         f" largest of any ZOI {largest * 1e6:+.0f} µm/m",
         noise_line(history),
     ]

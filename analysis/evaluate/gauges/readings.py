@@ -30,7 +30,7 @@ def read_area(chosen: Mask, field: StrainField, value: str, statistic: Statistic
     if missing := _missing(chosen, field):
         return GaugeValue(math.nan, math.nan, missing)
     affine = statistic == "affine" and value in GRADIENTS
-    if affine and field.is_apart(chosen):
+    if affine and field.n_parts(chosen) > 1:
         return GaugeValue(math.nan, math.nan, COME_APART)
     found = AreaStrain.of(field, chosen) if affine else None
     if found is not None:

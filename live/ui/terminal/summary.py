@@ -64,7 +64,8 @@ def brief_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
     strain, sigma = last.axial(axis)
     lines = [
         f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        f"strain along {axis} at the end: {strain_text(strain, sigma)} µm/m",
+        f"strain along {axis} at the end: {strain_text(strain, sigma)} µm/m"
+        + f" ({last.apart})" * bool(last.apart),
         *_figures(run_state, specimen),
         noise_line(history),
         *_remarks(run_state, specimen),
