@@ -68,12 +68,10 @@ class PartsGuard:
         if not step.n_valid or bool(step.apart) == self._apart:
             return
         self._apart = bool(step.apart)
-        text, level = "the region is whole again", "info"
+        text = "the region is whole again"
         if self._apart:
-            text = (
-                f"{step.apart}: it has no strain from here on; gauges within a part have, and the extension"
-            )
-            level = "warning"
+            text = f"{step.apart}: it has no strain from here on; gauges within a part have, and the extension"
+        level: Level = "warning" if self._apart else "info"
         self._on_event(Event(step.t, EventKind.MEASUREMENT, "region", text, level, {"parts": step.n_parts}))
 
 
