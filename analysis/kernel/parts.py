@@ -18,6 +18,8 @@ Bools = NDArray[np.bool_]
 
 PART = 0.1
 """Share of the valid ZOIs that makes a part."""
+ROUNDS = 4
+"""What is wrong hides others from its neighbours until it is left out."""
 MIN_PAIRS = 3
 """ZOIs that face each other across a gap from which on a jump is one."""
 _VARIANCES = [PAIR_INDEX[i, i] for i in range(6)]
@@ -28,14 +30,17 @@ def coherent(field: StrainField) -> StrainField:
     from analysis.compiled.loops import read_only
     from analysis.follow.coherence import ALONE, label, stand_out
 
-    p, variance = read_only(_affine(field)), read_only(field.covariance)
-    step, out = float(field.grid.step), np.zeros(field.grid.shape, np.uint8)
-    stand_out(p, variance, step, read_only(field.ok), out)
-    alone = out == ALONE
-    if alone.any():
-        field = _without(field, alone)
+    step, rough = float(field.grid.step), False
+    for _ in range(ROUNDS):
+        p, variance = read_only(_affine(field)), read_only(field.covariance)
+        out = np.zeros(field.grid.shape, np.uint8)
+        stand_out(p, variance, step, read_only(field.ok), out)
+        rough = rough or bool(out.any())
+        if not (out == ALONE).any():
+            break
+        field = _without(field, out == ALONE)
     # As a rule ZOIs on a crack have no value.
-    if out.any() or field.n_valid < field.grid.n_active:
+    if rough or field.n_valid < field.grid.n_active:
         labels = np.zeros(field.grid.shape, np.int32)
         label(p, variance, step, read_only(field.ok), labels)
         field = replace(field, parts=_parts(field, labels))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.field import Status
+from analysis.field import Status, in_blocks
 from analysis.follow.repetition import Repetition
 from analysis.kernel.neighbours import Neighbours
 from analysis.kernel.reference import ReferencePicture
@@ -31,6 +31,8 @@ FEW, FAR_MOVES = 256, 6
 """ZOIs that are tried first, and pixels uphill from a place that was found in a smaller picture."""
 STRAYS = 0.02
 """Share of ZOIs that may lie farther off for the others to be trusted."""
+AS_GOOD = 0.05
+"""Correlation that noise and a fraction of a pixel take from the nearest place; beyond it a farther one is better."""
 MIN_ANCHORS = 0.02
 """ZOIs that do not repeat, of those that do, from which on all wait for them."""
 ALIKE = 0.4
@@ -62,7 +64,21 @@ def repetition(reference: ReferencePicture) -> Repetition:
             places.append(np.nanmedian(away[:, match].reshape(-1, 2), axis=0))
             usual = np.count_nonzero(match) >= USUAL * np.count_nonzero(tested)
             has.append(match | (near & able & ~tested & usual))
-    return Repetition(np.array(places).reshape(-1, 2), np.array(has, bool).reshape(-1, zois).T)
+    whole = np.array(has, bool).reshape(-1, zois).T
+    return Repetition(np.array(places).reshape(-1, 2), _with_lone(reference, whole, able))
+
+
+def _with_lone(reference: ReferencePicture, has: Bools, able: Bools) -> Bools:
+    """``has`` (A, K) with that of their neighbours for the few that do not repeat among those that do."""
+    from scipy.ndimage import binary_dilation
+
+    lone = able & ~has.any(axis=1)
+    if not has.any() or not lone.any():
+        return has
+    beside = reference.spread(lone[:, None], False)[0]
+    lone &= ~in_blocks(beside).ravel()[reference.index]
+    around = [binary_dilation(one, np.ones((3, 3), bool)) for one in reference.spread(has, False)]
+    return has | (lone[:, None] & np.stack([one.ravel()[reference.index] for one in around], axis=1))
 
 
 def _inside(reference: ReferencePicture, place: NDArray[np.intp]) -> Bools:
@@ -127,7 +143,8 @@ def settle(solution: Solution, expected: Floats) -> Bools:
     if (off[valid & np.isfinite(off)] < CALM_PERIODS).all():
         settled = _outward(solution, neighbours, valid & np.isfinite(off), repeats)
     else:
-        settled = _outward(solution, neighbours, valid & ~repeats, repeats)
+        _fit_near(solution, np.flatnonzero(valid & (off >= CALM_PERIODS)), expected)
+        settled = _outward(solution, neighbours, (solution.status == Status.OK) & ~repeats, repeats)
         settled = _as_expected(solution, neighbours, settled, expected)
     undecided = repeats & ~settled & (solution.status == Status.OK)
     solution.status[undecided] = Status.AMBIGUOUS
@@ -209,15 +226,24 @@ def _is_expected(solution: Solution, expected: Floats) -> bool:
 
 
 def _fit_near(solution: Solution, which: NDArray[np.intp], expected: Floats) -> None:
-    """Fit some ZOIs at the place nearest to where they are expected: that or one that looks like where they are."""
+    """Fit some ZOIs where they are expected, or at the nearest place like theirs; not where that is worse."""
+    at = _displacements(solution)
+    guess = expected[which]
+    here = np.where((solution.status[which] == Status.OK)[:, None], solution.found.p[which][:, at], np.nan)
+    away = np.nan_to_num(here - guess[:, at])
+    nearest = solution.reference.repetition.nearest(away, which)
+    near, score = _climbed(solution, which, guess[:, None, at] + np.stack([nearest, 0 * away], axis=1))
+    own = _climbed(solution, which, (guess[:, at] + away)[:, None])[1]
+    better = np.isnan(here[:, 0]) | (score >= own - AS_GOOD)
+    guess[:, at] = near
+    _brought(solution, which[better], guess[better])
+
+
+def _climbed(solution: Solution, which: NDArray[np.intp], places: Floats) -> tuple[NDArray[np.int64], Floats]:
+    """Whole pixels (B, 2) uphill from the best of some places (B, K, 2) of ZOIs, and the correlation there, (B,)."""
     from analysis.follow.hill_climb import MAX_MOVES, climbed
 
-    reference, at = solution.reference, _displacements(solution)
-    offset = np.float32(reference.prepared.pattern.mean)
-    guess, image = expected[which], solution.image.astype(np.float32)
-    away = np.nan_to_num(solution.found.p[which][:, at] - guess[:, at], posinf=0.0, neginf=0.0)
-    away = reference.repetition.nearest(away, which)
-    near = np.rint(guess[:, None, at] + np.stack([away, 0 * away], axis=1)).astype(np.int64)
-    origins, size = reference.prepared.origins[which], reference.grid.size
-    guess[:, at] = climbed(reference.image, image, offset, origins, size, near, MAX_MOVES)[0]
-    _brought(solution, which, guess)
+    reference, image = solution.reference, solution.image.astype(np.float32)
+    offset, origins = np.float32(reference.prepared.pattern.mean), reference.prepared.origins[which]
+    near = np.rint(places).astype(np.int64)
+    return climbed(reference.image, image, offset, origins, reference.grid.size, near, MAX_MOVES)
