@@ -7,17 +7,21 @@ against each other, by more than strain as on both sides of the gap may make, ha
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import PAIR_INDEX, Status, StrainField
+from analysis.field.grid import overlap
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 PART = 0.1
 """Share of the valid ZOIs that makes a part."""
+MANY, CERTAIN, REACHES = 0.02, 1.5, (1, 2, 4)
+"""Share of ZOIs that stand out from which on what is left is looked at, and widens the uncertainties above so much."""
 ROUNDS = 4
 """What is wrong hides others from its neighbours until it is left out."""
 MIN_PAIRS = 3
@@ -30,7 +34,7 @@ def coherent(field: StrainField) -> StrainField:
     from analysis.compiled.loops import read_only
     from analysis.follow.coherence import ALONE, label, stand_out
 
-    step, rough = float(field.grid.step), False
+    step, rough, valid = float(field.grid.step), False, field.n_valid
     for _ in range(ROUNDS):
         p, variance = read_only(_affine(field)), read_only(field.covariance)
         out = np.zeros(field.grid.shape, np.uint8)
@@ -39,6 +43,8 @@ def coherent(field: StrainField) -> StrainField:
         if not (out == ALONE).any():
             break
         field = _without(field, out == ALONE)
+    if field.n_valid < (1 - MANY) * valid:
+        field = replace(field, covariance=field.covariance * np.float32(_incoherence(field)))
     # As a rule ZOIs on a crack have no value.
     if rough or field.n_valid < field.grid.n_active:
         labels = np.zeros(field.grid.shape, np.int32)
@@ -52,6 +58,30 @@ def _affine(field: StrainField) -> Floats:
     shape = field.grid.shape
     whole = field.parameters.reshape(2, -1, *shape)[:, :3]
     return np.ascontiguousarray(whole.reshape(6, *shape), np.float64)
+
+
+def _incoherence(field: StrainField) -> float:
+    """Variance of a mean over that of its noise: what neighbours differ by beyond quadratics, and how far it reaches.
+
+    By differences of the second order along x of such along y, between ZOIs 1, 2 and 4 steps apart. Values that are
+    wrong alone show it all in the nearest; what shows half of it only ``n`` steps apart is shared by n x n ZOIs.
+    """
+    u, sigma = _affine(field)[[0, 3]], np.sqrt(field.covariance[_VARIANCES][[0, 3]])
+    second, found = np.array([1.0, -2.0, 1.0]) / 2, []
+    for apart in REACHES:
+        if min(field.grid.shape) <= 2 * apart + 1:
+            break
+        lines, columns = ([slice(k * apart, n - (2 - k) * apart) for k in range(3)] for n in u.shape[1:])
+        each = product(zip(second, lines, strict=True), zip(second, columns, strict=True))
+        left = sum(a * b * u[:, line, column] for (a, line), (b, column) in each)
+        rho = overlap(field.window, field.grid.size, field.grid.step * apart, 3, 0)
+        noise = second @ rho[abs(np.subtract.outer(np.arange(3), np.arange(3)))] @ second
+        inner = sigma[:, apart:-apart, apart:-apart]
+        found.append(float(np.nanmean((left / inner) ** 2)) / noise**2)
+    if not found or not np.isfinite(found).all():
+        return 1.0
+    reach = next(n for n, much in zip(REACHES, found, strict=False) if much >= max(found) / 2)
+    return max(max(found) * reach**2, 1.0) if max(found) > CERTAIN else 1.0
 
 
 def _without(field: StrainField, alone: Bools) -> StrainField:

@@ -70,7 +70,9 @@ class PartsGuard:
         self._apart = bool(step.apart)
         text = "the region is whole again"
         if self._apart:
-            text = f"{step.apart}: it has no strain from here on; gauges within a part have, and the extension"
+            text = (
+                f"{step.apart}: it has no strain from here on; gauges within a part have, and the extension"
+            )
         level: Level = "warning" if self._apart else "info"
         self._on_event(Event(step.t, EventKind.MEASUREMENT, "region", text, level, {"parts": step.n_parts}))
 

@@ -117,12 +117,15 @@ def test_side_peaks_are_those_of_the_lattice() -> None:
     assert all(near.all() for near in found.values())
 
 
-def tiled(side: float, u: float = 0.0, v: float = 0.0, across: bool = True) -> np.ndarray:
-    """One piece of ``side`` px again and again along y, and ``across`` along x too, moved by (u, v)."""
-    x, y = pixels(SHAPE)
-    return finding.picture(
-        SPECKLE.at(np.mod(x - u, side) if across else x - u, np.mod(y - v, side)), int(side + u)
-    )
+def tiled(side: int, u: float = 0.0, v: float = 0.0, across: bool = True) -> np.ndarray:
+    """One piece of ``side`` px again and again along y, and ``across`` along x too, moved by (u, v) without an edge."""
+    shape = side, side if across else 900
+    fy, fx = np.fft.fftfreq(shape[0])[:, None], np.fft.rfftfreq(shape[1])[None]
+    blurred = np.exp(-2 * (np.pi * 2.5) ** 2 * (fy**2 + fx**2) - 2j * np.pi * (fx * u + fy * v))
+    piece = np.fft.irfft2(np.fft.rfft2(np.random.default_rng(side).normal(0, 1, shape)) * blurred, shape)
+    rows, columns = (-(-whole // part) for whole, part in zip(SHAPE, shape, strict=True))
+    level = 0.5 + 0.18 * np.tile(piece / piece.std(), (rows, columns))[: SHAPE[0], : SHAPE[1]]
+    return finding.picture(level, int(side + 10 * u))
 
 
 @pytest.mark.parametrize("side", [20, 37, 65, 130, 200, 260])

@@ -67,6 +67,23 @@ def test_wrong_neighbours_do_not_pull() -> None:
     assert (~field.ok & ~wrong).sum() <= 2
 
 
+def scattered(size: float, reach: int = 1) -> StrainField:
+    """ZOIs side by side, one of 20 found elsewhere; errors of ``size`` px, alike in ``reach`` x ``reach`` ZOIs."""
+    rng, grid = np.random.default_rng(8), ZoiGrid.cover(Roi(0, 0, 480, 480), 8, 8)
+    error = np.kron(rng.normal(0, size, (60 // reach,) * 2), np.ones((reach, reach)))
+    elsewhere = rng.uniform(50, 250, grid.shape) * (rng.random(grid.shape) < 0.05)
+    found = rng.normal(0, SIGMA_PX, grid.shape) + error + elsewhere
+    return coherent(StrainField.from_values(grid, {"u": found}, {"u": SIGMA_PX, "v": SIGMA_PX}))
+
+
+def test_what_is_left_widens_the_uncertainty_of_means_where_many_stood_out() -> None:
+    none, some, wide = (scattered(*case).mean("u")[1] for case in ((0,), (0.04,), (0.04, 3)))
+    alone = math.hypot(SIGMA_PX, 0.04 / math.sqrt(2)) / SIGMA_PX  # v has no such error: half of the variance
+    assert none == pytest.approx(SIGMA_PX / math.sqrt(3600 * 0.95), rel=0.02)
+    assert some == pytest.approx(alone * none, rel=0.1)
+    assert wide > 1.4 * some
+
+
 def test_noise_bending_and_a_crack_between_zois_change_no_verdict() -> None:
     for values in ({}, bent(), {"v": 0.4 * (Y > 0)}):
         field = field_of(**values)
