@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.compiled.forked import FORK_GUARD
 from analysis.field import Motion, StrainField, ZoiGrid
+from analysis.follow.parts import coherent
 from analysis.follow.renewal import taken
 from analysis.kernel.images import Noise, as_image, as_model, as_recorded, clipped_pixels
 from analysis.kernel.lines import mend
-from analysis.kernel.parts import coherent
 from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.repeating import repetition
 from analysis.kernel.result import PredictedMotion, field_of

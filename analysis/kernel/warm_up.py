@@ -199,8 +199,8 @@ def _rest() -> None:
     from analysis.fit.kernel_args import OutArgs, PooledError, ReferenceArgs, VerdictArgs
     from analysis.fit.pooling import explained, medians
     from analysis.fit.verdict import judge
+    from analysis.follow.parts import coherent
     from analysis.follow.prediction import motion_after
-    from analysis.kernel.parts import coherent
     from analysis.kernel.reference import ReferencePicture
     from analysis.kernel.settings import KernelSettings
 

@@ -13,7 +13,7 @@ from acquire.events import Event
 from analysis import Roi, Status, StrainField, ZoiGrid
 from analysis.evaluate import COME_APART, AreaGauge, AreaStrain, ExtensionGauge
 from analysis.field import Block, part_of
-from analysis.kernel.parts import coherent
+from analysis.follow.parts import coherent
 from live.pipeline.guards import PartsGuard
 from live.pipeline.measurement import TimeStep, region_strains
 from tests.live.made_up import make_measurement
