@@ -12,8 +12,10 @@ import os
 import select
 import signal
 import socket
+import stat
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -21,6 +23,7 @@ from types import FrameType
 
 _START_S = 10.0  # for the memory of another process's socket
 _CLOSED_POLL_S = 0.5
+_ROOT = Path(__file__).parents[1]
 _ARENA_MAX, _POOLS = -8, 2  # malloc.h
 
 if sys.platform == "win32":
@@ -83,6 +86,20 @@ def signal_handler(
 
 
 # -- processes --------------------------------------------------------------------------------
+
+
+def python_command(module: str, *words: str) -> list[str]:
+    """The command of a Python process that runs ``module``; a module in the working folder is not taken for another."""
+    return [sys.executable, "-P", "-m", module, *words]
+
+
+def python_environment(**more: str) -> dict[str, str]:
+    """The environment for ``python_command``, with this code in its path where it is not installed."""
+    paths = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    if _ROOT.name not in ("site-packages", "dist-packages"):  # they stand behind Python's own modules
+        paths = [str(_ROOT), *paths]
+    # An empty entry would be the working folder.
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths)), **more}
 
 
 def start_with_socket(
@@ -286,6 +303,34 @@ def forget_pages(file: int, size: int) -> None:
     """Free the memory that holds the first ``size`` bytes of a file, where the system can."""
     if sys.platform == "linux":
         os.posix_fadvise(file, 0, size, os.POSIX_FADV_DONTNEED)
+
+
+def can_write(folder: Path) -> bool:
+    """Whether files can be made in ``folder``, which is made where it is not there."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
+def private_folder(name: str) -> Path:
+    """A folder of this user alone below the temporary one, the same each time; raises OSError where there is none.
+
+    Where another user, or one who let others write to it, has made it before, it is a new one.
+    """
+    if sys.platform == "win32":  # there the temporary folder is the user's own
+        path = Path(tempfile.gettempdir()) / name
+        path.mkdir(exist_ok=True)
+        return path
+    else:
+        path = Path(tempfile.gettempdir()) / f"{name}-{os.getuid()}"
+        with contextlib.suppress(FileExistsError):
+            path.mkdir(mode=0o700)
+        found = path.lstat()
+        ours = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077
+        return path if ours else Path(tempfile.mkdtemp(prefix=f"{name}-"))
 
 
 def open_pty() -> tuple[int, int, str]:

@@ -6,6 +6,7 @@ device; the simulated camera has its frames from here too: which come, and what 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -142,7 +143,7 @@ class Planned:
 def plan_frames(duration_s: float, fps: float, faults: FaultPlan) -> Iterator[Planned]:
     """Every frame period of a test of ``duration_s`` seconds, in order; ends after "gone"."""
     left: dict[str, float] = {"drop": 0.0, "damage": 0.0}
-    for index in range(int(duration_s * fps + 1e-9) + 1):
+    for index in itertools.takewhile(lambda index: index <= duration_s * fps + 1e-9, itertools.count()):
         t = index / fps
         for name in left:
             while fault := faults.begun(name, t):

@@ -3,6 +3,7 @@
 - ``Programme``: hold, pull to yield, pull on, hold. Two constant strain rates, as ISO 6892-1 has them: a slow one
   through the elastic part, where most is to be measured, and a faster one beyond yield. Times are seconds since
   the test began (``TestClock``).
+- ``Pull``: when an operator lets the programme pull, and how slowly.
 - ``Machine``: driven by another program, which sends ``speed V`` (1/s: over the free length of the specimen) over
   TCP and gets ``ok``. The machine is soft: while the specimen is elastic, part of the way goes into the machine,
   beyond yield all goes into the specimen. So the strain rate is not the speed, and jumps at yield; to hold it takes
@@ -127,6 +128,23 @@ class Machine:
         return "no: give speed V, 1/s"
 
 
+class Pull:
+    """The pull of a programme that waits for its operator: as programmed until ``start`` is called.
+
+    Attributes
+    ----------
+    told : (float, float) or None, s
+        When it begins, since the start of the test, and how long it takes.
+    """
+
+    def __init__(self) -> None:
+        self.told: tuple[float, float] | None = None
+
+    def start(self, begins_s: float, lasts_s: float) -> None:
+        """Pull from ``begins_s`` on for ``lasts_s``; it must be later than any picture that is made already."""
+        self.told = begins_s, lasts_s
+
+
 @dataclass(frozen=True, slots=True)
 class Programme:
     """Strain over time, made of straight pieces.
@@ -134,7 +152,7 @@ class Programme:
     Attributes
     ----------
     hold_s : float, s
-        At rest, for the reference burst.
+        At rest, for the reference burst; the longest where it waits for its operator.
     ramp_s : float, s
         Pulling.
     end_s : float, s
@@ -145,6 +163,8 @@ class Programme:
         Part of the ramp's time spent up to ``knee_strain``.
     machine : Machine or None
         Driven from outside; then it alone decides the strain, and the times are those of the test.
+    pull : Pull or None
+        Given where the programme waits for its operator.
     """
 
     hold_s: float = 2.0
@@ -154,27 +174,36 @@ class Programme:
     max_strain: float = 8e-3
     knee: float = 0.6
     machine: Machine | None = None
+    pull: Pull | None = None
+
+    @property
+    def knots_s(self) -> tuple[float, float, float]:
+        """Times since the start at which the pull begins, the rate changes, and the pull ends, s."""
+        told = None if self.pull is None else self.pull.told
+        begins, lasts = told or (self.hold_s, self.ramp_s)
+        return begins, begins + self.knee * lasts, begins + lasts
 
     @property
     def duration_s(self) -> float:
         """Length of the whole test, s."""
-        return self.hold_s + self.ramp_s + self.end_s
+        return self.knots_s[2] + self.end_s
 
     @property
     def knee_s(self) -> float:
         """Time since the start at which the rate changes, s."""
-        return self.hold_s + self.knee * self.ramp_s
+        return self.knots_s[1]
 
     def strain(self, t: ArrayLike) -> Array:
         """Axial strain at ``t`` seconds since the start; 0 before."""
         if self.machine is not None:
             return self.machine.strain(t)
-        times = (self.hold_s, self.knee_s, self.hold_s + self.ramp_s)
-        return np.asarray(np.interp(np.asarray(t, float), times, (0.0, self.knee_strain, self.max_strain)))
+        strains = (0.0, self.knee_strain, self.max_strain)
+        return np.asarray(np.interp(np.asarray(t, float), self.knots_s, strains))
 
     def progress(self, t: ArrayLike) -> Array:
         """Part of the ramp that is done, 0 to 1."""
-        return np.clip((np.asarray(t, float) - self.hold_s) / self.ramp_s, 0.0, 1.0)
+        begins, _, ends = self.knots_s
+        return np.clip((np.asarray(t, float) - begins) / (ends - begins), 0.0, 1.0)
 
 
 class TestClock:

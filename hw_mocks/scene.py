@@ -8,6 +8,7 @@ Motion during the exposure is left out: a frame shows its mid-exposure instant.
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass
 from functools import lru_cache
 from statistics import NormalDist
@@ -23,6 +24,8 @@ from hw_mocks.specimen import VirtualSpecimen
 from hw_mocks.speckle import Hole, Speckle
 
 FRINGE = 8.0  # px of pattern beyond what the test can move into view
+RENDER_SHARE = 0.4
+"""Of one core that rendering may take where the rate follows the machine."""
 
 
 class Scene:
@@ -207,3 +210,22 @@ class Exposer:
         signal = (scale, offset, sensor.gain, sensor.read_noise**2)
         expose(flat, *noise, *signal, float(sensor.top), image.ravel())
         return frozen(image)
+
+
+def upper_half(image: NDArray[Any]) -> NDArray[Any]:
+    """A damaged picture: the rest never came."""
+    torn = image.copy()
+    torn[image.shape[0] // 2 :] = 0
+    return frozen(torn)
+
+
+def rendered_fps(scene: Scene, sensor: Sensor) -> float:
+    """The rate at which rendering leaves most of the machine to the measurement, 1/s."""
+    exposer = Exposer(sensor, (scene.specimen.height, scene.specimen.width), 0)
+    exposer.expose(scene.render(0.0))  # compiles
+    taken = []
+    for t in np.linspace(0, scene.specimen.duration_s, 6):
+        begin = time.perf_counter()
+        exposer.expose(scene.render(float(t)))
+        taken.append(time.perf_counter() - begin)
+    return RENDER_SHARE / float(np.median(taken))

@@ -3,12 +3,14 @@
 It looks at a ``VirtualSpecimen`` through an analytic renderer and a noisy sensor, and behaves like
 a driver: frames come at their own pace from a thread of its own into a finite ring of buffers;
 when nobody takes them they are dropped and the sequence numbers show it; so do frames that the
-renderer cannot finish in time. ``lockstep=yes`` waits for its reader instead, on nominal time.
+renderer cannot finish in time. With ``fps=auto`` such a frame is taken later instead, and all that follow
+with it. ``lockstep=yes`` waits for its reader, on nominal time.
 """
 
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -17,16 +19,15 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquire.addresses import Address, Options
 from acquire.closing import Closing
 from acquire.errors import DeviceError
 from acquire.events import EventSink, device_event
-from acquire.frame import CameraInfo, CameraSetting, Clock, Frame, frozen
+from acquire.frame import CameraInfo, CameraSetting, Clock, Frame
 from hw_mocks.faults import CAMERA_FAULTS, FaultPlan, Planned, parse_faults, plan_frames
 from hw_mocks.optics import Optics, take_optics
-from hw_mocks.scene import Exposer, Scene, Sensor, take_sensor
+from hw_mocks.scene import Exposer, Scene, Sensor, rendered_fps, take_sensor, upper_half
 from hw_mocks.specimen import VirtualSpecimen, take_specimen
 
 log = logging.getLogger(__name__)
@@ -34,8 +35,6 @@ POLL_S = 0.1
 FORMATS = {8: "GREY", 10: "Y10", 12: "Y12", 16: "Y16"}
 AUTO_FPS = (30.0, 25.0, 20.0, 15.0, 10.0, 5.0)
 """What fps=auto chooses from."""
-RENDER_SHARE = 0.4
-"""Of one core that rendering may take then."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +57,8 @@ class SimCameraSettings:
         Nominal time of the start (lock step).
     faults : FaultPlan
     optics : Optics
+    unhurried : bool
+        A frame whose time has passed is taken now, and all that follow later by as much; else it is lost.
     """
 
     sensor: Sensor
@@ -70,6 +71,7 @@ class SimCameraSettings:
     offset_s: float = 0.0
     faults: FaultPlan = field(default_factory=FaultPlan)
     optics: Optics = field(default_factory=Optics)
+    unhurried: bool = False
 
     def scene(self, specimen: VirtualSpecimen) -> Scene:
         """What the camera sees of ``specimen``."""
@@ -145,12 +147,12 @@ class SimCamera(Closing):
         self._sleep = sleep or self._stopped.wait
         self._scene = settings.scene(specimen)
         self._exposer = Exposer(settings.sensor, (specimen.height, specimen.width), settings.seed + 1)
-        self._plan = plan_frames(specimen.duration_s, settings.fps, settings.faults)
+        self._plan = self._planned()
         self._ring = Ring(settings.buffers)
         self._thread: threading.Thread | None = None
         self._error: Exception | None = None
         self._last_index, self._trouble = -1, ""
-        self._entered_s = 0.0
+        self._entered_s = self._delay_s = 0.0
         self.dropped = 0
         self.info = self._describe(address)
         specimen.clock.claimed = True
@@ -268,6 +270,17 @@ class SimCamera(Closing):
         finally:
             self._ring.close()
 
+    def _planned(self) -> Iterator[Planned]:
+        """The frames until the test ends, which its operator may decide; no time of an unhurried camera has passed."""
+        for planned in plan_frames(math.inf, self._settings.fps, self._settings.faults):
+            if self._settings.unhurried:
+                due = self._start() + planned.t + self._delay_s + self._settings.exposure_s / 2
+                self._delay_s += max(0.0, self._clock() - due)
+            t = planned.t + self._delay_s
+            if t > self.specimen.duration_s + 1e-9:
+                return
+            yield replace(planned, t=t)
+
     def _serve(self, planned: Planned) -> None:
         """One frame period; the picture is made before its time and stored when it is due.
 
@@ -297,17 +310,10 @@ class SimCamera(Closing):
 
     def _shoot(self, planned: Planned) -> Frame:
         image, damaged = self._exposer.expose(self._scene.render(planned.t)), planned.fate == "damaged"
-        image = _half(image) if damaged else image
+        image = upper_half(image) if damaged else image
         t = self._start() + planned.t
         raw = t if self.specimen.nominal else t + self._settings.exposure_s / 2
         return Frame(image, planned.index, t, self.info.clock, 0, self.info.bits, raw, damaged)
-
-
-def _half(image: NDArray[Any]) -> NDArray[Any]:
-    """The upper half; the rest never came."""
-    torn = image.copy()
-    torn[image.shape[0] // 2 :] = 0
-    return frozen(torn)
 
 
 def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpecimen) -> SimCamera:
@@ -315,8 +321,8 @@ def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpec
 
     Keys, beside those of the specimen (width, height, seconds, hold, end, max_strain, E_GPa, nu,
     yield_MPa, section_mm2, px_per_mm, n, r, neck, axis, hole, cell, overstrain, drift_x,
-    drift_y, rotation_deg, lockstep, machine): fps (a number, or auto: what this machine renders with ease), bits, noise
-    (% of full scale at mid-grey), fpn (%), brightness, exposure_us, radius (px), contrast (%), seed,
+    drift_y, rotation_deg, lockstep, machine, waits): fps (a number, or auto: what this machine renders with ease),
+    bits, noise (% of full scale at mid-grey), fpn (%), brightness, exposure_us, radius (px), contrast (%), seed,
     buffers, offset (s), faults. Of the view (``hw_mocks.optics``): stand_off_mm (none: telecentric), distortion
     (% at the corner), tilt_x_deg, tilt_y_deg, settle_mm, settle_x_deg, settle_y_deg (reached at the largest load),
     plates (x,y,width,height;...), plate_strain, readout_ms, flicker (%), lamp_hz, side, bending (%, of the front).
@@ -331,22 +337,17 @@ def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpec
     settings = _take_camera(options)
     options.done()
     if _automatic(options) and not specimen.nominal:
-        settings = replace(settings, fps=affordable_fps(specimen, settings))
+        most = rendered_fps(settings.scene(specimen), settings.sensor)
+        fps = next((fps for fps in AUTO_FPS if fps <= most), AUTO_FPS[-1])
+        settings = replace(settings, fps=fps, unhurried=True)
     return SimCamera(specimen, settings, address.text, on_event)
 
 
-def affordable_fps(specimen: VirtualSpecimen, settings: SimCameraSettings) -> float:
-    """The highest rate of ``AUTO_FPS`` at which rendering leaves most of the machine to the measurement."""
-    scene = settings.scene(specimen)
-    exposer = Exposer(settings.sensor, (specimen.height, specimen.width), 0)
-    exposer.expose(scene.render(0.0))  # compiles
-    taken = []
-    for t in np.linspace(0, specimen.duration_s, 6):
-        begin = time.perf_counter()
-        exposer.expose(scene.render(float(t)))
-        taken.append(time.perf_counter() - begin)
-    most = RENDER_SHARE / float(np.median(taken))
-    return next((fps for fps in AUTO_FPS if fps <= most), AUTO_FPS[-1])
+def fps_on_this_machine(address: Address) -> float:
+    """The rate at which this machine renders the pictures of an address with ease, 1/s."""
+    options = Options(address)
+    specimen, settings = take_specimen(options), _take_camera(options)
+    return rendered_fps(settings.scene(specimen), settings.sensor)
 
 
 def _automatic(options: Options) -> bool:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from acquire.addresses import Address, Options
 from acquire.errors import ConfigError
 from hw_mocks.deformation import Gradient, SpecimenDeformation
-from hw_mocks.machine import FlowCurve, Machine, PowerLaw, Programme, TestClock
+from hw_mocks.machine import FlowCurve, Machine, PowerLaw, Programme, Pull, TestClock
 from hw_mocks.strain_modes import NECK_AT, Axis, Kind, StrainModes
 
 Array = NDArray[np.float64]
@@ -47,6 +47,7 @@ SPECIMEN_KEYS = frozenset(
         "rotation_deg",
         "lockstep",
         "machine",
+        "waits",
     }
 )
 
@@ -124,8 +125,7 @@ class VirtualSpecimen:
         p, wanted = self.programme, self.material.yield_strain
         if wanted > p.max_strain:
             return math.inf
-        strains = (0.0, p.knee_strain, p.max_strain)
-        return float(np.interp(wanted, strains, (p.hold_s, p.knee_s, p.hold_s + p.ramp_s)))
+        return float(np.interp(wanted, (0.0, p.knee_strain, p.max_strain), p.knots_s))
 
     @property
     def modes(self) -> StrainModes:
@@ -277,9 +277,9 @@ def _take_programme(options: Options, material: FlowCurve | PowerLaw, clock: Tes
         )
     plastic = top > material.yield_strain
     knee_strain, knee = (material.yield_strain, 0.6) if plastic else (top / 2, 0.5)
-    return Programme(
-        hold, seconds - hold - end, end, knee_strain, top, knee, _machine(options, material, clock)
-    )
+    pull = Pull() if options.flag("waits") else None
+    machine = _machine(options, material, clock)
+    return Programme(hold, seconds - hold - end, end, knee_strain, top, knee, machine, pull)
 
 
 def _machine(options: Options, material: FlowCurve | PowerLaw, clock: TestClock) -> Machine | None:

@@ -9,8 +9,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from acquire.compiled_loops import njit
 
 GOLDEN = 0x9E3779B97F4A7C15  # step of SplitMix64
 

@@ -25,6 +25,8 @@ _WRONG_PATH = {errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     _replace_closed_streams()
+    with contextlib.suppress(AttributeError):  # not where a test or a program has put its own stream
+        sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     limit_resources()
     try:
         with ended_by_sigterm():

@@ -9,8 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numpy.typing import NDArray
+
+from acquire.compiled_loops import njit
 
 GROUP = 8  # frames folded in one pass; a burst of at most so many never stores its sum
 BLOCK = 4096  # pixels that stay in the first-level cache while the frames go by

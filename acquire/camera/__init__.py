@@ -13,6 +13,7 @@ from acquire.camera.opening import (
 )
 from acquire.camera.timing import (
     FrameCounter,
+    FramePace,
     StallWatch,
     exposure_and_gain,
     longest_pause_s,
@@ -29,6 +30,7 @@ __all__ = [
     "CroppedCamera",
     "FailureGuard",
     "FrameCounter",
+    "FramePace",
     "RepeatGuard",
     "StallWatch",
     "exposure_and_gain",

@@ -1,11 +1,14 @@
 """Numbers, times and pauses of a camera's frames; drivers share them. Nothing here touches a device or reads a clock.
 
-``FrameCounter`` makes the numbers of a test from a driver's sequence numbers: never back, gaps counted. ``StallWatch``
-reports a pause that is too long, and its end.
+``FrameCounter`` makes the numbers of a test from a driver's sequence numbers: never back, gaps counted. ``FramePace``
+knows at which rate frames do come, and finds gaps without numbers. ``StallWatch`` reports a pause that is too long, and
+its end.
 """
 
 from __future__ import annotations
 
+import statistics
+from collections import deque
 from collections.abc import Callable
 from typing import Literal
 
@@ -76,6 +79,48 @@ def exposure_and_gain(
     return tuple(settings)
 
 
+class FramePace:
+    """The rate at which a camera gives its frames, whatever its driver says: the median of the last intervals."""
+
+    KNOWN, KEPT = 5, 20  # intervals: from which the rate is known, and of which it is the median
+    GAP, ALIKE = (
+        1.5,
+        0.25,
+    )  # a gap is longer than so many intervals, and differs by so much from the one before
+
+    def __init__(self) -> None:
+        self._intervals: deque[float] = deque(maxlen=self.KEPT)
+        self._told = False
+
+    @property
+    def fps(self) -> float | None:
+        """Frames a second that come; None until it is known."""
+        return 1 / statistics.median(self._intervals) if len(self._intervals) >= self.KNOWN else None
+
+    def missing(self, interval: float) -> int:
+        """Take the interval between two frames, s, and give how many are missing in it.
+
+        None are before the rate is known, and none where the camera goes on at another rate (automatic exposure).
+        """
+        before, fps = self._intervals[-1] if self._intervals else interval, self.fps
+        if interval > 0:
+            self._intervals.append(interval)
+        if fps is None or interval * fps < self.GAP or abs(interval - before) < self.ALIKE * interval:
+            return 0
+        return missing_between(0.0, interval, fps)
+
+    def remark(self, said: float | None) -> str:
+        """A sentence, once, where the camera keeps another rate than its driver says, 1/s; else ""."""
+        fps = self.fps
+        if self._told or not said or not fps or len(self._intervals) < self.KEPT:
+            return ""
+        self._told = abs(fps - said) > 0.1 * said
+        why = "little light? a shorter exposure keeps the rate"
+        return (
+            f"{fps:.3g} frames a second come, not the {said:.3g} of the driver ({why})" if self._told else ""
+        )
+
+
 class FrameCounter:
     """Numbers frames over the whole run, also when the driver starts again at zero.
 
@@ -92,6 +137,7 @@ class FrameCounter:
         Its stamp.
     counts_itself : bool
         False once the driver's numbers have been found not to count.
+    pace : FramePace
     """
 
     def __init__(self, cycle: int = 2**32) -> None:
@@ -99,6 +145,7 @@ class FrameCounter:
         self.index = -1
         self.t = float("-inf")
         self.counts_itself = True
+        self.pace = FramePace()
         self._sequence: int | None = None
 
     def restart(self) -> None:
@@ -115,7 +162,8 @@ class FrameCounter:
         t : float, s
             Its stamp.
         fps : float or None, 1/s
-            For frames lost while the device was away, found from the time that passed.
+            For frames lost while the device was away, found from the time that passed, where the rate that comes
+            is not known yet.
         """
         lost = self._lost(sequence, t, fps)
         if self.index < 0 and self._sequence is None:
@@ -129,12 +177,15 @@ class FrameCounter:
         if self.index < 0:
             return 0
         if self._sequence is None:
-            return missing_between(self.t, t, fps)
+            return missing_between(self.t, t, fps and (self.pace.fps or fps))
         step = (sequence - self._sequence) % self._cycle
         if 0 < step < self._cycle // 2:
+            self.pace.missing((t - self.t) / step)
             return step - 1
         self.counts_itself = False
-        return missing_between(self.t, t, fps)
+        known = step == 0 or self.pace.fps  # a number that stands still has never told anything
+        missing = self.pace.missing(t - self.t)
+        return missing if known else missing_between(self.t, t, fps)
 
 
 class StallWatch:

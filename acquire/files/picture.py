@@ -17,7 +17,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import LOG_WARNING, load_cv2, log_settings
 from acquire.errors import DataError
+from acquire.files.tiff import UNREADABLE, tiff_pages
 
 MAX_BYTES = 2**31 - 1
 _KINDS = {
@@ -179,6 +180,18 @@ def _take_reports(capture: IO[bytes]) -> list[str]:
     return [line for line in lines if _DECODERS.search(line)]
 
 
+_EXPORT = "cannot be read; save it as 16-bit TIFF pictures with the program of the camera"
+FOREIGN = {
+    **dict.fromkeys((".mraw", ".cih", ".cihx"), f"a film of a Photron camera {_EXPORT}"),
+    ".cine": f"a film of a Phantom camera {_EXPORT}",
+    ".seq": f"a film of StreamPix {_EXPORT}",
+    **dict.fromkeys(
+        (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2"),
+        "a raw picture cannot be read; develop it as 16-bit TIFF, without sharpening and without noise reduction",
+    ),
+    ".heic": "this picture cannot be read; save it as PNG or TIFF",
+}
+"""Endings of files that are not read, and what to do with them."""
 log = logging.getLogger(__name__)
 LOSSY = (".jpg", ".jpeg")
 
@@ -225,12 +238,21 @@ def read_picture_page(path: Path, source: Source, page: int = 0) -> NDArray[Any]
     decoded = decode(source, page) if _complete(path, source) else None
     if decoded is None or decoded.picture is None:
         log.debug("%s: %s", path, decoded.damage if decoded else "ends too early")
-        raise DataError(f"{path}: not an image, or cut off; copy it again or take it out of the list")
+        raise DataError(f"{path}: {_why_not(path, page)}")
     if decoded.damage:
         raise DataError(
             f"{path}: a damaged image ({decoded.damage}); copy it again or take it out of the list"
         )
     return decoded.picture
+
+
+def _why_not(path: Path, page: int) -> str:
+    with suppress(DataError, IndexError):
+        if packed := UNREADABLE.get(tiff_pages(path)[page].compression):
+            return (
+                f"compressed with {packed}, which cannot be read; save it with LZW, Deflate or no compression"
+            )
+    return "not an image, or cut off; copy it again or take it out of the list"
 
 
 def _complete(path: Path, source: Source) -> bool:

@@ -40,6 +40,7 @@ log = logging.getLogger(__name__)
 
 SLICE_S = 0.1  # longest wait between two looks at whether to stop
 CLOSE_S = 0.8  # of a camera that may have died a moment ago; a thread goes on with it
+QUARTZ = 3e-4  # what the rate of a camera's clock may be wrong by
 GIGE_NUMBERS, ALL_NUMBERS = 65535, 2**64  # GigE counts from 1 to 65535 and begins again
 
 
@@ -73,7 +74,7 @@ class GenicamCamera(CameraBase):
         self._address, self._settings, self._on_event = address, settings, on_event
         self._library = library or load_aravis()
         self._name = name_of(self._library, target, address)
-        self._clock = DeviceClock()
+        self._clock = DeviceClock(QUARTZ)
         self._stall = StallWatch(self._report)
         self._t = -math.inf
         self._damaged, self._unstamped, self._refused = RateLimiter(), False, ""
@@ -272,7 +273,7 @@ class GenicamCamera(CameraBase):
                 return
             self._device, self._setup = device, setup
             self._counter.restart()
-            self._clock = DeviceClock()
+            self._clock = DeviceClock(QUARTZ)
             self._begin(device)
         if not self._stall.stalled:
             self._report("opened again; the frames in between are counted as lost", "info")

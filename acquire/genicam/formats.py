@@ -118,7 +118,7 @@ def _unpacked_rows(
     length = pixel_format.size(pixels)
     count = (samples.size - length) // pitch + 1
     rows = as_strided(samples, (count, length), (pitch, 1))
-    if pixel_format.size(2 * pixels) == 2 * length:  # no row ends within a byte
+    if pixel_format.size(8 * pixels) == 8 * length:  # no row ends within a byte
         return _unpacked(rows.reshape(-1), pixel_format, count * pixels)
     return np.stack([_unpacked(row, pixel_format, pixels) for row in rows])
 

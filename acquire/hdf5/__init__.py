@@ -9,6 +9,7 @@ from acquire.hdf5.damage import (
     abandon_file,
     check_size,
     create_file,
+    open_file,
     probe,
     read_superblock,
     reason,
@@ -36,6 +37,7 @@ from acquire.hdf5.tables import (
     new_group,
     new_json,
     set_attributes,
+    storable,
     to_json,
 )
 
@@ -65,6 +67,7 @@ __all__ = [
     "new_json",
     "open_dataset",
     "open_datasets",
+    "open_file",
     "open_group",
     "probe",
     "read_attribute",
@@ -73,6 +76,7 @@ __all__ = [
     "read_superblock",
     "reason",
     "set_attributes",
+    "storable",
     "stored_rows",
     "to_json",
 ]

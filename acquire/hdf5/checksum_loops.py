@@ -8,8 +8,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from acquire.compiled_loops import njit
 
 LANES = 256  # words that are summed side by side, so that they fill vectors
 ROWS = 360  # sums of the sums of so many words still fit into 32 bits

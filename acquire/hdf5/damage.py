@@ -12,11 +12,11 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import logging
 import os
 import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,12 +25,13 @@ from typing import Any
 import h5py
 
 from acquire.errors import DataError
+from acquire.system import python_command, python_environment
 
 PROBE_S = 30.0  # HDF5 retries a bad checksum of an unfinished file for ever
 
 
 def probe(path: Path, package: str, timeout_s: float | None = None, *, words: Sequence[str] = ()) -> None:
-    """Read ``path`` by ``python -m package path``, with more ``words``, first.
+    """Read ``path`` by ``python -P -m package path``, with more ``words``, first.
 
     Parameters
     ----------
@@ -42,11 +43,11 @@ def probe(path: Path, package: str, timeout_s: float | None = None, *, words: Se
     DataError
         The child crashed, did not end in time, or refused the file itself.
     """
-    command = [sys.executable, "-m", package, str(path), *words]
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, timeout=timeout_s or PROBE_S, check=False
-        )
+            python_command(package, str(path), *words), env=python_environment(), capture_output=True, text=True,
+            errors="backslashreplace", timeout=timeout_s or PROBE_S, check=False,
+        )  # fmt: skip
     except subprocess.TimeoutExpired as error:
         raise DataError(f"{path} is damaged: reading it does not come to an end") from error
     if done.returncode != 0:
@@ -63,6 +64,29 @@ def reason(error: Exception) -> str:
 
 
 log = logging.getLogger(__name__)
+_HELD = (errno.EAGAIN, errno.EACCES)
+
+
+def open_file(path: Path, mode: str = "r", **options: Any) -> h5py.File:
+    """Open an HDF5 file, without a lock where its file system has none; ``options`` as of ``h5py.File``.
+
+    Raises
+    ------
+    DataError
+        Another program has locked it.
+    OSError or RuntimeError
+        It cannot be opened.
+    """
+    try:
+        return h5py.File(path, mode, **options)
+    except OSError as error:
+        if "unable to lock file" not in str(error):
+            raise
+        if error.errno not in _HELD:
+            return h5py.File(path, mode, locking=False, **options)
+        raise DataError(
+            f"{path} is locked: another program has it open or writes to it; close it there, or wait, and call again"
+        ) from error
 
 
 def abandon_file(file: h5py.File) -> None:
@@ -108,7 +132,7 @@ def create_file(path: Path, declare: Callable[[h5py.File], object]) -> h5py.File
     except OSError:
         path.unlink(missing_ok=True)
         raise
-    file = h5py.File(path, "r+", libver=_BOUNDS, rdcc_nbytes=CACHE_BYTES)
+    file = open_file(path, "r+", libver=_BOUNDS, rdcc_nbytes=CACHE_BYTES)
     cache = file.id.get_mdc_config()
     cache.set_initial_size = True
     cache.initial_size = cache.min_size = cache.max_size = METADATA_BYTES

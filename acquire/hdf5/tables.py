@@ -100,12 +100,17 @@ def set_attributes(item: Any, **attributes: Any) -> None:
     """Set attributes, texts in fixed length.
 
     Texts of variable length would stand in HDF5's global heap, the one structure of this file
-    without a checksum: the library loops for ever on a damaged one.
+    without a checksum: the library loops for ever on a damaged one. Bytes of a name that is not UTF-8 are escaped.
     """
     for name, value in attributes.items():
         if isinstance(value, list):
-            value = np.array([text.encode() for text in value], "S")
-        item.attrs[name] = np.bytes_(value.encode()) if isinstance(value, str) else value
+            value = np.array([storable(text).encode() for text in value], "S")
+        item.attrs[name] = np.bytes_(storable(value).encode()) if isinstance(value, str) else value
+
+
+def storable(text: str) -> str:
+    """The text, with bytes of a name that is not UTF-8 escaped."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def as_text(value: Any) -> str:

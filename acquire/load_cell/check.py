@@ -263,6 +263,12 @@ def _remarks(found: LoadReport, samples: Sequence[LoadSample], digit_N: float) -
     beyond = sum(bool(sample.flags & (LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD)) for sample in samples)
     if bad:
         remarks.append(f"{bad} of {found.samples} lines gave no value: noise on the line, or another grammar")
+    old = sum(LoadFlag.STALE in sample.flags and not math.isnan(sample.force) for sample in samples)
+    if 2 * old > found.good:
+        remarks.append(
+            f"{old} of {found.good} values are of unknown age (STALE): the device should send each line at once, "
+            "or its own time with it (millis=)"
+        )
     if beyond:
         remarks.append(f"{beyond} samples in overload or saturated: unload the cell, or check its wiring")
     if found.rate < SLOW_HZ or math.isnan(found.rate):

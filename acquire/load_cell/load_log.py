@@ -21,6 +21,8 @@ from numpy.typing import NDArray
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadFlag, LoadSample
 
+_BEYOND = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD
+
 
 class LoadLog:
     """All samples so far; every method may be called from any thread.
@@ -31,14 +33,17 @@ class LoadLog:
         Between samples further apart than this the force is not known.
     lag_s : float, s
         By which samples are stamped later than the load they show; taken off by ``force_at``.
+    by_name : bool
+        Each force was given for a frame: there are no times that could lag.
     """
 
-    def __init__(self, max_gap_s: float = 0.25, lag_s: float = 0.0) -> None:
-        self._max_gap_s, self.lag_s = max_gap_s, lag_s
+    def __init__(self, max_gap_s: float = 0.25, lag_s: float = 0.0, *, by_name: bool = False) -> None:
+        self._max_gap_s, self.lag_s, self.by_name = max_gap_s, lag_s, by_name
         self._t = array("d")
         self._force = array("d")
         self._zeros: list[tuple[float, float]] = []
         self._latest: LoadSample | None = None
+        self._telling: LoadSample | None = None
         self._count = 0
         self._closed = False
         self._lock = threading.Lock()
@@ -49,11 +54,22 @@ class LoadLog:
             self._latest = sample
             self._count += 1
             none, stale = math.isnan(sample.force), LoadFlag.STALE in sample.flags
+            if sample.flags & _BEYOND or not (none or stale):
+                self._telling = sample
             if (stale and not none) or (none and LoadFlag.ERROR in sample.flags):
                 return
             if stale and self._t:
                 self._add(self._t[-1], math.nan)
             self._add(sample.t, sample.force)
+
+    def extend(self, times: NDArray[np.float64], forces: NDArray[np.float64]) -> None:
+        """Add many samples at once, (N,) s and N; their times rise, and follow those before."""
+        with self._lock:
+            self._t.frombytes(np.ascontiguousarray(times, np.float64).tobytes())
+            self._force.frombytes(np.ascontiguousarray(forces, np.float64).tobytes())
+            self._count += len(times)
+            if len(times):
+                self._latest = LoadSample(float(times[-1]), float(forces[-1]))
 
     def _add(self, t: float, force: float) -> None:
         self._t.append(max(t, self._t[-1]) if self._t else t)
@@ -118,6 +134,22 @@ class LoadLog:
                 return math.nan
             return self._between(after - 1, after, t)
 
+    def why_none_at(self, t: float) -> str:
+        """Why ``force_at`` knows no force at ``t``, and what can be done."""
+        with self._lock:
+            after = bisect_left(self._t, t + self.lag_s)
+            if after in (0, len(self._t)):
+                return (
+                    "no reading of the load cell came before it" if not after else "no reading came after it"
+                )
+            gap = self._t[after] - self._t[after - 1]
+        if gap <= self._max_gap_s:
+            return "the readings beside it have no value (overload, tare, lines lost)"
+        return (
+            f"the readings of the load cell whose time is known are {gap:.2g} s apart, load.max_gap_s is"
+            f" {self._max_gap_s:g} s; let it send more often, one line at a time, or set load.max_gap_s"
+        )
+
     def _between(self, before: int, after: int, t: float) -> float:
         gap = self._t[after] - self._t[before]
         if gap > self._max_gap_s:
@@ -138,6 +170,11 @@ class LoadLog:
     def latest(self) -> LoadSample | None:
         """The newest sample, valid or not."""
         return self._latest
+
+    @property
+    def telling(self) -> LoadSample | None:
+        """The newest sample that tells the force at a known time, or that it is beyond the range of the cell."""
+        return self._telling
 
     def __len__(self) -> int:
         """Samples appended, lines without a reading included."""

@@ -1,7 +1,6 @@
-"""What belongs to image files beside their pixels: their times from a CSV, and the number of pages of a TIFF.
+"""When pictures in files were taken: times from a CSV, from Exif, or of the files.
 
-A CSV has one time a line, or a file name and its time. Pages are counted from the directories of the file
-(TIFF 6.0, section 2; BigTIFF); no pixel is read.
+A CSV has one time a line, or a file name and its time.
 """
 
 from __future__ import annotations
@@ -9,10 +8,9 @@ from __future__ import annotations
 import csv
 import itertools
 import math
-import struct
+import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import BinaryIO
 
 from acquire.errors import DataError
 from acquire.files.picture import read_bytes
@@ -84,54 +82,21 @@ def _check(path: Path, times: list[float], images: Sequence[Path]) -> None:
             raise DataError(f"{path}: the times run backwards ({later:g} s after {earlier:g} s)")
 
 
-def count_pages(path: Path) -> int:
-    """Number of pictures in the file; 1 for anything that is not a TIFF.
+_TAKEN = re.compile(rb"\d{4}:\d\d:\d\d \d\d:\d\d:\d\d(?=\0)")
+_HEAD = 1 << 16
 
-    Raises
-    ------
-    DataError
-        The file cannot be opened, or its directories are broken.
+
+def taken_times(paths: Sequence[Path]) -> list[float]:
+    """When the pictures were taken: of Exif where each has another time, else the times of the files.
+
+    Exif has whole seconds, the earliest of a picture counts (Exif 2.32, 4.6.5): as a number of 14 digits.
     """
-    if path.suffix.lower() not in (".tif", ".tiff"):
-        return 1
-    try:
-        with path.open("rb") as file:
-            return _count(file, path)
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
-    except struct.error as error:
-        raise DataError(
-            f"{path}: a TIFF that is cut off; copy it again or take it out of the list"
-        ) from error
+    taken = [min(_TAKEN.findall(_head(path)), default=b"") for path in paths]
+    if all(taken) and len(set(taken)) == len(taken):
+        return [float(re.sub(rb"\D", b"", text)) for text in taken]
+    return [float(path.stat().st_mtime_ns) for path in paths]
 
 
-def _count(file: BinaryIO, path: Path) -> int:
-    head = file.read(16)
-    order = {b"II": "<", b"MM": ">"}.get(head[:2])
-    if order is None or len(head) < 8:
-        return 1  # whatever it is, the decoder decides
-    big = struct.unpack_from(order + "H", head, 2)[0] == 43
-    offset = (
-        struct.unpack_from(order + "Q", head, 8)[0] if big else struct.unpack_from(order + "I", head, 4)[0]
-    )
-    seen: set[int] = set()
-    while offset:
-        if offset in seen:
-            raise DataError(f"{path}: the directories of this TIFF run in a circle; save it anew")
-        seen.add(offset)
-        offset = _next(file, order, offset, big)
-    return max(len(seen), 1)
-
-
-def _next(file: BinaryIO, order: str, offset: int, big: bool) -> int:
-    count_format, entry_size, offset_format = ("Q", 20, "Q") if big else ("H", 12, "I")
-    count = _unpack(file, order + count_format, offset)
-    return _unpack(file, order + offset_format, offset + struct.calcsize(count_format) + count * entry_size)
-
-
-def _unpack(file: BinaryIO, layout: str, offset: int) -> int:
-    if offset > 2**62:
-        raise struct.error("an offset beyond any file")
-    file.seek(offset)
-    value: int = struct.unpack(layout, file.read(struct.calcsize(layout)))[0]
-    return value
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(_HEAD)

@@ -1,16 +1,19 @@
 """A folder, a glob or a single image as a camera: ``files:shots/*.tif?fps=5&gray=luma&bits=12``.
 
-Pictures are read when they are asked for, in natural order (2 before 10), pages of a multi-page
-TIFF one after the other. Nobody stamped them: ``clock`` is "nominal", or times come from a CSV. A picture
-that cannot be read, or is not like the first, is a damaged frame and an event; the others come all the same.
-``white=4080`` is the grey level of saturation, where that is not the highest of the bits.
+Pictures are read when they are asked for, in the order of ``acquire.files.order`` (``order=time``, ``first=NAME`` where
+names do not say it), pages of a multi-page TIFF one after the other. Nobody stamped them: ``clock`` is "nominal", or
+times come from a CSV. A picture that cannot be read, is a mask by its name or not like most, is a damaged frame and an
+event; the others come all the same. ``white=4080`` is the grey level of saturation, where that is not the highest of
+the bits.
 """
 
 from __future__ import annotations
 
 import glob
-import re
+import os
+from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -23,43 +26,73 @@ from acquire.addresses import Address, Options, expanded
 from acquire.camera import CameraBase
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import EventSink, device_event, ignore_event
-from acquire.files.picture import LOSSY, Source, check_regular, picture_source, read_picture_page
+from acquire.files.order import AUTO, BY, in_order, masks
+from acquire.files.picture import FOREIGN, LOSSY, Source, check_regular, picture_source, read_picture_page
+from acquire.files.tiff import full_pages, tiff_pages
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, to_gray
-from acquire.opencv.image_metadata import count_pages, read_stamps
+from acquire.opencv.image_metadata import read_stamps, taken_times
 
 SUFFIXES = (".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm")
 MAX_REPORTED = 20  # pictures that are left out, one by one
-_DIGITS = re.compile(r"(\d+)")
+_SYSTEM = ("thumbs.db", "ehthumbs.db", "desktop.ini")
+_SAMPLE = 3  # pictures whose format is compared
 
 
-def natural_key(path: Path) -> list[tuple[int, str]]:
-    """Sort key under which shot_2 comes before shot_10."""
-    parts = _DIGITS.split(str(path))
-    return [(int(part), "") if part.isdecimal() else (0, part.lower()) for part in parts]
+def find_images(target: str, by: str = AUTO, first: str | None = None) -> list[Path]:
+    """The images a folder, glob or file name stands for, in the order of the test; masks come last.
 
-
-def find_images(target: str) -> list[Path]:
-    """The images a folder, glob or file name stands for, in natural order.
+    Parameters
+    ----------
+    target : str
+    by, first
+        As for ``acquire.files.order.in_order``.
 
     Raises
     ------
     DataError
         There is none, or one is no regular file.
+    ConfigError
+        The order is not clear.
     """
-    path = expanded(target)
-    if path.is_dir():
-        found = [item for item in path.iterdir() if item.suffix.lower() in SUFFIXES]
-    elif path.exists():
-        found = [path]
-    else:
-        names = glob.glob(str(path), recursive=True)  # noqa: PTH207 (absolute patterns too)
-        found = [Path(name) for name in names if not Path(name).is_dir()]
-    if not found:
-        raise DataError(f"files:{target}: no image there; looked in {Path.cwd()} for {', '.join(SUFFIXES)}")
+    found = listed(target)
     for item in found:
         check_regular(item)
-    return sorted(found, key=natural_key)
+    ends = masks([path.name for path in found])
+    used, last = ([path for path in found if (path.name in ends) is end] for end in (False, True))
+    common = os.path.commonpath([path.parent for path in used])
+    names = [os.path.relpath(path, common) for path in used]
+    chosen = next((name for name, path in zip(names, used, strict=True) if first in (name, path.name)), None)
+    order = in_order(names, lambda: taken_times(used), by, chosen if first else None)
+    return [used[k] for k in order] + sorted(last)
+
+
+def listed(target: str) -> list[Path]:
+    """The images of ``find_images`` in no order; raises DataError where there is none."""
+    path = expanded(target)
+    if path.is_dir():
+        there = [item for item in path.iterdir() if _is_seen(item)]
+        found = [item for item in there if item.suffix.lower() in SUFFIXES]
+    elif path.exists():
+        there = found = [path]
+    else:
+        names = glob.glob(str(path), recursive=True)  # noqa: PTH207 (absolute patterns too)
+        there = found = [item for item in map(Path, names) if not item.is_dir() and _is_seen(item)]
+    for item in found or there:
+        if what := FOREIGN.get(item.suffix.lower()):
+            raise DataError(f"{item}: {what}")
+    if found:
+        return found
+    if not path.is_dir():
+        raise DataError(f"files:{target}: no image there; looked in {path.parent.absolute()}")
+    others = ", ".join(sorted(item.name for item in there)[:3])
+    only = f"only {others}{' ...' * (len(there) > 3)}" if there else "it is empty"
+    raise DataError(f"{path}: no picture in this folder ({only}); wanted: {', '.join(SUFFIXES)}")
+
+
+def _is_seen(path: Path) -> bool:
+    """Whether it is no file of a file manager or hidden."""
+    return not path.name.startswith(".") and path.name.lower() not in _SYSTEM
 
 
 def read_image(path: str | Path, gray: str | None = None, page: int = 0) -> NDArray[Any]:
@@ -98,6 +131,9 @@ class FileSettings:
         Where a sample is saturated; None: at the highest of its bits.
     stamps : str or None
         CSV with the time of each picture.
+    order : "auto" | "name" | "time"
+    first : str or None
+        Of ``find_images``.
     """
 
     fps: float = 1.0
@@ -105,6 +141,8 @@ class FileSettings:
     bits: int | None = None
     white: int | None = None
     stamps: str | None = None
+    order: str = AUTO
+    first: str | None = None
 
 
 class ImageFiles(CameraBase):
@@ -125,10 +163,12 @@ class ImageFiles(CameraBase):
         super().__init__()
         self._paths, self._settings, self._on_event = paths, settings, on_event
         self._left_out = 0
-        self._stamps = read_stamps(Path(settings.stamps), paths) if settings.stamps else None
-        first = read_image(paths[0], settings.gray)
+        self._stamps = _stamps(settings, paths)
+        self._masks = masks([path.name for path in paths])
+        self._usual = _usual([path for path in paths if path.name not in self._masks])
+        first = read_image(self._usual, settings.gray, _pages_of(self._usual)[0])
         self._bits = settings.bits or 8 * first.itemsize
-        self._check_range(first, paths[0])
+        self._check_range(first, self._usual)
         self._shape, self._dtype = first.shape, first.dtype
         self.info = CameraInfo(
             address=address,
@@ -157,8 +197,13 @@ class ImageFiles(CameraBase):
     def _pages(self) -> Iterator[tuple[Path, Callable[[], NDArray[Any]]]]:
         for path in self._paths:
             source = cache(partial(picture_source, path))
-            for page in range(_count(path)):
-                yield path, partial(_read_page, path, source, page)
+            for page in _pages_of(path):
+                yield path, partial(self._read, path, source, page)
+
+    def _read(self, path: Path, source: Callable[[], Source], page: int) -> NDArray[Any]:
+        if path.name in self._masks:
+            raise DataError(f"{path} is a mask by its name (--mask {path} uses it)")
+        return read_picture_page(path, source(), page)
 
     def _frame(self, index: int, path: Path, read: Callable[[], NDArray[Any]]) -> Frame:
         t = self._time(index)
@@ -188,12 +233,12 @@ class ImageFiles(CameraBase):
         return self._stamps[index]
 
     def _checked(self, picture: NDArray[Any], path: Path) -> NDArray[Any]:
-        image = to_gray(picture, self._settings.gray, str(path))
-        if image.shape != self._shape or image.dtype != self._dtype:
+        if picture.shape[:2] != self._shape or picture.dtype != self._dtype:
             raise DataError(
-                f"{path} is {_size(image.shape)} {image.dtype}, but {self._paths[0]} is "
+                f"{path} is {_size(picture.shape)} {picture.dtype}, but {self._usual} is "
                 f"{_size(self._shape)} {self._dtype}; all images of one test must be alike"
             )
+        image = to_gray(picture, self._settings.gray, str(path))
         self._check_range(image, path)
         return frozen(image)
 
@@ -206,6 +251,11 @@ class ImageFiles(CameraBase):
             )
 
     def _warnings(self, first: NDArray[Any]) -> Iterator[str]:
+        pages, taken = tiff_pages(self._usual), _pages_of(self._usual)
+        if len(taken) < len(pages):
+            yield (
+                f"{self._usual.name}: {len(taken)} of {len(pages)} pages are taken, the others are smaller (thumbnails)"
+            )
         if any(path.suffix.lower() in LOSSY for path in self._paths):
             yield "JPEG is lossy: its artefacts (0.6 to 1.7 GL) do not average out; TIFF or PNG measure better"
         for bits in (10, 12, 14):
@@ -217,16 +267,32 @@ class ImageFiles(CameraBase):
                 return
 
 
-def _count(path: Path) -> int:
-    """Pages; one where the file is broken: reading it raises."""
+def _usual(paths: list[Path]) -> Path:
+    """The first picture of the size and depth that most of some have; raises where the first cannot be read."""
+    formats = {paths[0]: _format(paths[0])}
+    for path in paths[:: -(-len(paths) // _SAMPLE)]:
+        with suppress(PhasedicError):
+            formats[path] = _format(path)
+    usual = Counter(formats.values()).most_common(1)[0][0]
+    at = next(k for k, path in enumerate(paths) if formats.get(path) == usual)
+    for path in paths[: at if usual != formats[paths[0]] else 0]:
+        with suppress(PhasedicError):
+            if _format(path) == usual:
+                return path
+    return paths[at]
+
+
+def _format(path: Path) -> tuple[tuple[int, ...], Any]:
+    picture = read_picture_page(path, picture_source(path), _pages_of(path)[0])
+    return picture.shape[:2], picture.dtype
+
+
+def _pages_of(path: Path) -> list[int]:
+    """Pages of the size of its largest; one where the file is broken: reading it raises."""
     try:
-        return count_pages(path)
+        return full_pages(path)
     except PhasedicError:
-        return 1
-
-
-def _read_page(path: Path, source: Callable[[], Source], page: int) -> NDArray[Any]:
-    return read_picture_page(path, source(), page)
+        return [0]
 
 
 def _size(shape: tuple[int, ...]) -> str:
@@ -235,7 +301,7 @@ def _size(shape: tuple[int, ...]) -> str:
 
 def picture_names(address: Address) -> list[tuple[str, int]]:
     """File and page of each picture of ``files:...``, in their order; raises as ``find_images``."""
-    return [(path.name, page) for path in find_images(address.target) for page in range(_count(path))]
+    return [(path.name, page) for path in _found(address) for page in _pages_of(path)]
 
 
 def picture_times(address: Address) -> dict[str, float]:
@@ -248,10 +314,10 @@ def picture_times(address: Address) -> dict[str, float]:
     DataError
         No picture, or stamps that do not fit.
     """
-    paths, settings = find_images(address.target), _settings(address)
-    stamps = read_stamps(Path(settings.stamps), paths) if settings.stamps else None
+    paths, settings = _found(address), _settings(address)
+    stamps = _stamps(settings, paths)
     times = {path.name: stamps[k] if stamps else k / settings.fps for k, path in enumerate(paths)}
-    if len(times) < len(paths) or any(_count(path) > 1 for path in paths):
+    if len(times) < len(paths) or any(len(_pages_of(path)) > 1 for path in paths):
         raise ConfigError(
             f"{address.text}: two pictures share a name, or one has several pages; give times in place of names"
         )
@@ -259,14 +325,28 @@ def picture_times(address: Address) -> dict[str, float]:
 
 
 def open_files(address: Address, on_event: EventSink) -> ImageFiles:
-    """Open ``files:folder|glob|name?fps=&gray=&bits=&white=&stamps=``.
+    """Open ``files:folder|glob|name?fps=&gray=&bits=&white=&stamps=&order=&first=``.
 
     Raises
     ------
     ConfigError, DataError
         See ``acquire.camera.open_camera``.
     """
-    return ImageFiles(address.text, find_images(address.target), _settings(address), on_event)
+    return ImageFiles(address.text, _found(address), _settings(address), on_event)
+
+
+def _stamps(settings: FileSettings, paths: list[Path]) -> list[float] | None:
+    """The times of a CSV, one a picture; masks, which come last, have that of the last."""
+    if not settings.stamps:
+        return None
+    ends = masks([path.name for path in paths])
+    stamps = read_stamps(Path(settings.stamps), [path for path in paths if path.name not in ends])
+    return stamps + stamps[-1:] * len(ends)
+
+
+def _found(address: Address) -> list[Path]:
+    settings = _settings(address)
+    return find_images(address.target, settings.order, settings.first)
 
 
 def _settings(address: Address) -> FileSettings:
@@ -280,6 +360,8 @@ def _settings(address: Address) -> FileSettings:
         bits=options.integer("bits", minimum=1, maximum=16),
         white=options.integer("white", minimum=1, maximum=65535),
         stamps=options.text("stamps"),
+        order=options.choice("order", BY, AUTO),
+        first=options.text("first"),
     )
     options.done()
     return settings

@@ -1,10 +1,12 @@
 """Video files as a camera: ``video:test.mp4?gray=luma``. Frames come as fast as they are fetched.
 
-Times are those of the container; what compression did to the picture cannot be undone.
+Times are those of the container; what compression did to the picture cannot be undone. A codec that makes a picture of
+earlier ones holds back what moves a little (``controls["inter_frame"]``).
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,16 @@ from acquire.events import EventSink, device_event
 from acquire.files.picture import check_regular, is_utf8
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
+
+INTRA = {
+    "", "mjpg", "jpeg", "mjpa", "mjpb", "avrn", "mjp2", "mj2c", "ffv1", "ffvh", "hfyu", "lags", "magy", "ulrg", "ulra",
+    "uly0", "uly2", "uly4", "mpng", "png", "dib", "raw", "rgba", "bgra", "i420", "iyuv", "yv12", "yuy2", "uyvy", "y800",
+    "grey", "gray", "y16", "v210", "apcn", "apch", "apcs", "apco", "ap4h", "ap4x", "avdn", "avdh", "cfhd", "dvsd",
+}  # fmt: skip
+"""Codecs, by their code in small letters, each of whose pictures stands alone; H.264, VP9 and all others do not."""
+FILM_WARNING = "compressed film: strain may be 10 % low; record MJPG, FFV1 or pictures"
+_COUNTED = ((0, b"RIFF"), (4, b"ftyp"))  # containers with the number of frames; others have but a duration
+_MOST_COUNTED = 50_000_000  # bytes that are read through to count frames
 
 
 class VideoFile(CameraBase):
@@ -39,12 +51,16 @@ class VideoFile(CameraBase):
         check_regular(path)
         if not is_utf8(path):
             raise DataError(f"{path}: OpenCV opens a video by its name, which must be UTF-8; rename it")
+        with path.open("rb") as file:
+            self._head = file.read(16)
         self._address, self._path, self._gray_plane, self._on_event = address, path, gray, on_event
         self._capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
             raise DataError(f"{path}: not a video that can be read, or cut off; try to play or convert it")
         self._promised = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
         self._fps = self._capture.get(cv2.CAP_PROP_FPS) or 25.0
+        code = _fourcc(int(self._capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF)
+        inter_frame = code.lower() not in INTRA
         self.info = CameraInfo(
             address=address,
             name=path.name,
@@ -54,20 +70,22 @@ class VideoFile(CameraBase):
             live=False,
             clock="nominal",
             fps=self._fps,
-            pixel_format=_fourcc(int(self._capture.get(cv2.CAP_PROP_FOURCC))),
-            controls={"gray": gray, "frames": self._promised},
-            warnings=(WEBCAM_WARNING,),
+            pixel_format=code,
+            controls={"gray": gray, "frames": self._count(), "inter_frame": inter_frame},
+            warnings=(FILM_WARNING,) * inter_frame + (WEBCAM_WARNING,),
         )
 
     def __iter__(self) -> Iterator[Frame]:
         cv2 = load_cv2()
 
-        index, t = 0, 0.0
+        index, t, longest, place = 0, 0.0, 1.0, 0.0
         while not self.stopped.is_set():
             well, picture = self._capture.read()
             if not well:
-                self._report_if_short(index)
+                self._report_if_short(index, int(place + longest))
                 return
+            former, place = place, self._capture.get(getattr(cv2, "CAP_PROP_PTS", -1))
+            longest = max(longest, place - former) if index else longest
             stamp = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000
             t = stamp if stamp > t or index == 0 else t + 1 / self._fps
             yield Frame(frozen(self._grey(picture, index)), index, t, "nominal", 0, 8, stamp)
@@ -79,8 +97,19 @@ class VideoFile(CameraBase):
             raise DataError(f"{self._path}: frame {index} is of another size than the first")
         return image
 
-    def _report_if_short(self, count: int) -> None:
-        if count < self._promised:
+    def _count(self) -> int | None:
+        """Frames of the file; None where only their number times their duration is known, and it is large."""
+        if any(self._head[at:].startswith(word) for at, word in _COUNTED):
+            return self._promised
+        if self._path.stat().st_size > _MOST_COUNTED:
+            return None
+        cv2 = load_cv2()
+        capture = cv2.VideoCapture(str(self._path), cv2.CAP_FFMPEG)
+        return next(k for k in itertools.count() if not capture.grab())
+
+    def _report_if_short(self, count: int, reached: int) -> None:
+        """A warning where the film ends before its duration: ``reached`` of the frames that this would have."""
+        if max(count, reached) < self._promised:
             text = f"{self._path}: ends after {count} of {self._promised} frames; it may be cut off"
             device_event(self._on_event, self._address, text, missing=self._promised - count)
 

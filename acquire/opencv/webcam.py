@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import queue
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.addresses import Address, Options
-from acquire.camera import CameraBase, FailureGuard, RepeatGuard, missing_between
+from acquire.camera import CameraBase, FailureGuard, FramePace, RepeatGuard
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import EventSink, device_event
@@ -78,6 +79,20 @@ def _properties() -> dict[str, int]:
         "exposure": cv2.CAP_PROP_EXPOSURE,
         "gain": cv2.CAP_PROP_GAIN,
     }
+
+
+def _automatics() -> list[tuple[str, int, float]]:
+    """What a camera changes by itself: name, property, and the value that switches it off.
+
+    Of the exposure that is 1 behind V4L2 (``V4L2_EXPOSURE_MANUAL``) and 0 behind the other backends.
+    """
+    cv2 = load_cv2()
+    manual = 1.0 if sys.platform == "linux" else 0.0
+    return [
+        ("exposure", cv2.CAP_PROP_AUTO_EXPOSURE, manual),
+        ("white balance", cv2.CAP_PROP_AUTO_WB, 0.0),
+        ("focus", cv2.CAP_PROP_AUTOFOCUS, 0.0),
+    ]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,7 +170,7 @@ class OpenCVCamera(CameraBase):
         super().__init__()
         self._address, self._opener, self._settings = address, opener, settings
         self._on_event, self._now = on_event, now
-        self._repeats, self._failures = RepeatGuard(), FailureGuard()
+        self._repeats, self._failures, self._pace = RepeatGuard(), FailureGuard(), FramePace()
         self._index, self._last_t = -1, float("-inf")
         self._drain: _Drain | None = None
         self._capture: Capture | None = self._open()
@@ -177,6 +192,12 @@ class OpenCVCamera(CameraBase):
 
     def _set(self, capture: Capture) -> None:
         properties = _properties()
+        self._automatic = [
+            name
+            for name, prop, manual in _automatics()
+            if not (capture.set(prop, manual) and capture.get(prop) == manual)
+            and (name == "exposure" or capture.get(prop) > 0)  # not every camera has the others
+        ]
         for name, value in self._settings.asked().items():
             capture.set(properties[name], value)
         for name, value in self._settings.asked().items():
@@ -203,6 +224,11 @@ class OpenCVCamera(CameraBase):
         controls = {name: capture.get(prop) for name, prop in _properties().items()}
         fps = controls["fps"]
         warnings = [WEBCAM_WARNING]
+        if self._automatic:
+            warnings.append(
+                f"OpenCV does not switch off, or does not tell: automatic {', '.join(self._automatic)}; grey levels "
+                "and sharpness may drift: set them by hand in the camera's own program"
+            )
         if self._clock == "host":
             warnings.append("OpenCV tells neither stamps nor losses here: times are those of this program")
         return CameraInfo(
@@ -273,8 +299,10 @@ class OpenCVCamera(CameraBase):
             return None
         raw_t = shot.stamp if self._clock == "device" else shot.returned
         t = max(raw_t, self._last_t)
-        fps = self.info.fps if self._clock == "device" and self._index >= 0 else None
-        lost = missing_between(self._last_t, t, fps)
+        missing = self._pace.missing(t - self._last_t) if self._index >= 0 else 0
+        lost = missing if self._clock == "device" else 0
+        if remark := self._pace.remark(self.info.fps):
+            self._report(remark)
         self._index, self._last_t = self._index + 1 + lost, t
         return Frame(frozen(image), self._index, t, self._clock, lost, 8, raw_t, self._repeated(image))
 

@@ -70,8 +70,6 @@ class ModbusParser(Parser):
         held = self._held.data
         if len(held) < EXCEPTION_BYTES or held[0] != self._profile.slave:
             return 0
-        if held.startswith(self._request):  # an RS-485 adapter that echoes
-            return len(self._request)
         if held[1] == self._profile.function:
             size = 5 + 2 * self._profile.count if held[2] == 2 * self._profile.count else 0
         else:
@@ -80,7 +78,7 @@ class ModbusParser(Parser):
         return size if sound else 0
 
     def _read(self, answer: bytes, start: int) -> list[Reading]:
-        if answer == self._request or answer[1] == WRITE_ONE:
+        if answer[1] == WRITE_ONE:
             return []
         if answer[1] & 0x80:
             return [Reading(math.nan, None, answer, start, flags=LoadFlag.ERROR)]

@@ -15,12 +15,13 @@ from typing import Any, Self
 
 from acquire.addresses import Address
 from acquire.closing import Closing
-from acquire.device_clock import DeviceClock
+from acquire.device_clock import ClockUnit, DeviceClock
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.protocols.base import Reading
-from acquire.serial_line.clock import ArrivalRate, ArrivalTimes
+from acquire.serial_line.clock import ArrivalRate, ArrivalTimes, in_milliseconds
+from acquire.serial_line.echo import Echo
 from acquire.serial_line.link import FloodGuard, Link, LinkContext, LoadWatch, Opener
 from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling
@@ -71,11 +72,8 @@ class SerialCell(Closing):
         self._busy = threading.Lock()
         self._parser = settings.parser
         self._scaling = Scaling(settings, self._report)
-        self._times, self._device, self._pace = (
-            ArrivalTimes(settings.byte_time_s),
-            DeviceClock(),
-            ArrivalRate(),
-        )
+        self._times, self._pace = ArrivalTimes(settings.byte_time_s), ArrivalRate()
+        self._device, self._unit = DeviceClock(), ClockUnit()  # of the device's own time, where it sends one
         self._last_t = -math.inf  # of the last sample
         self._last_read = math.nan
         self._watch, self._flood = (
@@ -87,7 +85,8 @@ class SerialCell(Closing):
         self._skipped = 0  # bytes, in floods
         self._waited = True  # for the bytes of the last round
         context = LinkContext(opener, clock, self._stop, self._sleep)
-        self._link = Link(settings.line, context, self._report, lambda: self._watch.last_words(clock()))
+        echo = Echo(self._parser, self._report) if settings.mode == "poll" else None
+        self._link = Link(settings.line, context, self._report, lambda: self._watch.last_words(clock()), echo)
         try:
             self._command("start")
             self._wait_for_first()
@@ -200,7 +199,7 @@ class SerialCell(Closing):
         self._rest()
         began = self._clock()
         data = self._link.receive(BLOCK)
-        self._last_read = self._clock()
+        self._last_read = self._link.arrived if data else self._clock()
         self._waited = self._last_read - began > 1e-3
         readings = self._feed(data)
         if not data or self._last_read - self._polled > ANSWER_S:
@@ -235,6 +234,11 @@ class SerialCell(Closing):
         if not readings:
             return []
         times = [self._times.began(reading.start) for reading in readings]
+        arrived = math.nan if self._flood.late else times[-1]
+        readings, told = in_milliseconds(self._unit, readings, arrived)
+        if told:
+            self._report("warning", told)
+            self._device = DeviceClock()
         stamps = [(r.device_ms, t) for r, t in zip(readings, times, strict=True) if r.device_ms is not None]
         waited = self._flood.late
         if not waited:  # messages of unknown age cannot tie the device's clock
@@ -271,7 +275,7 @@ class SerialCell(Closing):
         data = self._settings.commands.get(name)
         if data is None or (name in ("start", "stop") and self._settings.mode != "stream"):
             return False
-        return self._link.write(data)
+        return self._link.write(data, polls=self._settings.mode == "poll")
 
     def tare(self, *, force: bool = False) -> None:
         """Make the present load zero; done, or refused, by the reading thread at its next round."""

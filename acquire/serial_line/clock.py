@@ -11,6 +11,10 @@ import math
 import statistics
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
+
+from acquire.device_clock import ClockUnit
+from acquire.protocols.base import Reading
 
 
 class ArrivalTimes:
@@ -145,3 +149,28 @@ class ArrivalRate:
             return False
         self._tie, self._credit = delay, self._late_s
         return True
+
+
+def in_milliseconds(
+    unit: ClockUnit, readings: Sequence[Reading], arrived: float
+) -> tuple[list[Reading], str]:
+    """Readings with the device's own time in ms, or without it where it is no clock; what a person must know of it.
+
+    Parameters
+    ----------
+    unit : ClockUnit
+        Looks at the last of them.
+    readings : sequence of Reading
+        Not empty.
+    arrived : float, s
+        When the last began to arrive; NaN where they may have waited.
+    """
+    count = readings[-1].device_ms
+    told = "" if count is None or math.isnan(arrived) else unit.look(count, arrived)
+    ms = unit.ms
+    if ms == 1.0:
+        return list(readings), told
+    return [
+        replace(r, device_ms=None if ms is None or r.device_ms is None else r.device_ms * ms)
+        for r in readings
+    ], told

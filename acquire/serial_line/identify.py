@@ -213,7 +213,7 @@ def ask(question: Question, opener: Opener = open_port, clock: Clock = time.mono
     try:
         _collect(port, 0.3, clock)  # what it sends unasked is no answer
         port.write(question.data)
-        received = _collect(port, 0.7, clock)
+        received = _collect(port, 0.7, clock).removeprefix(question.data)  # an adapter may echo
     except PORT_ERRORS as error:
         raise DeviceError(f"{question.line.url}: lost while asking ({error}); check the cable") from error
     finally:

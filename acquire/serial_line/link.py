@@ -18,6 +18,7 @@ from acquire.errors import ConfigError, DeviceError
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.opening_thread import Opening
 from acquire.serial_line.byte_ports import Port
+from acquire.serial_line.echo import Echo
 from acquire.serial_line.ports import PORT_ERRORS, LineSettings, find_again, identity_of
 
 log = logging.getLogger(__name__)
@@ -77,11 +78,15 @@ class Link:
     report : callable taking level and text
     last_words : callable
         Words about the last sample when the port is lost.
+    echo : Echo or None
+        Of what is written with ``polls``.
 
     Attributes
     ----------
     identity : str
         Of the USB device behind it.
+    arrived : float, s
+        When the last bytes came.
 
     Raises
     ------
@@ -95,8 +100,10 @@ class Link:
         context: LinkContext,
         report: Report,
         last_words: Callable[[], str] = lambda: "",
+        echo: Echo | None = None,
     ) -> None:
         self._line, self._report, self._last_words = line, report, last_words
+        self._echo, self.arrived = echo, -math.inf
         self._opener, self._clock = context.opener, context.clock
         self._sleep, self._stopped = context.sleep, context.stopped
         first = self._opening_at(lambda: line)
@@ -119,17 +126,23 @@ class Link:
         return self._port is not None
 
     def receive(self, limit: int, *, wait: bool = True) -> bytes:
-        """See ``Port``; b"" also when the port is lost by it."""
-        if self._port is None:
-            return b""
-        try:
-            data = self._port.receive(limit, wait=wait)
-        except PORT_ERRORS as error:
-            self.lose(error)
-            return b""
-        if data and self._missed:
-            self._heard_again()
-        return data
+        """See ``Port``; b"" also when the port is lost by it; without the echo of what was written."""
+        while self._port is not None:
+            try:
+                data = self._port.receive(limit, wait=wait)
+            except PORT_ERRORS as error:
+                self.lose(error)
+                return b""
+            if data and self._missed:
+                self._heard_again()
+            self.arrived = self._clock() if data else self.arrived
+            if self._echo is None:
+                return data
+            if not data:
+                return self._echo.release()
+            if left := self._echo.take(data):
+                return left
+        return b""
 
     def _heard_again(self) -> None:
         if self._short < 2 or self._clock() - self._since >= STEADY_S:
@@ -138,10 +151,12 @@ class Link:
                 "info", "connected again" + ("" if self._url == self._line.url else f" as {self._url}")
             )
 
-    def write(self, data: bytes) -> bool:
-        """Send ``data``; False where that is impossible."""
+    def write(self, data: bytes, *, polls: bool = False) -> bool:
+        """Send ``data``, among polls; False where that is impossible."""
         if self._port is None:
             return False
+        if polls and self._echo is not None:
+            self._echo.sent(data)
         try:
             self._port.write(data)
         except PORT_ERRORS as error:
@@ -152,6 +167,8 @@ class Link:
     def lose(self, error: Exception) -> None:
         """The port is gone."""
         port, self._port = self._port, None
+        if self._echo is not None:
+            self._echo.release()
         close_port(port)
         if self._stopped.is_set():
             return

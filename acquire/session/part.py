@@ -28,6 +28,7 @@ from acquire.hdf5 import (
     check_size,
     open_dataset,
     open_datasets,
+    open_file,
     open_group,
     probe,
     read_attribute,
@@ -314,7 +315,7 @@ def _open_file(path: Path, probed: bool, salvage: bool) -> tuple[h5py.File, str 
             return h5py.File(
                 PaddedFile(path, block.size), "r"
             ), f"is truncated: {there} of {block.size} bytes are there"
-        return h5py.File(path, "r", swmr=block.unfinished), UNFINISHED if block.unfinished else None
+        return open_file(path, swmr=block.unfinished), UNFINISHED if block.unfinished else None
     except (OSError, RuntimeError) as error:
         raise damaged(path, "it cannot be opened", error, NOTHING if salvage else ADVICE) from error
 

@@ -271,7 +271,9 @@ G_CTRL, S_CTRL = _iowr(27, ControlValue), _iowr(28, ControlValue)
 QUERYCTRL, QUERYMENU = _iowr(36, QueryControl), _iowr(37, QueryMenu)
 ENUM_FRAMESIZES, ENUM_FRAMEINTERVALS = _iowr(74, FrameSize), _iowr(75, FrameInterval)
 
-CAPTURE, MMAP, FIELD_ANY, FIELD_NONE = 1, 1, 0, 1
+CAPTURE, MMAP, FIELD_NONE = 1, 1, 1
+FIELDS_APART = {2: "top", 3: "bottom", 5: "sequential", 6: "sequential", 7: "alternate"}
+FIELDS_WOVEN = {4, 8, 9}  # both fields in the rows of one picture
 CAP_CAPTURE, CAP_CAPTURE_MPLANE, CAP_STREAMING, CAP_DEVICE_CAPS = 0x1, 0x1000, 0x04000000, 0x80000000
 CAP_TIMEPERFRAME = 0x1000
 SIZE_DISCRETE = INTERVAL_DISCRETE = 1

@@ -118,7 +118,7 @@ class V4L2Camera(CameraBase):
 
     def _describe(self) -> CameraInfo:
         setup, mode = self._setup, self._setup.mode
-        width, height = picture_size(mode.width, mode.height, self._settings.plane, setup.format.kind)
+        width, height = picture_size(mode.width, mode.height, setup.format, self._settings.plane)
         return CameraInfo(
             address=self._address,
             name=str(self._identity),
@@ -215,6 +215,8 @@ class V4L2Camera(CameraBase):
             return None
         counted = self._counter.counts_itself
         lost = self._counter.count(stamp.sequence, raw_t, self._setup.mode.fps)
+        if remark := self._counter.pace.remark(self._setup.mode.fps):
+            self._report(remark)
         if counted and not self._counter.counts_itself:
             self._report("the driver does not number its frames; losses are counted from their stamps alone")
         if stamp.damaged:

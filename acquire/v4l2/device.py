@@ -66,6 +66,8 @@ class Mode:
     full_range : bool
         Luma uses all 256 levels.
     fps : float or None, 1/s
+    field : int
+        ``api.FIELD_NONE`` where all rows of a picture are of one moment.
     """
 
     fourcc: str
@@ -74,6 +76,7 @@ class Mode:
     bytes_per_line: int
     full_range: bool
     fps: float | None
+    field: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,6 +208,7 @@ class V4L2Device:
             bytes_per_line=pix.bytesperline,
             full_range=pix.quantization == api.QUANTIZATION_FULL,
             fps=self.fps(),
+            field=pix.field,
         )
 
     def set_format(self, fourcc: str, width: int, height: int) -> None:

@@ -102,9 +102,18 @@ def preferred(offered: list[str]) -> str | None:
     return next((code for code, item in FORMATS.items() if code in offered and item.kind != "jpeg"), None)
 
 
-def picture_size(width: int, height: int, plane: Plane, kind: Kind) -> tuple[int, int]:
-    """Width and height of the pictures handed out: one colour plane of a mosaic is half as large."""
-    return (width // 2, height // 2) if kind == "bayer" and plane != "raw" else (width, height)
+def picture_size(width: int, height: int, pixel_format: PixelFormat, plane: Plane) -> tuple[int, int]:
+    """Width and height of the pictures handed out: one colour plane of a mosaic has every other row and column."""
+    if pixel_format.kind != "bayer" or plane == "raw":
+        return width, height
+    y, x = _first(pixel_format, plane)
+    return (width + 1 - x) // 2, (height + 1 - y) // 2
+
+
+def _first(pixel_format: PixelFormat, plane: Plane) -> tuple[int, int]:
+    """Row and column of the first sample of a colour; of the two greens of a mosaic the upper one."""
+    y, x = divmod(pixel_format.order.index(plane.upper()), 2)
+    return y, x
 
 
 def decode(
@@ -152,7 +161,7 @@ def decode(
 def _plane(mosaic: NDArray[Any], pixel_format: PixelFormat, plane: Plane) -> NDArray[Any]:
     if pixel_format.kind != "bayer" or plane == "raw":
         return mosaic
-    y, x = divmod(pixel_format.order.index(plane.upper()), 2)
+    y, x = _first(pixel_format, plane)
     return mosaic[y::2, x::2]
 
 

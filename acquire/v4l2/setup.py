@@ -7,6 +7,7 @@ from typing import Any
 
 from acquire.errors import ConfigError, DeviceError
 from acquire.frame import CameraSetting
+from acquire.v4l2 import api
 from acquire.v4l2.controls import (
     Control,
     ControlWishes,
@@ -140,6 +141,11 @@ def _set_format(device: V4L2Device, fourcc: str, settings: V4L2Settings, where: 
     width, height = settings.width or now.width, settings.height or now.height
     device.set_format(fourcc, width, height)
     got = device.mode()
+    if got.field in api.FIELDS_APART:
+        raise ConfigError(
+            f"{where}: gives interlaced fields one by one ({api.FIELDS_APART[got.field]}), not pictures; choose a "
+            "progressive input (input=) or mode of the source"
+        )
     if got.fourcc != fourcc:
         raise ConfigError(f"{where}: asked for format={fourcc}, the driver gives {got.fourcc}; ask for that")
     asked = (settings.width or got.width, settings.height or got.height)
@@ -171,6 +177,11 @@ def _in_force(device: V4L2Device, settings: V4L2Settings, controls: dict[int, Co
     if automatic:
         warnings.append(
             f"the camera goes on changing by itself: {', '.join(automatic)}; grey levels may drift"
+        )
+    if mode.field in api.FIELDS_WOVEN:
+        warnings.append(
+            "interlaced: odd and even rows are of two moments, and what moves is torn between them; choose a "
+            "progressive input (input=) or mode of the source"
         )
     return Setup(
         mode=mode,

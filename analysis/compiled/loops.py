@@ -26,6 +26,7 @@ import numba
 from numba.np.ufunc import parallel as numba_threads
 from numpy.typing import NDArray
 
+from analysis.compiled.cache import CheckedFile
 from analysis.compiled.layer import give_start_lock, threading_layer
 
 give_start_lock(numba_threads)
@@ -94,6 +95,7 @@ def _stamped(dispatcher: Any) -> Any:
     """
     try:
         file = _cache_file(dispatcher)
+        file.__class__ = CheckedFile
         file._source_stamp = _own_stamp()
         # An index of other modules is not even read: it may name types that have moved.
         file._version = f"{numba.__version__}, loops {_own_stamp_digest()}"

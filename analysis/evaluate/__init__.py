@@ -2,15 +2,16 @@
 
 ``gauges`` are virtual gauges and extensometers on a field, by the extension of two ends. ``tensile`` evaluates a test:
 a ``curve`` by one of the ``standards``, its ``elastic`` line, its ``strengths``, its plastic ``flow``, each a
-``figure`` with an interval. ``lag`` is the delay of the load beside the frames. ``floor`` has the still phase of a test
-and the noise floor in it. ``deconvolution`` removes the blur of the ZOI from a map.
+``figure`` with an interval; ``programme`` finds what kind of test it is, ``seen`` what of the force was seen. ``lag``
+is the delay of the load beside the frames. ``floor`` has the still phase of a test and the noise floor in it.
+``deconvolution`` removes the blur of the ZOI from a map.
 """
 
 from analysis.evaluate.area.strain import AreaStrain, Unevenness
 from analysis.evaluate.curve import Course, Curve, TwoSides, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import ErrorLimits, LoadAxis, load_axis, principal_direction
-from analysis.evaluate.figure import CONFIDENCE, Figure
+from analysis.evaluate.figure import AT_LEAST, CONFIDENCE, Figure
 from analysis.evaluate.floor import MIN_STILL_INSTANTS, NoiseFloor, evenly, noise_floor, still_phase
 from analysis.evaluate.flow import Neck, neck, true_at_top
 from analysis.evaluate.gauges.extensometers import (
@@ -25,13 +26,16 @@ from analysis.evaluate.gauges.geometry import inside_polygon
 from analysis.evaluate.gauges.kinds import GAUGE_KINDS, AreaGauge, CircleGauge, StripGauge, ZoiGauge
 from analysis.evaluate.gauges.readings import COME_APART, distance, facing
 from analysis.evaluate.lag import Track, find_lag
+from analysis.evaluate.programme import KINDS, Kind
 from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
 from analysis.evaluate.tensile import Span, StrainZero, TensileFigures, TensileOptions, ZeroBy, evaluate_test
 
 __all__ = [
+    "AT_LEAST",
     "COME_APART",
     "CONFIDENCE",
     "GAUGE_KINDS",
+    "KINDS",
     "MIN_STILL_INSTANTS",
     "STANDARDS",
     "AreaGauge",
@@ -46,6 +50,7 @@ __all__ = [
     "Gauge",
     "GaugeValue",
     "Interval",
+    "Kind",
     "LineGauge",
     "LoadAxis",
     "Neck",

@@ -16,6 +16,12 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 _BROKEN = 0.02  # of the highest stress: below it there is no specimen any more
 _FALL = 5.0  # times what is usual from one sample to the next
+_BACK = 0.2  # of the highest stress: what has broken does not carry as much again
+_UNLOADED, _TOGETHER = (
+    3,
+    0.9,
+)  # samples of a fall in which strain and stress go down together, and their correlation
+_SURE, _LOOP = 8.0, 0.02  # of an unloading: standard deviations, and share of the highest stress
 _PARTS, _WIDEST = 60, 4  # of a loading: half the width of its running means, and the most, samples
 _MEDIAN_OF_NORMAL = 0.6745
 TILT = math.radians(0.1)
@@ -93,6 +99,8 @@ class Loading:
         The highest stress.
     broke : bool
         The test went on to the break.
+    idle : (M,) float64, s
+        Time spent in unloadings that were taken out before.
     """
 
     t: Floats
@@ -112,15 +120,19 @@ class Loading:
     half: int
     top: int
     broke: bool
+    idle: Floats | float = 0.0
 
     @classmethod
     def of(cls, curve: Curve) -> Loading:
-        """What can be evaluated of ``curve``; may be empty."""
-        end = broken_at(curve.stress)
+        """What can be evaluated of ``curve``, without unloadings: the envelope of rising strain; may be empty."""
+        end = broken_at(curve.stress, curve.strain)
         stop = len(curve.t) if end is None else end + 1
         elastic = curve.strain if curve.elastic is None else curve.elastic
         narrowing = curve.transverse if curve.narrowing is None else curve.narrowing
         known = np.isfinite(curve.strain[:stop]) & np.isfinite(curve.stress[:stop])
+        seconds = curve.t[:stop][known]
+        rising = _envelope(curve.strain[:stop][known], curve.stress[:stop][known], end is not None)
+        known[known] = rising
         nothing = np.full(len(curve.t), math.nan)
         t, strain, stress, across, elastic, uneven, misfit, narrowing, lens, blur = (
             (nothing if a is None else a)[:stop][known]
@@ -134,7 +146,7 @@ class Loading:
         return cls(
             t, strain, stress, across, elastic, uneven, misfit, narrowing, lens, blur,
             smoothed(stress, half), smoothed(strain, half),
-            noise(strain), noise(stress), half, top, end is not None,
+            noise(strain), noise(stress), half, top, end is not None, _idle(seconds, rising),
         )  # fmt: skip
 
     @property
@@ -143,30 +155,72 @@ class Loading:
         return len(self.t)
 
 
-def broken_at(stress: Floats) -> int | None:
+def broken_at(stress: Floats, strain: Floats | None = None) -> int | None:
     """The last sample before the break, or None where there was none.
 
-    The specimen has broken when the stress falls below 2 % of the highest; the fall begins at the first
-    sample that loses more than five times what is usual there (ISO 6892-1:2019, annex A, on fracture).
+    The specimen has broken when the stress falls below 2 % of the highest and does not come back; the fall begins at
+    the first sample that loses more than five times what is usual there (ISO 6892-1:2019, annex A, on fracture).
+    Where the strain goes back with the stress over several samples it is unloaded.
 
     Parameters
     ----------
     stress : (N,) float64
+    strain : (N,) float64, optional
     """
     known = np.flatnonzero(np.isfinite(stress))
     values = stress[known]
     if len(values) < 3 or values.max() <= 0:
         return None
     top = int(np.argmax(values))
-    gone = np.flatnonzero(values[top:] < _BROKEN * values[top])
+    above = int(np.flatnonzero(values > _BACK * values[top])[-1])
+    gone = np.flatnonzero(values[above:] < _BROKEN * values[top])
     if not len(gone):
         return None
-    k = top + int(gone[0])
+    k = fallen = above + int(gone[0])
     steps = np.abs(np.diff(values[:k]))
     usual = max(float(np.median(steps)), 3 * noise(values[:k])) if len(steps) else np.inf
     while k > top and values[k - 1] - values[k] > _FALL * usual:
         k -= 1
+    first = k if k < fallen else top + int(np.flatnonzero(values[top:fallen] >= values[top] / 2)[-1])
+    if strain is not None and _go_down(strain[known][first : fallen + 1], values[first : fallen + 1]):
+        return None
     return int(known[k])
+
+
+def _go_down(strain: Floats, stress: Floats) -> bool:
+    """Whether both fall together, over more samples than a break takes."""
+    both = np.isfinite(strain)
+    if np.count_nonzero(both) < _UNLOADED + 2:
+        return False
+    e, s = strain[both], stress[both]
+    return bool(e[-1] < e[0] and np.corrcoef(e, s)[0, 1] > _TOGETHER)
+
+
+def _envelope(strain: Floats, stress: Floats, broke: bool) -> NDArray[np.bool_]:
+    """Which samples are no unloading and reloading, (N,): from where strain and stress go down to where strain is back.
+
+    One that does not come back is an unloading where the stress goes down to none; before a break it may be a neck
+    outside of the gauge.
+    """
+    rising = np.ones(len(strain), np.bool_)
+    if len(strain) < ENOUGH:
+        return rising
+    least_strain, least = _SURE * noise(strain), max(_SURE * noise(stress), _LOOP * float(stress.max()))
+    below = strain < np.maximum.accumulate(strain)
+    turns = np.flatnonzero(np.diff(np.concatenate([[False], below, [False]])))
+    for first, stop in turns.reshape(-1, 2):
+        before, part = first - 1, slice(first, stop)
+        deep = strain[before] - strain[part].min() > least_strain
+        ends = stop == len(strain) and (broke or stress[-1] > _BACK * stress.max())
+        if deep and stress[before] - stress[part].min() > least and not ends:
+            rising[part] = False
+    return rising
+
+
+def _idle(t: Floats, rising: NDArray[np.bool_]) -> Floats:
+    """Seconds spent in what is left out before each sample that is kept, (M,)."""
+    steps = np.diff(t, prepend=t[:1])
+    return np.asarray(np.cumsum(np.where(rising, 0.0, steps))[rising])
 
 
 def true_curve(strain: Floats, stress: Floats) -> tuple[Floats, Floats]:
@@ -251,6 +305,12 @@ def smoothed(values: Floats, half: int) -> Floats:
     reach = np.minimum(half, np.minimum(np.arange(n), np.arange(n)[::-1]))
     k = np.arange(n)
     return np.asarray((total[k + reach + 1] - total[k - reach]) / (2 * reach + 1))
+
+
+def running_median(values: Floats, half: int) -> Floats:
+    """Median over 2 ``half`` + 1 values, the ends repeated beyond them, (N,)."""
+    padded = np.pad(values, half, mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1))
 
 
 def first_crossing(values: Floats, level: float, start: int = 0) -> float:

@@ -79,6 +79,9 @@ class FittedLine:
         return Figure.about(self.slope, sigma, dof)
 
 
+FILM = "film"
+
+
 @dataclass(frozen=True, slots=True)
 class ErrorLimits:
     """What a modulus is uncertain by beyond the scatter: limits of error, between which all values are as likely.
@@ -89,16 +92,19 @@ class ErrorLimits:
         Relative; None: not stated.
     strain : float or None
         Of what comes with the load over the elastic interval: motion off the plane, lens, alignment.
+    film : float or None
+        Relative, of every strain: a codec that makes a picture of earlier ones holds motion back.
     """
 
     force: float | None = None
     section: float | None = None
     strain: float | None = None
+    film: float | None = None
 
     def shares(self, strain: float) -> dict[str, float]:
         """Relative standard uncertainties (JCGM 100:2008, 4.3.7) of a slope over ``strain``; of what is stated."""
         relative = None if self.strain is None else self.strain / strain
-        limits = {"load cell": self.force, "section": self.section, "strain": relative}
+        limits = {"load cell": self.force, "section": self.section, "strain": relative, FILM: self.film}
         return {name: limit / math.sqrt(3) for name, limit in limits.items() if limit is not None}
 
 

@@ -8,6 +8,9 @@ from dataclasses import dataclass, replace
 CONFIDENCE = 0.95
 """Of all intervals here; they hold the scatter of strain and force, and that of E the stated limits of error."""
 
+AT_LEAST = "at least"
+"""Qualifier of a bound: what lies above it was not seen."""
+
 
 @dataclass(frozen=True, slots=True)
 class Figure:
@@ -19,12 +22,15 @@ class Figure:
         NaN where it cannot be had.
     why : str
         Why it cannot be had; of a value, a remark, mostly none.
+    qualifier : str
+        What kind of a number it is: ``AT_LEAST`` of a bound, "film" of a compressed film; mostly none.
     """
 
     value: float
     low: float
     high: float
     why: str = ""
+    qualifier: str = ""
 
     @classmethod
     def about(cls, value: float, sigma: float, dof: float = math.inf, why: str = "") -> Figure:
@@ -42,24 +48,35 @@ class Figure:
         """Whether there is a value."""
         return math.isfinite(self.value)
 
+    @property
+    def is_bound(self) -> bool:
+        """Whether the value may be any above."""
+        return self.qualifier == AT_LEAST
+
     def remarked(self, words: str) -> Figure:
         """The figure with a remark, where it is known."""
         return replace(self, why=words) if self.known and words else self
 
+    def at_least(self) -> Figure:
+        """The figure as a bound, without an upper end, where it is known."""
+        return replace(self, high=math.inf, qualifier=AT_LEAST) if self.known else self
+
     def over(self, other: float) -> Figure:
         """The figure in another unit: divided by a positive number."""
-        return Figure(self.value / other, self.low / other, self.high / other, self.why)
+        return replace(self, value=self.value / other, low=self.low / other, high=self.high / other)
+
+    def limited(self, share: float, qualifier: str) -> Figure:
+        """The figure with a limit of error beyond its interval, a ``share`` of its value."""
+        beyond = share * abs(self.value)
+        words = self.qualifier or (qualifier if self.known else "")
+        return replace(self, low=self.low - beyond, high=self.high + beyond, qualifier=words)
 
     def minus(self, other: float, sigma: float = 0.0) -> Figure:
         """``other``, of standard uncertainty ``sigma``, taken away."""
         half = quantile() * sigma
         value = self.value - other
-        return Figure(
-            value,
-            value - math.hypot(self.value - self.low, half),
-            value + math.hypot(self.high - self.value, half),
-            self.why,
-        )
+        low, high = (math.hypot(one, half) for one in (self.value - self.low, self.high - self.value))
+        return replace(self, value=value, low=value - low, high=value + high)
 
 
 def quantile(dof: float = math.inf) -> float:

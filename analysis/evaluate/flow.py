@@ -7,8 +7,8 @@ kept.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
@@ -114,9 +114,10 @@ def true_at_top(strength: Figure, strain: Figure) -> tuple[Figure, Figure]:
 
     Volume is kept, and the strain is uniform up to there. Both must be known.
     """
-    stretch = strain.minus(-1.0)
-    stress = Figure(strength.value * stretch.value, strength.low * stretch.low, strength.high * stretch.high)
-    return stress, Figure(math.log(stretch.value), math.log(stretch.low), math.log(stretch.high))
+    stretch, ends = strain.minus(-1.0), ("value", "low", "high")
+    stress: dict[str, Any] = {end: getattr(strength, end) * getattr(stretch, end) for end in ends}
+    logarithm: dict[str, Any] = {end: math.log(getattr(stretch, end)) for end in ends}
+    return replace(strength, **stress, why=""), replace(strain, **logarithm, why="")
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,8 +1,9 @@
 """How late the load comes beside the frames, from the test itself.
 
-Up to the end of the elastic part the strain follows the force: strain(t) = a + b force(t + lag). The lag is
-the one for which the two fit best. It shows where the force changes its pace, at the onset above all: on
-a straight ramp alone a lag and an offset are the same, and there is no answer.
+Up to the end of the elastic part the strain follows the force: strain(t) = a + b f + c f^2 with f = force(t + lag).
+The lag is the one for which the two fit best. It shows where the force changes its pace, at the onset above all: on
+a straight ramp alone a lag and an offset are the same, and there is no answer; nor where a bend of the curve (c) or, in
+a cyclic test, a loop of the material explains as much.
 """
 
 from __future__ import annotations
@@ -13,14 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate.curve import noise
+from analysis.evaluate.curve import Curve, noise
 from analysis.evaluate.figure import Figure, quantile
+from analysis.evaluate.programme import Programme, reversals
 
 Floats = NDArray[np.float64]
 
 MIN_FRAMES = 20
 """Frames that a lag needs."""
 
+_IN_PART = 10  # of them in the elastic part
 _SMOOTH_S = 0.15  # over which the pace of the force is read
 _GRID_S = 0.02
 _STEPS = 20
@@ -28,6 +31,8 @@ _SHARES = (0.2, 0.25, 0.3, 0.38, 0.47, 0.6, 0.75, 1.0)
 """Of the highest force: how far the elastic part is tried to reach."""
 _CURVED = 3.5  # standard deviations of a curvature that ends the elastic part
 _APART_S, _SEPARATION = 0.2, 20.0  # a lag this far away must fit worse by this many variances
+_BENT = 5.0  # times the noise: second differences of the force that are no bend
+_BACK = 0.1  # of the highest force: a fall by more ends the first rise
 _KNOWN = 0.95  # of the information that must come from the force itself and not from its noise
 
 
@@ -65,12 +70,12 @@ def find_lag(strain: Track, force: Track, max_lag: float = 1.0, max_half_width: 
         the reason why there is none.
     """
     strain, force = strain.known(), force.known()
-    if why := _too_little(strain, force, max_lag):
+    if why := _too_little(strain, force, max_lag) or _turns_round(strain, force):
         return Figure.none(why)
     best: _Fit | None = None
     for share in _SHARES:
         part = _elastic(strain, force, share, max_lag)
-        if len(part.t) < MIN_FRAMES:
+        if len(part.t) < _IN_PART:
             continue
         fit = _fit(part, force, max_lag, noise(strain.values))
         if not fit.straight:
@@ -78,7 +83,7 @@ def find_lag(strain: Track, force: Track, max_lag: float = 1.0, max_half_width: 
         best = fit
     if best is None:
         return Figure.none(
-            f"nowhere from the start on do {MIN_FRAMES} frames follow the force in a straight line;"
+            f"nowhere from the start on do {_IN_PART} frames follow the force in a straight line;"
             " begin to measure some seconds before the load"
         )
     return _accepted(best, max_lag, max_half_width)
@@ -114,36 +119,104 @@ def _too_little(strain: Track, force: Track, max_lag: float) -> str:
     return ""
 
 
+def _turns_round(strain: Track, force: Track) -> str:
+    """Why the course of the test gives no lag; empty where it may."""
+    curve = Curve(strain.t, strain.values, np.interp(strain.t, force.t, force.values))
+    cyclic = Programme.of(curve).kind == "cyclic"
+    return "in a cyclic test a loop of the material looks like a lag" if cyclic else ""
+
+
 def _elastic(strain: Track, force: Track, share: float, max_lag: float) -> Track:
-    """The frames until the force reaches ``share`` of its highest, that have force around them at any lag."""
+    """The frames until the force reaches ``share`` of its highest or goes back, with force around them at any lag."""
     base = float(np.median(force.values[: max(len(force.t) // 50, 3)]))
     swing = np.abs(force.values - base)
-    end = min(float(force.t[np.argmax(swing >= share * swing.max())]), force.t[-1] - max_lag - _SMOOTH_S)
+    turns = reversals(swing, max(_BACK * float(swing.max()), 10 * noise(force.values)))
+    first = turns[0] if turns else len(swing) - 1
+    reached = min(int(np.argmax(swing >= share * swing.max())), first)
+    end = min(float(force.t[reached]), force.t[-1] - max_lag - _SMOOTH_S)
     inside = (strain.t >= force.t[0] + max_lag + _SMOOTH_S) & (strain.t <= end)
     return Track(strain.t[inside], strain.values[inside])
 
 
 def _fit(part: Track, force: Track, max_lag: float, noise_strain: float) -> _Fit:
-    """The best lag over ``part``; a fit that leaves much more than the noise of one strain is not straight."""
+    """The best lag over ``part``; a fit that leaves much more than the noise is not straight."""
     lags = np.arange(-max_lag, max_lag + _GRID_S / 2, _GRID_S)
-    left = np.array([_left(part, force, lag)[0] for lag in lags])
+    bends = _bends(force)
+    slope = abs(float(_Model.at(0.0, part, force, 0 * bends, 1.0).found[1]))
+    sigma = max(math.hypot(noise_strain, slope * noise(force.values)), 1e-15)
+    left = np.array([_Model.at(lag, part, force, slope * bends, sigma).left for lag in lags])
     lag = float(lags[np.argmin(left)])
     for _ in range(_STEPS):
-        step = float(np.clip(_step(part, force, lag), -_GRID_S, _GRID_S))
-        lag = float(np.clip(lag + step, -max_lag, max_lag))
+        step = _Model.at(lag, part, force, slope * bends, sigma).step(force)
+        lag = float(np.clip(lag + np.clip(step, -_GRID_S, _GRID_S), -max_lag, max_lag))
         if abs(step) < 1e-5:
             break
     elsewhere = left[np.abs(lags - lag) > _APART_S]
-    return _assessed(part, force, lag, float(elsewhere.min()) if len(elsewhere) else 0.0, noise_strain)
+    model = _Model.at(lag, part, force, slope * bends, sigma)
+    return _assessed(model, force, lag, float(elsewhere.min()) if len(elsewhere) else 0.0)
 
 
-def _columns(part: Track, force: Track, lag: float) -> tuple[Floats, Floats]:
-    """1 and the force at the shifted times, (N, 2), and the pace of that force, (N,)."""
-    shifted = part.t + lag
-    level = np.interp(shifted, force.t, force.values)
-    half = _SMOOTH_S / 2
-    pace = (_mean_force(force, shifted + half) - _mean_force(force, shifted - half)) / _SMOOTH_S
-    return np.column_stack([np.ones_like(level), level]), pace
+@dataclass(frozen=True, slots=True, eq=False)
+class _Model:
+    """The strain as a parabola over the force at shifted times, each frame by its weight.
+
+    A frame counts less where the force bends between two samples: what lies between them is not known.
+
+    Attributes
+    ----------
+    t : (N,) float64, s
+        Shifted.
+    shape : (N, 3) float64
+        1, force and its square, weighted.
+    values, weight : (N,) float64
+    found : (3,) float64
+        Factors of ``shape``.
+    sigma : float
+        Noise of the strain, with that of the force.
+    """
+
+    t: Floats
+    shape: Floats
+    values: Floats
+    weight: Floats
+    found: Floats
+    sigma: float
+
+    @classmethod
+    def at(cls, lag: float, part: Track, force: Track, bends: Floats, sigma: float) -> _Model:
+        """For a lag; ``bends`` are those of the strain between two samples of the force."""
+        t = part.t + lag
+        k = np.clip(np.searchsorted(force.t, t, side="right") - 1, 0, len(bends) - 1)
+        level, scale = np.interp(t, force.t, force.values), max(float(np.abs(force.values).max()), 1e-300)
+        weight = np.asarray(sigma / np.hypot(sigma, bends[k]), np.float64)
+        shape = np.column_stack([weight, weight * level, weight * level**2 / scale])
+        values = part.values * weight
+        found = np.asarray(np.linalg.lstsq(shape, values, rcond=None)[0], np.float64)
+        return cls(t, shape, values, weight, found, sigma)
+
+    @property
+    def left(self) -> float:
+        """Sum of squares that is not explained."""
+        rest = self.values - self.shape @ self.found
+        return float(rest @ rest)
+
+    def pace(self, force: Track) -> Floats:
+        """Weighted change of the strain with the lag, (N,)."""
+        half = _SMOOTH_S / 2
+        pace = (_mean_force(force, self.t + half) - _mean_force(force, self.t - half)) / _SMOOTH_S
+        bent = 2 * self.found[2] * self.shape[:, 2] / np.where(self.shape[:, 1] == 0, 1.0, self.shape[:, 1])
+        return np.asarray((self.found[1] + bent) * pace * self.weight)
+
+    def step(self, force: Track) -> float:
+        """By how much another lag fits better, s."""
+        full = np.column_stack([self.shape, self.pace(force)])
+        return float(np.linalg.lstsq(full, self.values, rcond=None)[0][-1])
+
+
+def _bends(force: Track) -> Floats:
+    """How far the force may be from the straight line between two samples, beyond noise, (N - 1,)."""
+    bend = np.abs(np.diff(force.values, 2, prepend=force.values[0], append=force.values[-1]))
+    return np.asarray(np.maximum((bend[:-1] + bend[1:]) / 4 - _BENT * noise(force.values), 0.0))
 
 
 def _mean_force(force: Track, t: Floats) -> Floats:
@@ -154,41 +227,22 @@ def _mean_force(force: Track, t: Floats) -> Floats:
     return np.asarray(np.subtract(*ends) / _SMOOTH_S)
 
 
-def _left(part: Track, force: Track, lag: float) -> tuple[float, Floats]:
-    """Sum of squares that the best line leaves, and that line: offset and slope."""
-    level = np.interp(part.t + lag, force.t, force.values)
-    x, y = level - level.mean(), part.values - part.values.mean()
-    slope = float(x @ y) / max(float(x @ x), 1e-300)
-    rest = y - slope * x
-    return float(rest @ rest), np.array([part.values.mean() - slope * level.mean(), slope])
-
-
-def _step(part: Track, force: Track, lag: float) -> float:
-    shape, pace = _columns(part, force, lag)
-    found = np.linalg.lstsq(shape, part.values, rcond=None)[0]
-    full = np.column_stack([shape, found[1] * pace])
-    return float(np.linalg.lstsq(full, part.values, rcond=None)[0][2])
-
-
-def _assessed(part: Track, force: Track, lag: float, elsewhere: float, noise_strain: float) -> _Fit:
-    shape, pace = _columns(part, force, lag)
-    left, line = _left(part, force, lag)
-    n = len(part.t)
-    variance = max(left / (n - 3), 1e-30)
-    free = _without(pace, shape)
-    information, spurious = float(free @ free), n * _pace_noise(force) ** 2
-    true = (information - spurious) * line[1] ** 2
-    level = shape[:, 1] - shape[:, 1].mean()
-    bent = _without(level**2, np.column_stack([shape, pace]))
-    curved = abs(float(bent @ part.values)) / math.sqrt(float(bent @ bent) * variance)
-    expected = max(noise_strain, 1e-15) ** 2 * (1 + 5 * math.sqrt(2 / n))
+def _assessed(model: _Model, force: Track, lag: float, elsewhere: float) -> _Fit:
+    n = float(model.weight @ model.weight)
+    variance = max(model.left / max(n - 4, 1.0), 1e-30)
+    pace = model.pace(force)
+    free = _without(pace, model.shape)
+    information, spurious = float(free @ free), n * (model.found[1] * _pace_noise(force)) ** 2
+    level = _without(model.shape[:, 1], model.shape[:, :1])
+    bent = _without(model.shape[:, 2], np.column_stack([model.shape[:, :2], pace]))
+    curved = abs(float(bent @ model.values)) / math.sqrt(max(float(bent @ bent), 1e-300) * variance)
     return _Fit(
         lag=lag,
-        sigma=math.sqrt(variance / true) if true > 0 else math.inf,
-        n=n,
-        separation=(elsewhere - left) / variance,
-        significance=abs(line[1]) * math.sqrt(float(level @ level) / variance),
-        straight=curved < _CURVED and variance < expected,
+        sigma=math.sqrt(variance / (information - spurious)) if information > spurious else math.inf,
+        n=round(n),
+        separation=(elsewhere - model.left) / variance,
+        significance=abs(model.found[1]) * math.sqrt(float(level @ level) / variance),
+        straight=curved < _CURVED and variance < model.sigma**2 * (1 + 5 * math.sqrt(2 / n)),
         known=1 - spurious / information if information > 0 else 0.0,
     )
 

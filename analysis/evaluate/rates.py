@@ -17,7 +17,7 @@ _PARTS, _IN_PART = 10, 5  # of a strain rate held against a standard, and the po
 
 def strain_rate(loading: Loading, first: int, last: int, bands: tuple[Band, ...]) -> Figure:
     """The slope of strain over time, held against the bands of a standard."""
-    t, strain = loading.t[first:last], loading.strain[first:last]
+    t, strain = (loading.t - loading.idle)[first:last], loading.strain[first:last]
     if len(t) < 3 or np.ptp(t) == 0:
         return Figure.none(f"{len(t)} points of that part are known")
     dt, de = t - t.mean(), strain - strain.mean()

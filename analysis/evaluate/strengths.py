@@ -9,10 +9,13 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.evaluate.curve import ENOUGH, Curve, Floats, Loading, first_crossing, noise, reading, smoothed
 from analysis.evaluate.elastic import FittedLine
 from analysis.evaluate.figure import Figure, quantile
+
+Indices = NDArray[np.intp]
 
 _DROP, _RANGE = (
     0.005,
@@ -22,7 +25,10 @@ _TRANSIENT, _PLATEAU = (
     0.0005,
     0.0025,
 )  # strain after ReH: its undershoot, and where ReL is looked for (clause 12)
+_BEGINS = 0.002  # plastic strain before which flow begins
+_FINE = 2.5e-4  # strain that the means may reach over where the stress waves
 _ABOUT = 0.25  # of a proof strain: the part of the curve that its stress is read from
+_PULLED = 0.5  # of the plastic strain there: the strain must grow by as much, or it is a hold
 _BEFORE = 5  # samples whose rise bounds what may lie between two of them
 _SURE = 4.0  # standard deviations that a fall must exceed
 
@@ -49,12 +55,17 @@ def proof_strength(loading: Loading, line: FittedLine, offset: float) -> Figure:
     stress = reading(loading.stress, at, first, last, loading.noise_stress)
     place = (offset - strain.value) / strain.slope if strain.slope > 0 else 0.0
     hardening = abs(stress.slope / strain.slope) if strain.slope > 0 else 0.0
+    if loading.course[last - 1] - loading.course[first] < _PULLED * (course[last - 1] - course[first]):
+        return Figure.none(
+            f"{100 * offset:g} % plastic strain is reached while the stress falls and the strain rests"
+        )
     value = stress.value + stress.slope * float(np.clip(place, -2, 2))
     doubt = math.hypot(strain.sigma, line.sigma_at(value))
     found = Figure.about(value, math.hypot(stress.sigma, hardening * doubt), max(last - first - 3, 4))
     if last - first >= ENOUGH:
-        return found
-    between = _bend(loading.stress, at) + hardening * _bend(plastic, at)
+        between = _waves(loading, at, stress.value, np.arange(first, last))
+    else:
+        between = _bend(loading.stress, at) + hardening * _bend(plastic, at)
     return replace(found, low=found.low - between, high=found.high + between)
 
 
@@ -67,10 +78,11 @@ def yield_point(loading: Loading, line: FittedLine) -> Yield:
     for k in np.flatnonzero(fallen & (np.arange(loading.n) > line.last)):
         at = int(np.argmax(loading.stress[: k + 1]))
         end = _passed(loading, at)
-        lasts = loading.course[end] - loading.course[at] >= _RANGE
-        if lasts and (end < loading.n - 1 or _begins_to_flow(loading, line, at)):
-            return Yield(highest_stress(loading, at), _lower(loading, at, end), at)
-    why = "no yield point: nowhere does the stress fall by 0.5 % for 0.05 % strain, and rise again"
+        lasts = loading.course[end] - loading.course[at] >= (_RANGE if end < loading.n - 1 else _PLATEAU)
+        if lasts and loading.course[at] - line.strain_at(loading.level[at]) < _BEGINS:
+            upper = highest_stress(loading, at)
+            return Yield(upper, _lower(loading, at, end, upper), at)
+    why = "no yield point: nowhere does the stress fall by 0.5 % for 0.05 % strain where flow begins"
     return Yield(Figure.none(why), Figure.none(why))
 
 
@@ -94,6 +106,10 @@ def highest_stress(loading: Loading, at: int) -> Figure:
     before = max(at - _BEFORE, 0)
     rise = max(float(stress[at] - stress[before]), 0.0) / max(at - before, 1)
     value = float(stress[at])
+    # Where samples lie farther apart from here on, more may lie between them.
+    steps = np.diff(loading.strain[before : at + 2])
+    if at > before and at + 1 < loading.n and steps[-1] > 2 * (usual := float(steps[:-1].mean())) > 0:
+        rise *= float(steps[-1]) / usual
     return Figure(value, value - lifted, value + quantile() * sigma + rise)
 
 
@@ -123,21 +139,31 @@ def _passed(loading: Loading, at: int) -> int:
     return at + 1 + int(again[0]) if len(again) else loading.n - 1
 
 
-def _begins_to_flow(loading: Loading, line: FittedLine, at: int) -> bool:
-    """Whether a peak that is never passed again is a yield point and not the beginning of a neck."""
-    plastic = loading.course[at] - line.strain_at(loading.level[at])
-    return bool(plastic < 4 * _RANGE and loading.course[-1] - loading.course[at] >= _PLATEAU)
+def _lower(loading: Loading, at: int, passed: int, upper: Figure) -> Figure:
+    """The lowest stress between the transient and 0.25 % after the upper yield strength.
 
-
-def _lower(loading: Loading, at: int, passed: int) -> Figure:
+    The interval reaches down to the lowest of the whole plateau, which is the other reading of the definition (3.10.2.2
+    and clause 12), and of what may lie between two samples.
+    """
     after = loading.course - loading.course[at]
-    part = np.arange(loading.n)
-    part = part[(part > at) & (part <= passed) & (after >= _TRANSIENT) & (after <= _PLATEAU)]
+    plateau = np.flatnonzero(
+        (np.arange(loading.n) > at) & (np.arange(loading.n) <= passed) & (after >= _TRANSIENT)
+    )
+    part = plateau[after[plateau] <= _PLATEAU]
     if not len(part):
         return Figure.none("the plateau is too short to tell the lower yield strength")
-    value = float(loading.level[part].min())
-    doubt = _doubt(loading)
-    return Figure(value, value - doubt, value + doubt)
+    half, level = _fine(loading, part)
+    doubt = _SURE * loading.noise_stress / math.sqrt(2 * half + 1)
+    value = float(level[part].min())
+    least = min(value, float((level - _hidden_bottom(level, max(half, 1), doubt))[plateau].min()))
+    return Figure(min(value, upper.value), least - doubt, min(value + doubt, upper.high))
+
+
+def _hidden_bottom(level: Floats, reach: int, doubt: float) -> Floats:
+    """How far a bottom may lie below each value: lifted by means, or between two samples, (N,)."""
+    bend = np.zeros(len(level))
+    bend[reach:-reach] = level[: -2 * reach] - 2 * level[reach:-reach] + level[2 * reach :]
+    return np.where(bend > 2 * doubt, bend / 2, 0.0)
 
 
 def _doubt(loading: Loading) -> float:
@@ -161,6 +187,20 @@ def _bend(values: Floats, at: float) -> float:
     if before < 1 or len(near) < 4:
         return abs(float(values[before + 1] - values[before]))
     return float(np.abs(np.diff(near, 2)).sum()) / 4
+
+
+def _fine(loading: Loading, part: Indices) -> tuple[int, Floats]:
+    """Running means of the stress over no more than a part of a wave, and half the width of them, samples."""
+    a_sample = float(np.diff(loading.course[part]).max(initial=0.0))
+    half = min(loading.half, round(_FINE / max(a_sample, 1e-12) / 2))
+    return half, loading.level if half == loading.half else smoothed(loading.stress, half)
+
+
+def _waves(loading: Loading, at: float, value: float, part: Indices) -> float:
+    """How far the stress at ``at`` may be from a parabola over ``part``: where it waves, beyond noise."""
+    half, level = _fine(loading, part)
+    off = abs(float(np.interp(at, np.arange(loading.n), level)) - value)
+    return 1.25 * off if off > _SURE * loading.noise_stress / math.sqrt(2 * half + 1) else 0.0
 
 
 def _around(course: Floats, at: float, low: float, high: float) -> tuple[int, int]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from analysis.evaluate.curve import Curve, Loading, first_crossing, noise, reading
 from analysis.evaluate.elastic import (
+    FILM,
     MIN_POINTS,
     ErrorLimits,
     FittedLine,
@@ -27,7 +28,9 @@ from analysis.evaluate.elastic import (
 )
 from analysis.evaluate.figure import Figure
 from analysis.evaluate.flow import anisotropy, hardening
+from analysis.evaluate.programme import KINDS, Kind, Programme
 from analysis.evaluate.rates import midway, seconds_of, strain_rate
+from analysis.evaluate.seen import Unseen, confirmed, unseen
 from analysis.evaluate.standards import STANDARDS, Standard
 from analysis.evaluate.strengths import (
     Yield,
@@ -40,6 +43,8 @@ from analysis.evaluate.strengths import (
 
 ZeroBy = Literal["raw", "toe", "preload"]
 
+_LINE = ("E", "E_chord", "nu")
+_OF_TENSION = ("Rp01", "Rp02", "Rp1", "ReH", "ReL", "Rm", "Agt", "Ag", "At", "A", "r", "n")
 _ROUNDS = 8
 BLUR_STRAIN = 30e-6 / 0.5**2
 """Largest error of a strain by a change of sharpness, over the variance of the blur, 1/px^2 (docs/data/accuracy.md)."""
@@ -59,16 +64,21 @@ class TensileOptions:
     preload : float, Pa
     limits : ErrorLimits
         Of what E is uncertain by beyond the scatter.
+    test : "auto" or one of ``KINDS``
+        The kind of the test: found from its course, or given.
     """
 
     standard: Standard = STANDARDS["iso6892"]
     zero: ZeroBy = "raw"
     preload: float = 0.0
     limits: ErrorLimits = field(default_factory=ErrorLimits)
+    test: str = "auto"
 
     def __post_init__(self) -> None:
         if self.zero not in ("raw", "toe", "preload"):
             raise ValueError(f"unknown zero {self.zero!r}; known: raw, toe, preload")
+        if self.test not in ("auto", *KINDS):
+            raise ValueError(f"unknown test {self.test!r}; known: auto, {', '.join(KINDS)}")
         if self.zero == "preload" and not self.preload > 0:
             raise ValueError("a zero at a preload needs that preload, in Pa above 0")
 
@@ -121,6 +131,10 @@ class TensileFigures:
         Relative standard uncertainties that the interval of E is made of, by their causes; empty without E.
     strain, elastic_strain : str
         What the strain of the curve is, and that of E and nu, in words.
+    kind : str
+        Of the test, one of ``KINDS``.
+    notes : tuple of str
+        What must be said of the test: its kind where it is no tensile one or given, forces left out, a gap.
     """
 
     E: Figure
@@ -148,6 +162,8 @@ class TensileFigures:
     strain: str = ""
     elastic_strain: str = ""
     budget: Mapping[str, float] = field(default_factory=dict)
+    kind: Kind = "tensile"
+    notes: tuple[str, ...] = ()
 
 
 def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> TensileFigures:
@@ -163,9 +179,55 @@ def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> Tensil
     -------
     TensileFigures
         E and nu carry a remark in ``why`` where the strain is not uniform over the area that they are from.
+        Strengths and extensions are known of a tensile test alone, and are bounds where forces were not seen.
     """
-    found = _evaluated(curve, options or TensileOptions())
-    return replace(found, strain=curve.source, elastic_strain=curve.elastic_source or curve.source)
+    options = options or TensileOptions()
+    sure, notes = confirmed(curve)
+    programme = Programme.of(sure, options.test)
+    if programme.why:
+        found = _untensile(_evaluated(programme.first_rise(sure), options), programme.why)
+    else:
+        gap = unseen(sure, curve)
+        found = _evaluated(sure, options) if gap is None else _bounded(_evaluated(sure, options), sure, gap)
+        notes += () if gap is None else (gap.words,)
+    if programme.why or options.test != "auto":
+        notes += (programme.words,)
+    found = _of_film(found, options.limits.film)
+    source, elastic = curve.source, curve.elastic_source or curve.source
+    return replace(found, strain=source, elastic_strain=elastic, kind=programme.kind, notes=notes)
+
+
+def _untensile(figures: TensileFigures, why: str) -> TensileFigures:
+    """Without what belongs to a tensile test; what else is not known has the same reason."""
+    none = Figure.none(why)
+    left = {name: one if one.known else none for name in _LINE for one in [getattr(figures, name)]}
+    changed: dict[str, Any] = dict.fromkeys(_OF_TENSION, none) | left
+    return replace(figures, **changed)
+
+
+def _bounded(figures: TensileFigures, curve: Curve, gap: Unseen) -> TensileFigures:
+    """Strength and extensions as bounds; those of a gap before the highest stress begin where it does."""
+    top = curve.stress == figures.Rm.value
+    early = top.any() and int(np.argmax(top)) >= gap.after >= 0
+    before = float(curve.strain[gap.before]) - figures.zero.strain
+    found = {name: getattr(figures, name) for name in ("Rm", "Agt", "Ag", "At", "A")}
+    if early and found["Agt"].known and before < found["Agt"].low:
+        elastic = found["Agt"].value - found["Ag"].value
+        found["Agt"] = replace(found["Agt"], value=before, low=before)
+        if found["Ag"].known:
+            found["Ag"] = replace(found["Ag"], value=before - elastic, low=before - elastic)
+    bounds: dict[str, Any] = {name: one.remarked(gap.words).at_least() for name, one in found.items()}
+    return replace(figures, **bounds)
+
+
+def _of_film(figures: TensileFigures, limit: float | None) -> TensileFigures:
+    """With a limit of error of strains in the figures that depend on strain; E has it in its budget."""
+    shares = dict.fromkeys(("E", "E_chord", "Rp01", "Rp02", "Rp1"), 0.0)
+    shares |= dict.fromkeys(("nu", "Agt", "Ag", "At", "A", "r", "n"), limit or 0.0)
+    limited: dict[str, Any] = {
+        name: getattr(figures, name).limited(share, FILM) for name, share in shares.items()
+    }
+    return replace(figures, **limited) if limit else figures
 
 
 def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:

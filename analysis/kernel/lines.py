@@ -28,6 +28,8 @@ SAMPLE, MAX_ZOIS = 30, 1000
 
 ROUNDS = 3
 """How often lines are taken off; each time more ZOIs show them."""
+APART = 0.5
+"""Distance of two lines in the deformed image, px, below which they count as one."""
 
 
 def mend(solution: Solution) -> None:
@@ -115,8 +117,23 @@ def _profile(solution: Solution, which: Places, left: Floats, axis: int) -> Floa
     count = np.bincount(line.ravel())
     seen = count > 0
     place, mean = (np.bincount(line.ravel(), v.ravel())[seen] / count[seen] for v in (moved, left))
-    ahead = np.append(np.diff(place) > 0, True)
+    kept = apart(place)
     lines = np.arange(ready.shape[axis])
-    near = np.abs(lines - np.interp(lines, place[ahead], place[ahead])) < 1
-    spline: Any = CubicSpline(place[ahead], mean[ahead])
+    if len(kept) < 2:
+        return np.zeros(len(lines))
+    near = np.abs(lines - np.interp(lines, place[kept], place[kept])) < 1
+    spline: Any = CubicSpline(place[kept], mean[kept])
     return np.where(near, spline(lines), 0.0)
+
+
+def apart(place: Floats) -> list[int]:
+    """Which of the places (N,), px, to take, in rising order: each at least ``APART`` beyond the one before.
+
+    The lines of ZOIs that moved apart or over one another come out of order, or on the same place, where a curve
+    through all of them has no limits.
+    """
+    kept: list[int] = []
+    for k in np.argsort(place, kind="stable").tolist():
+        if not kept or place[k] - place[kept[-1]] >= APART:
+            kept.append(k)
+    return kept

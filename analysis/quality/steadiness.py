@@ -19,6 +19,8 @@ FINE = 4
 BY_CHANCE = 5.0
 """A peak counts from ln(frequencies) + this, in means of the spectrum: once in 150 series of noise."""
 MAINS_HZ = (50.0, 60.0)
+MAX_DRIFT, CLEAR = 2e-5, 5.0
+"""Of a strain that should be still, and in units of its uncertainty: beyond both, the specimen is loaded or moves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +41,8 @@ class Steadiness:
     seconds : float, s
     rate : float or None, 1/s
         Of the series; None without times.
+    sigma_drift : float
+        Standard uncertainty of ``drift``; NaN where it is not known.
     """
 
     drift: float
@@ -47,6 +51,7 @@ class Steadiness:
     frequency: float | None
     seconds: float
     rate: float | None
+    sigma_drift: float = math.nan
 
     @property
     def vibration(self) -> float:
@@ -77,7 +82,13 @@ def steadiness(times: ArrayLike, values: ArrayLike, noise: float = 0.0) -> Stead
     rms = math.sqrt(float(rest @ rest) / (len(x) - 2))
     peak = main_frequency(t, rest) if timed else None
     rate = 1 / float(np.median(np.diff(t))) if timed else None
-    return Steadiness(float(slope), rms, noise, peak, span, rate)
+    sigma = max(rms, noise) / math.sqrt(float(((place - place.mean()) ** 2).sum()))
+    return Steadiness(float(slope), rms, noise, peak, span, rate, sigma)
+
+
+def strain_drifts(drift: float, sigma: float) -> bool:
+    """Whether a strain that should be still has changed by ``drift``, whose uncertainty is ``sigma``; NaN: no."""
+    return abs(drift) > MAX_DRIFT and abs(drift) > CLEAR * sigma
 
 
 def main_frequency(times: Floats, values: Floats) -> float | None:

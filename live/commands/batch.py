@@ -5,27 +5,31 @@ from __future__ import annotations
 import argparse
 import math
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 from acquire.errors import ConfigError
 from acquire.system import cores
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import (
-    MEASURE,
+    FORCES,
+    OF_PICTURES,
     add_as_measured,
     add_config_file,
     add_help_all,
     add_metadata,
     add_options,
+    add_picture_order,
     add_section,
     add_time_span,
     add_verbose,
+    in_picture_order,
     overrides,
 )
 from live.commands.signals import signals
 from live.ui.terminal.screen import TerminalScreen
 
-OUTPUT = ("axis", "standard", "zero", "lag")
+OUTPUT = ("axis", "standard", "test", "zero", "lag")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,8 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_as_measured(parser)
     add_time_span(parser)
     add_config_file(parser)
-    add_options(parser, "measurement", *MEASURE)
+    add_picture_order(parser, dest="measure.order")
+    add_options(parser, "measurement", *OF_PICTURES)
     add_options(parser, "evaluation", *OUTPUT)
+    add_options(parser, "files of forces", *FORCES)
     add_section(parser)
     add_metadata(parser)
     add_verbose(parser)
@@ -64,7 +70,11 @@ def command(arguments: argparse.Namespace) -> int:
     if arguments.workers < 1:
         raise ConfigError(f"--workers {arguments.workers} is not possible; allowed: from 1")
     request = CampaignRequest(
-        tests=find_tests(arguments.tests),
+        tests=[
+            replace(test, source=in_picture_order(test.source, arguments.picture_order))
+            for test in find_tests(arguments.tests)
+        ],
+        reference=arguments.reference,
         out=Path(arguments.folder),
         workers=arguments.workers,
         config=arguments.config,

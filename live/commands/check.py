@@ -32,6 +32,7 @@ from live.config.loading import Config
 from live.config.sides import second_camera, side_configs
 from live.setup.check.budget import budget_lines
 from live.setup.check.check_list import CheckFigures, examine, table_lines
+from live.setup.check.disk import disk_lines, write_rate
 from live.setup.check.sample import take
 from live.setup.check.verdict import DEFAULT_TARGET, check_lines
 from live.setup.devices import check_load_port, open_load
@@ -46,6 +47,7 @@ LISTEN_S = 3.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic check``."""
     add_options(parser, "devices", "camera", "back", "beside", "crop", "dark", "flat", "load")
+    add_options(parser, "recording of the test", "record", "no-record", "seconds", "out")
     parser.add_argument(
         "--target", type=float, metavar="UM_M", help="largest strain noise of one ZOI for the test, um/m"
     )
@@ -85,16 +87,18 @@ def command(arguments: argparse.Namespace) -> int:
             screen.print(f"--watch looks at the {first} only; without it both cameras are checked")
         with interrupts() as stop:
             figures = watch(one, target, screen, stop.is_set)
-        ready = _shown(figures, one, target, snapshots[first], screen)
+        rate = write_rate(figures.stack, config)
+        ready = _shown(figures, one, target, snapshots[first], screen, rate)
         screen.print(_verdict([figures], ready))
         return 0 if ready else NOT_READY
     stacks = {name: take(one, report_warnings(screen.print)) for name, one in cameras.items()}
+    rate = sum(write_rate(stacks[name], one) for name, one in cameras.items())
     load, every, ready = _load(config), list[CheckFigures](), True
     for name, one in cameras.items():
         if name:
             screen.print(f"{name}: {one.camera.address}")
         every.append(examine(stacks[name], one, load))
-        ready &= _shown(every[-1], one, target, snapshots[name], screen)
+        ready &= _shown(every[-1], one, target, snapshots[name], screen, rate)
         if name:
             screen.print("")
     screen.print(_verdict(every, ready))
@@ -110,13 +114,21 @@ def _snapshot_of(name: str, given: str | None) -> Path | None:
 
 
 def _shown(
-    figures: CheckFigures, config: Config, target: float | None, path: Path | None, screen: TerminalScreen
+    figures: CheckFigures,
+    config: Config,
+    target: float | None,
+    path: Path | None,
+    screen: TerminalScreen,
+    rate: float,
 ) -> bool:
-    """Print the figures of one camera, and draw them where that is asked; whether it is ready."""
+    """Print the figures of one camera, and draw them where that is asked; whether it is ready.
+
+    ``rate``: what the recording of all cameras writes, bytes/s.
+    """
     if path is not None:
         write_picture(path, _drawn(figures, config, target))
         screen.print(f"written: {path}")
-    lines = check_lines(figures, target, config.measure.reference_shift_px)
+    lines = [*check_lines(figures, target, config.measure.reference_shift_px), *disk_lines(rate, config)]
     budget = budget_lines(figures, config)
     for line in [
         *(line.text() for line in lines),

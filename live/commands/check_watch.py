@@ -15,6 +15,7 @@ from live.config.loading import Config
 from live.config.sections import DEFAULT_REFERENCE_BURST
 from live.pipeline.screen import Screen
 from live.setup.check.check_list import CheckFigures
+from live.setup.check.disk import disk_lines, write_rate
 from live.setup.check.quick_check import QUICK_FRAMES, QuickCheck, QuickChecker, RollingFrames
 from live.setup.check.verdict import CheckLine, check_lines
 from live.setup.devices import at_rest, open_rig
@@ -54,7 +55,10 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
                 stack = rolling.newest(QUICK_FRAMES)
                 if stack is not None:
                     quick = checker.check(stack)
-                    lines = check_lines(quick.figures, target, config.measure.reference_shift_px)
+                    lines = [
+                        *check_lines(quick.figures, target, config.measure.reference_shift_px),
+                        *disk_lines(write_rate(stack, config), config),
+                    ]
                     shown = [
                         *notes[-MAX_NOTES:],
                         peak_line(quick),

@@ -9,7 +9,7 @@ from functools import partial
 from acquire.addresses import Options, parse_address
 from acquire.events import EventKind, Level
 from acquire.serial_line.ports import LineSettings
-from live.config.channels import DEFAULT_CHANNELS, joint_channels
+from live.config.channels import DEFAULT_CHANNELS, OF_LOAD, joint_channels
 from live.config.gauges import outlines
 from live.config.listen_address import ListenAddress, read_token
 from live.config.loading import Config
@@ -77,7 +77,12 @@ def _lines(about: RunInfo, run_state: RunState, joint: JointChannels | None) -> 
     config, start = about.config, about.start.monotonic
     gauges = tuple(f"{prefix}gauge_{name}" for name in config.gauges for prefix in ("", "sigma_"))
     both = () if joint is None else joint_channels(config.gauges)
-    channels = config.strain_out.channels or (*DEFAULT_CHANNELS, *gauges, *both)
+    wanted = config.strain_out.channels or (*DEFAULT_CHANNELS, *gauges, *both)
+    absent = {
+        *(() if run_state.with_load else OF_LOAD),
+        *(() if config.specimen.area_m2 else ("stress_MPa",)),
+    }
+    channels = [channel for channel in wanted if channel not in absent]
     more = dict if joint is None else partial(joint.read, start)
     return LineFormat(ChannelValues(start, run_state.snapshot, more), channels, config.strain_out.format)
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import argparse
 import math
+import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -17,6 +19,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.addresses import parse_address, with_setting
+from acquire.frame import Frame
 from analysis import PICTURE_KINDS
 from analysis.evaluate import AreaStrain
 from analysis.field import Status, StrainField, Sums
@@ -26,8 +30,8 @@ from live.commands.run import print_outcome, run_attended
 from live.config.loading import Config
 from live.config.values import AUTO
 from live.pipeline.consumer import Consumer
-from live.pipeline.measurement import Measurement
-from live.results.figures import evaluate, tensile_table
+from live.pipeline.measurement import AXIAL, Measurement
+from live.results.figures import tensile_table
 from live.results.folder import check_folder
 from live.run.outcome import Outcome
 from live.setup.compiling import compile_ahead
@@ -36,13 +40,24 @@ from live.ui.terminal.screen import TerminalScreen
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid
+    from analysis.evaluate import TensileFigures
     from hw_mocks.specimen import VirtualSpecimen
+    from live.run.live_run import LiveRun
 
 Array = NDArray[np.float64]
 WIDTH_MM, THICKNESS_MM = 20.0, 2.0
 SPECIMENS = ("woven", "uniform", "hole")
 RELATIVE = 0.0005  # of the strain, beside three times the predicted uncertainty
 MIN_WITHIN = 0.97  # 99 % are to be expected; of 150 values, chance takes one in a few runs below that
+FAR = 2.5  # half intervals of E: beyond it, chance takes one run in a million
+ELASTIC_BURSTS = 56
+"""Bursts that the elastic part is to have: 40 are left where a machine becomes slower by a third during the test."""
+ELASTIC_SHARE, SHORTEST_S, LONGEST_S = 0.6, 17.0, 150.0
+"""Share of the pull up to yield; limits of its length, s."""
+RATE_BURSTS, LEAD_S, LONGEST_WAIT_S = 6, 0.5, 120.0
+"""Bursts that give the rate of this machine; s from then to the pull, and from the start to it at the longest."""
+SLOW_FPS, SMALL = 5.0, {"width": 320, "height": 256, "hole": 30, "cell": 48}
+"""Below this rate of the whole picture, a quarter of it is taken: half of all lengths."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,25 +77,38 @@ def command(arguments: argparse.Namespace) -> int:
     check_folder(config.output.dir)
     # All that the next commands need too: 8-bit pictures, and a batch.
     compile_ahead(PICTURE_KINDS, phase=True, show=screen.status)
-    collector = MeansCollector()
+    config = replace(config, camera=replace(config.camera, address=fitting(config.camera.address)))
+    collector, operator = MeansCollector(), Operator(config.output.seconds)
     # The whole picture is specimen: it is only looked at where gauges are to be placed.
     with located(config, screen.print) if config.measure.gauges == AUTO else nullcontext(config) as config:
-        outcome = run_attended(config, screen, [collector])
+        outcome = run_attended(config, screen, [collector, operator], operator.attend)
     print_outcome(outcome, screen, verbose=arguments.verbose)
     if outcome.rig.specimen is None or not collector.measurements:
         return outcome.exit_code
     code = compare(outcome, collector, config, screen.print)
-    return outcome.exit_code or code
+    return code if code == 1 else outcome.exit_code or code
+
+
+def fitting(address: str) -> str:
+    """The address with a smaller picture where this machine is slow, and the rate is not given."""
+    from hw_mocks.sim_camera import fps_on_this_machine
+
+    parsed = parse_address(address)
+    if ("fps", "auto") in parsed.settings and fps_on_this_machine(parsed) < SLOW_FPS:
+        for key, value in SMALL.items():
+            address = with_setting(address, key, value)
+    return address
 
 
 def _defaults(arguments: argparse.Namespace) -> dict[str, Any]:
     section = WIDTH_MM * THICKNESS_MM
     given = getattr(arguments, "output.seconds")
-    seconds = f"&seconds={given:g}" if given else ""
+    wait, seconds = (LONGEST_WAIT_S, LONGEST_WAIT_S + SHORTEST_S) if given is None else (given / 2, given)
     fps = "auto" if arguments.fps is None else f"{arguments.fps:g}"
     return {
         "camera.address": (
-            f"sim:{arguments.specimen}?bits=12&fps={fps}&buffers=64&section_mm2={section:g}{seconds}"
+            f"sim:{arguments.specimen}?bits=12&fps={fps}&buffers=64&section_mm2={section:g}"
+            f"&waits=yes&hold={wait:g}&seconds={seconds:g}"
         ),
         "load.address": "sim:",
         "specimen.width_mm": WIDTH_MM,
@@ -109,19 +137,68 @@ def _strains(field: StrainField) -> tuple[float, float, float]:
     return area.value("exx"), area.value("eyy"), area.value("exy")
 
 
+class Operator(Consumer):
+    """Lets the rig pull once there is a reference, so slowly that this machine measures enough in the elastic part.
+
+    Parameters
+    ----------
+    seconds : float or None, s
+        Length of the whole test where it is given: then the pull takes what is left.
+    clock : callable giving monotonic seconds
+    """
+
+    name = "operator of the rig"
+    blocks = False
+
+    def __init__(self, seconds: float | None, clock: Callable[[], float] = time.monotonic) -> None:
+        self._seconds, self._clock = seconds, clock
+        self._measured: deque[tuple[float, float]] = deque(maxlen=RATE_BURSTS)
+        self._specimen: VirtualSpecimen | None = None
+        self._lead_s = LEAD_S
+
+    def attend(self, live: LiveRun) -> None:
+        """Operate the rig of this run."""
+        self.operate(live.rig.specimen, live.rig.camera.info.fps)
+
+    def operate(self, specimen: VirtualSpecimen | None, fps: float | None) -> None:
+        """Operate the machine of ``specimen``; pictures are made up to one period of ``fps`` (1/s) beforehand."""
+        self._specimen, self._lead_s = specimen, LEAD_S + 1 / (fps or 1.0)
+
+    def measurement(self, measurement: Measurement) -> None:
+        """Start the pull where the rate of the bursts is known: the lower of that of their times and of the results."""
+        pull = None if self._specimen is None else self._specimen.programme.pull
+        if self._specimen is None or pull is None or pull.told is not None:
+            return
+        now = self._clock()
+        self._measured.append((measurement.t, now))
+        begins_s = self._specimen.elapsed(now) + self._lead_s
+        if self._seconds is not None:
+            pull.start(begins_s, max(self._seconds - begins_s - self._specimen.programme.end_s, 0.1))
+        elif len(self._measured) == RATE_BURSTS:
+            period_s = max(np.subtract(self._measured[-1], self._measured[0])) / (RATE_BURSTS - 1)
+            wanted_s = ELASTIC_BURSTS * period_s / ELASTIC_SHARE
+            pull.start(begins_s, float(np.clip(wanted_s, SHORTEST_S, LONGEST_S)))
+
+
 class MeansCollector(Consumer):
-    """Collects the means of all measurements."""
+    """Collects the means of all measurements, and the times of all frames by their numbers."""
 
     name = "comparison with the truth"
     blocks = False
 
     def __init__(self) -> None:
         self.measurements: list[MeasuredMeans] = []
+        self._times: dict[int, float] = {}
+
+    def frame(self, frame: Frame) -> None:
+        """Keep its time: those of a busy machine are not evenly spaced."""
+        self._times[frame.index] = frame.t
 
     def measurement(self, measurement: Measurement) -> None:
         """Keep the means of the small strains, their sigmas and their ZOIs; the truth is a small strain."""
         m, i = measurement, measurement.time_step
-        times = m.t + np.linspace(-0.5, 0.5, m.burst.n) * m.burst.duration
+        even = m.t + np.linspace(-0.5, 0.5, m.burst.n) * m.burst.duration
+        times = np.array([self._times.get(m.burst.first_index + k, t) for k, t in enumerate(even)])
         self.measurements.append(
             MeasuredMeans(
                 times,
@@ -148,11 +225,12 @@ class ZoiTruth:
         self._specimen, self._grid = specimen, grid
         half = (grid.size - 1) / 2
         place = np.arange(grid.size) - half
-        sigma = grid.size / 6
-        self._w = np.exp(-(place**2) / (2 * sigma**2))
-        self._w /= self._w.sum()
-        self._wx = self._w * place / (self._w @ place**2)
+        weight = np.exp(-(place**2) / (2 * (grid.size / 6) ** 2))
+        weight /= weight.sum()
+        slope = weight * place / (weight @ place**2)
         self._x0, self._y0 = grid.x[0] - half, grid.y[0] - half
+        self._down = [_windows(grid.y, self._y0 + half, one) for one in (weight, slope)]
+        self._across = [_windows(grid.x, self._x0 + half, one).T for one in (weight, slope)]
         columns = np.arange(round(grid.x[-1] + half) + 1 - round(self._x0)) + round(self._x0)
         rows = np.arange(round(grid.y[-1] + half) + 1 - round(self._y0)) + round(self._y0)
         self._x, self._y = np.meshgrid(columns + float(corner[0]), rows + float(corner[1]))
@@ -176,21 +254,27 @@ class ZoiTruth:
 
     def _parameters(self, t: float) -> tuple[Array, Array, Array, Array, Array, Array]:
         u, v = self._specimen.displacement(self._x, self._y, t)
-        return self._value(u), *self._gradient(u), self._value(v), *self._gradient(v)
+        # Weighted least squares of a plane: the weight is even, so the slopes separate.
+        (mean_y, slope_y), (mean_x, slope_x) = self._down, self._across
+        along_u, along_v = _product(mean_y, u), _product(mean_y, v)
+        return (
+            _product(along_u, mean_x), _product(along_u, slope_x), _product(_product(slope_y, u), mean_x),
+            _product(along_v, mean_x), _product(along_v, slope_x), _product(_product(slope_y, v), mean_x),
+        )  # fmt: skip
 
-    def _value(self, d: Array) -> Array:
-        return self._moved(self._moved(d, self._w, axis=0), self._w, axis=1)
 
-    def _gradient(self, d: Array) -> tuple[Array, Array]:
-        """Weighted least squares of a plane: the weight is even, so the slopes separate."""
-        along_x = self._moved(d, self._w, axis=0)
-        along_y = self._moved(d, self._wx, axis=0)
-        return self._moved(along_x, self._wx, axis=1), self._moved(along_y, self._w, axis=1)
+def _product(a: Array, b: Array) -> Array:
+    """Of two matrices, by this thread alone: those of BLAS wait for each other on a busy machine."""
+    return np.asarray(np.einsum("ij,jk->ik", a, b))
 
-    def _moved(self, d: Array, weights: Array, axis: int) -> Array:
-        windows = np.lib.stride_tricks.sliding_window_view(d, len(weights), axis=axis)
-        chosen = windows[:: self._grid.step] if axis == 0 else windows[:, :: self._grid.step]
-        return np.asarray(chosen @ weights)
+
+def _windows(centres: Array, first: float, weights: Array) -> Array:
+    """(N, P): a row for each of N ZOIs that begins where it begins, and has the weights of its P pixels."""
+    begins = np.rint(centres - first).astype(int)
+    rows = np.zeros((len(begins), begins[-1] + len(weights)))
+    for row, begin in zip(rows, begins, strict=True):
+        row[begin : begin + len(weights)] = weights
+    return rows
 
 
 def middle_of(specimen: VirtualSpecimen, times: Array) -> float:
@@ -209,7 +293,7 @@ def compare(
     assert specimen is not None
     crop = config.camera.crop or (0, 0, 0, 0)
     truth = ZoiTruth(specimen, outcome.grid, (crop[0], crop[1]))
-    ratios, errors = [], []
+    ratios, errors, last = [], [], None
     for m in collector.measurements:
         times = np.array([specimen.elapsed(t) for t in m.times])
         elapsed = middle_of(specimen, times)
@@ -218,21 +302,44 @@ def compare(
         if times[-1] <= specimen.yield_s:
             ratios.append([np.abs(error) / (RELATIVE * np.abs(true) + k * sigma) for k in (3, 5)])
             errors.append(error)
+            last = (elapsed, m)
     print_line("")
     print_line("against the simulated truth (elastic part; exx, eyy, exy):")
-    agreed = _print_strain(np.array(ratios), np.array(errors), print_line)
+    # Without a measured instant nothing is wrong: the machine was too slow, and E is not known.
+    agreed = _print_strain(np.array(ratios), np.array(errors), print_line) or not ratios
     _print_force(outcome, specimen, print_line)
-    figures = evaluate(outcome.run_state.history, outcome.run_state.loads, config.specimen)
-    rows = tensile_table(figures, stresses=True)
-    by = f" by {figures.elastic_strain}" if figures.E.known else ""
-    print_line(f"  E  {rows['E'].text}{by}, true {specimen.E / 1e9:g} GPa")
-    print_line(f"  nu {rows['nu'].text}, true {specimen.nu:g}")
+    figures = outcome.test.figures
+    there = specimen.E, specimen.nu
+    # In an uneven field (the hole) the strain of the region is not that of a specimen without it.
+    if figures.E.known and last is not None and AXIAL not in config.gauges:
+        exx, eyy, _ = truth.region(last[0], last[1].valid, last[1].pattern)
+        there = float(specimen.stress(last[0])) / eyy, -exx / eyy
+    agreed &= _print_modulus(figures, specimen, there, print_line)
     if agreed and not figures.E.known and not outcome.exit_code:
         print_line(
-            f"exit code {LOSS}: E was not measured ({figures.E.why}); end other programs, or give --fps 5"
+            f"exit code {LOSS}: E was not measured ({figures.E.why}); end other programs, or give a smaller --burst"
         )
         return LOSS
     return 0 if agreed else 1
+
+
+def _print_modulus(
+    figures: TensileFigures,
+    specimen: VirtualSpecimen,
+    there: tuple[float, float],
+    show: Callable[[str], None],
+) -> bool:
+    """E and nu against the truth ``there``; False where E is far off."""
+    rows, off = tensile_table(figures, stresses=True), 0.0
+    true, true_nu = f"true {specimen.E / 1e9:g} GPa", f"true {specimen.nu:g}"
+    if figures.E.known:
+        off = abs(rows["E"].figure.value - there[0] / 1e9) / rows["E"].half
+        held = "within its interval" if off <= 1 else f"off by {off:.1f} times its interval"
+        true = f"by {figures.elastic_strain}: {held}, true {there[0] / 1e9:.5g} GPa there ({true} of the material)"
+        true_nu = f"true {there[1]:.4g} there ({true_nu})"
+    show(f"  E  {rows['E'].text}, {true}")
+    show(f"  nu {rows['nu'].text}, {true_nu}")
+    return off <= FAR
 
 
 def _print_strain(ratios: Array, errors: Array, print_line: Callable[[str], None]) -> bool:

@@ -7,9 +7,12 @@ is stored under "section.key".
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from acquire.addresses import parse_address, with_setting
+from acquire.camera import with_scheme
 from acquire.errors import ConfigError
 from live.commands.arguments import HELP_ALL, not_empty
 from live.config.loading import Config, lens_in, load_config, options
@@ -18,8 +21,12 @@ MEASURE = (
     "roi", "mask", "zoi", "step", "gauges", "scale", "burst", "reference-burst", "window", "estimator", "strain",
     "order", "bending", "noise",
 )  # fmt: skip
-OUTPUT = ("out", "no-view", "no-rrd", "light", "axis", "standard", "zero", "lag", "report")
+OUTPUT = ("out", "no-view", "no-rrd", "light", "axis", "standard", "test", "zero", "lag", "report")
+FORCES = ("load-unit", "load-column", "load-decimal", "load-sign")
 PICTURES = (".png", ".tif")
+PICTURE_ORDERS = ("name", "time")
+OF_PICTURES = tuple(name for name in MEASURE if name != "order")
+"""``MEASURE`` for commands with ``add_picture_order``."""
 
 
 def add_options(parser: argparse.ArgumentParser, title: str, *names: str) -> None:
@@ -52,10 +59,40 @@ def _reader(read: Any) -> Any:
     return reader
 
 
-def add_measure(parser: argparse.ArgumentParser, *output: str) -> None:
-    """Add the options of measurement, and ``output``: by default all of ``OUTPUT``."""
+class _Order(argparse.Action):
+    """``--order``: name or time of pictures, or the order of the shape function, each in its place."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, *_: Any
+    ) -> None:
+        setattr(namespace, "picture_order" if values in PICTURE_ORDERS else self.dest, values)
+
+
+def add_picture_order(parser: argparse.ArgumentParser, read: Any = int, **more: Any) -> None:
+    """Add --reference, and --order for pictures and, by ``read``, for shape functions."""
+    words = "picture that the others are compared with, of the source or any other (default: the first)"
+    parser.add_argument("--reference", metavar="NAME", help=words)
+    words = "order of pictures where their names do not say it: name or time; or of the shape function of a ZOI: 1 or 2"
+    reader = lambda word: word if word in PICTURE_ORDERS else read(word)  # noqa: E731
+    parser.add_argument(
+        "--order", action=_Order, type=_reader(reader), metavar="name|time|N", help=words, **more
+    )
+    parser.set_defaults(picture_order=None)
+
+
+def in_picture_order(source: str, order: str | None) -> str:
+    """The address of pictures with the ``order`` that was given; raises ConfigError for other sources."""
+    if order is None:
+        return source
+    if parse_address(with_scheme(source)).scheme != "files":
+        raise ConfigError(f"--order {order}: {source} has an order of its own; it is for pictures in files")
+    return with_setting(source, "order", order)
+
+
+def add_measure(parser: argparse.ArgumentParser, *output: str, measure: Sequence[str] = MEASURE) -> None:
+    """Add the options of ``measure``, and ``output``: by default all of ``OUTPUT``."""
     add_config_file(parser)
-    add_options(parser, "measurement", *MEASURE)
+    add_options(parser, "measurement", *measure)
     add_options(parser, "output", *(output or OUTPUT))
     add_section(parser)
     add_lens(parser)

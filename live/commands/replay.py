@@ -10,7 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from live.commands.exit_codes import EXIT_WORDS
-from live.commands.options import add_as_measured, add_measure, add_time_span, overrides
+from live.commands.options import (
+    FORCES,
+    OF_PICTURES,
+    add_as_measured,
+    add_measure,
+    add_options,
+    add_picture_order,
+    add_time_span,
+    in_picture_order,
+    overrides,
+)
 from live.commands.sides import TABLE, put_together
 from live.commands.signals import signals
 from live.config.sides import BACK, FRONT, SIDES
@@ -34,10 +44,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_as_measured(parser)
     add_time_span(parser)
-    parser.add_argument("--reference", metavar="FILE", help="reference picture (default: the first)")
-    words = "forces by file or time_s: a CSV with a header such as file,force_kN"
+    add_picture_order(parser, dest="measure.order")
+    words = "forces: the export of a testing machine, or a CSV with a header such as file,force_kN or time_s,force_N"
     parser.add_argument("--load", dest="forces", metavar="FILE.csv", help=words)
-    add_measure(parser)
+    add_options(parser, "file of forces", *FORCES)
+    add_measure(parser, measure=OF_PICTURES)
 
 
 def command(arguments: argparse.Namespace) -> int:
@@ -49,7 +60,7 @@ def command(arguments: argparse.Namespace) -> int:
     from live.results.sides.folder import recorded_sides_in
 
     request = ReplayRequest(
-        source=arguments.source,
+        source=in_picture_order(arguments.source, arguments.picture_order),
         as_measured=arguments.as_measured,
         start_s=arguments.start_s,
         end_s=arguments.end_s,
@@ -74,7 +85,7 @@ def _print(done: Replayed, screen: Screen, *, verbose: bool = False, with_report
     print_summary(
         screen,
         done.run_state,
-        done.config.specimen,
+        done.test,
         done.folder,
         done.lines,
         verbose=verbose,

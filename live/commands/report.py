@@ -14,6 +14,7 @@ from live.commands.options import add_gauge_option
 from live.config.sides import SIDES
 from live.pipeline.screen import Screen
 from live.results.export.atomic_file import check_free, new_file
+from live.results.finished.figures_file import FILE, FiguresFile
 from live.results.quantities import Display
 from live.results.report.comparison import compare, tests_of, write_table
 from live.results.report.report import Report, ReportRequest, make_report
@@ -71,7 +72,7 @@ def command(arguments: argparse.Namespace) -> int:
                 write_table(tests, file)
             screen.print(str(out.with_suffix(".csv")))
         else:
-            report = make_report(found[0], _request(arguments, found[0]), screen)
+            report = _reported(found[0], _request(arguments, found[0]), screen)
         for note in (note for run in found for note in run.notes):
             screen.print(f"note: {note}")
     _save(report, out, arguments, screen)
@@ -112,14 +113,24 @@ def write_report(folder: Path, screen: Screen) -> str:
             screen.print(f"  {folder / 'report.html'}")
             return ""
         with open_run(folder) as run:
-            save_page(
-                make_report(run, ReportRequest(mm_per_px=run.mm_per_px), screen), folder / "report.html"
-            )
+            report = _reported(run, ReportRequest(mm_per_px=run.mm_per_px), screen)
+            save_page(report, folder / "report.html")
         screen.print(f"  {folder / 'report.html'}")
     except PhasedicError as error:
         screen.print(f"warning: no report was made: {error}")
         return str(error)
     return ""
+
+
+def _reported(run: RunFolder, wanted: ReportRequest, screen: Screen) -> Report:
+    """The report of one run, which gets its ``figures.json`` where it has none: a run that was killed wrote none."""
+    report = make_report(run, wanted, screen)
+    if report.test is not None and not (run.path / FILE).exists():
+        try:
+            FiguresFile.of(report.test, run.frame_counts or {}, 0).write(run.path)
+        except PhasedicError as error:
+            screen.print(f"note: {error}")
+    return report
 
 
 def _request(arguments: argparse.Namespace, run: RunFolder) -> ReportRequest:

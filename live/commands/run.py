@@ -91,7 +91,7 @@ def run_with_page(controller: PageController, config: Config, screen: Screen) ->
     outcome = run_attended(config, screen, [controller.begin(config)], controller.attach)
     print_outcome(outcome, screen)
     words = EXIT_WORDS.get(outcome.exit_code, "")
-    controller.end(run_result(outcome.run_state, outcome.config.specimen, outcome.folder, words))
+    controller.end(run_result(outcome.run_state, outcome.test, outcome.folder, words))
     return outcome
 
 
@@ -130,9 +130,7 @@ def print_outcome(outcome: Outcome, screen: Screen, *, verbose: bool = False) ->
     if verbose and rrd.exists():
         lines.append(f"open the recorded view with: {rerun_command()} {rrd}")
     report = outcome.config.output.report
-    print_summary(
-        screen, run_state, outcome.config.specimen, folder, lines, verbose=verbose, with_report=report
-    )
+    print_summary(screen, run_state, outcome.test, folder, lines, verbose=verbose, with_report=report)
     if report:
         from live.commands.report import write_report
 

@@ -13,7 +13,15 @@ import numpy as np
 
 from acquire.errors import ConfigError
 from acquire.printable import counted
-from live.commands.options import add_config_file, add_help_all, add_options, add_verbose, overrides
+from live.commands.options import (
+    add_config_file,
+    add_help_all,
+    add_options,
+    add_picture_order,
+    add_verbose,
+    in_picture_order,
+    overrides,
+)
 from live.config.values import AUTO
 from live.results.export.atomic_file import check_free, new_folder
 from live.results.report.saving import save_figures
@@ -41,9 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--step", type=_numbers, metavar="PX,PX", help="distances of ZOIs (default: a quarter of the side)"
     )
-    parser.add_argument(
-        "--order", type=_numbers, default=[1], metavar="1,2", help="orders of the shape function (default 1)"
-    )
+    add_picture_order(parser, _numbers, default=[1])
     parser.add_argument(
         "--window",
         type=_windows,
@@ -77,8 +83,10 @@ def command(arguments: argparse.Namespace) -> int:
     check_free(out)
     settings, found = _settings(arguments), []
     config_file = Path(arguments.config) if arguments.config else None
-    request = ReplayRequest(arguments.source, False, None, None, None, config_file, overrides(arguments))
+    source = in_picture_order(arguments.source, arguments.picture_order)
+    request = ReplayRequest(source, False, None, None, arguments.reference, config_file, overrides(arguments))
     with open_source(request) as (material, config):
+        screen.print(material.words)
         if AUTO in (config.measure.roi, config.measure.gauges):
             raise ConfigError(
                 "a study does not look for the specimen; give --roi x,y,width,height or all, or the --mask that"

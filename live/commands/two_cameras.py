@@ -51,8 +51,8 @@ def run_sides_with_page(
     outcome, both = _run(configs, screen, controller.begin_all(configs), attend)
     code = finish(outcome, both)
     states = {name: one.run_state for name, one in outcome.sides.items()}
-    specimen = next(iter(outcome.sides.values())).config.specimen
-    controller.end(sides_result(states, specimen, outcome.folder, EXIT_WORDS.get(code, "")))
+    tests = {name: one.test for name, one in outcome.sides.items()}
+    controller.end(sides_result(states, tests, outcome.folder, EXIT_WORDS.get(code, "")))
     return outcome.folder, code
 
 
@@ -90,7 +90,7 @@ def finish(outcome: OutcomeOfSides, both: SidesScreen) -> int:
     screen, folder = both.screen, outcome.folder
     for name, one in outcome.sides.items():
         lines = [*trouble_lines(one.run_state, one.outputs.reports)]
-        print_summary(both.side(name), one.run_state, one.config.specimen, one.folder, lines)
+        print_summary(both.side(name), one.run_state, one.test, one.folder, lines)
     screen.print()
     code = outcome.exit_code
     try:

@@ -9,8 +9,10 @@ MEASURED_CHANNELS = {
     "frame": "sequence number of the first frame of the burst",
     "axial": "strain along the load: the gauge axial, else of the region",
     "sigma_axial": "standard uncertainty of axial",
+    "age_s": "age of the strains, s",
     "strain_rate": "rate of axial over the last second, 1/s",
     "force_N": "newest value of the load cell, N",
+    "force_age_s": "its age, s",
     "stress_MPa": "force over the area of the section",
     "exx": "strain of the region: one affine field through its valid ZOIs",
     "eyy": "strain of the region: one affine field through its valid ZOIs",
@@ -28,19 +30,30 @@ JOINT_CHANNELS = {
 }
 """Of a test with two cameras, front and back."""
 _JOINT = ("mean_", "bending_", "sigma_mean_")
+STATE_CHANNELS = {
+    "state": "of the strains: live, old, unknown, not yet, paused, ended",
+    "force_state": "of the force: live, old, unknown, overload, underload, not yet, ended",
+}
+"""Words, of the strain output alone."""
 SYSTEM_CHANNELS = {
     "silent_s": "time since the last frame, s",
-    "load_silent_s": "time since the last sample of the load cell, s",
+    "load_silent_s": "time since the last value of the load cell, s",
     "disk_min": "time until the disk is full, minutes",
 }
+OF_LOAD = ("force_N", "force_age_s", "force_state", "stress_MPa")
+"""Channels that there are with a load cell alone."""
 DEFAULT_CHANNELS = (
     "time_s",
     "frame",
     "axial",
     "sigma_axial",
     "strain_rate",
+    "age_s",
+    "state",
     "force_N",
     "stress_MPa",
+    "force_age_s",
+    "force_state",
     "lost_share",
     "latency_s",
 )
@@ -51,7 +64,12 @@ def channel_names(gauges: Iterable[str], *, system: bool = False) -> tuple[str, 
     """All channels of a test with these gauges: ``gauge_NAME`` and ``sigma_gauge_NAME`` as in the files."""
     gauges = tuple(gauges)
     own = (f"{prefix}gauge_{name}" for name in gauges for prefix in ("", "sigma_"))
-    return (*MEASURED_CHANNELS, *own, *joint_channels(gauges), *(SYSTEM_CHANNELS if system else ()))
+    return (
+        *MEASURED_CHANNELS,
+        *own,
+        *joint_channels(gauges),
+        *(SYSTEM_CHANNELS if system else STATE_CHANNELS),
+    )
 
 
 def joint_channels(gauges: Iterable[str]) -> tuple[str, ...]:

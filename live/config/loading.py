@@ -280,6 +280,8 @@ def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:
     for number, alarm in enumerate(alarms, 1):
         if (alarm.above is None) is (alarm.below is None):
             raise ConfigError(f"{where}: alarm {number}: give one of above and below")
+        if alarm.end_on_unknown and not alarm.end:
+            raise ConfigError(f"{where}: alarm {number}: end_on_unknown needs end = true")
     return alarms
 
 

@@ -18,6 +18,7 @@ from live.config.values import (
     RECORD_MODE,
     RECTANGLE,
     REGION,
+    SIGN,
     SIZE,
     STRAINS,
     TEXT,
@@ -74,6 +75,15 @@ class LoadConfig:
         Option("lag", "S", expert=True))
     zero_N: float = key(number(-1e9, 1e9), 0.0,
         "force from which forces count, N; the page sets it for one test, where the operator tares before it")
+    unit: str | None = key(TEXT, None,
+        "unit of the force in a file, N, kN, kgf, lbf; N,ms: that of its times too (default: as the file says)",
+        Option("load-unit", "UNIT"))
+    column: str | None = key(TEXT, None,
+        "column of the force in a file, by heading or number from 1; FORCE,TIME: that of times or names too",
+        Option("load-column", "NAME"))
+    decimal: str | None = key(choice("point", "comma"), None,
+        "decimal mark of a file, where it can be read in two ways", Option("load-decimal"))
+    sign: int = key(SIGN, 1, "-1: the force of a file or recording is negative in tension", Option("load-sign", "SIGN"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,6 +236,7 @@ class AlarmConfig:
     hysteresis: float = key(number(0), 0.0, "distance back from the limit at which the alarm ends")
     name: str = key(TEXT, "", "name of the alarm in messages")
     end: bool = key(FLAG, False, "the alarm ends the run")
+    end_on_unknown: bool = key(FLAG, False, "also where it comes because the value is not known (with end = true)")
     line: str = key(TEXT, "", "line sent on all strain outputs when the alarm begins")
 
 
@@ -265,6 +276,9 @@ class SpecimenConfig:
     strain_error_um_m: float | None = key(number(0, 1e5), None,
         "limit of error of the strain that comes with the load over the elastic interval, um/m: motion off the plane"
         " (0.1 mm at 500 mm: 200), lens, alignment; in the interval of E")
+    film_error_percent: float | None = key(number(0, 100), None,
+        "limit of error of strains from a film whose codec makes pictures of earlier ones (H.264, VP9 ...), %: a replay"
+        " of such a film takes 10 where none is given; in the intervals of strains and of E")
     modulus_GPa: float | None = key(number(1e-6, 1e6), None,
         "modulus that is expected, GPa: phasedic check shows its budget in GPa too")
     nu: float | None = key(number(0, 0.5), None,
@@ -274,6 +288,9 @@ class SpecimenConfig:
         Option("axis"))
     standard: str = key(choice("iso6892", "iso527", "astm-d3039", "free"), "iso6892",
         "standard of the evaluation; free: only modulus_between", Option("standard", expert=True))
+    test: str = key(choice(AUTO, "tensile", "compression", "cyclic", "relaxation", "creep"), AUTO,
+        "kind of the test; strengths and extensions are those of a tensile one; auto: found from its course",
+        Option("test", expert=True))
     modulus_between: tuple[float, float] = key(STRAINS, (0.0005, 0.0025),
         "strain interval of the modulus in a free evaluation")
     zero: str = key(choice("raw", "toe", "preload"), "raw",

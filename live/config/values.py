@@ -217,6 +217,12 @@ def _strains(value: Any) -> tuple[float, float]:
     return low, high
 
 
+def _sign(value: Any) -> int:
+    if type(value) is not int or abs(value) != 1:
+        raise NotAllowed("1 or -1")
+    return value
+
+
 def _size(value: Any) -> tuple[int, int]:
     if not isinstance(value, list | tuple) or len(value) != 2:
         raise NotAllowed("two whole numbers: width, height in px")
@@ -251,6 +257,7 @@ def _names(value: Any) -> tuple[str, ...]:
 LENS_PARAMETERS = 8
 COVARIANCE = Check(_covariance)
 """Of the parameters of a lens."""
+SIGN = Check(_sign, int)
 SIZE = Check(_size)
 """width, height in px."""
 TEXT = Check(_text)

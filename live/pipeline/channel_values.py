@@ -1,13 +1,14 @@
-"""The values of the output channels at a measurement, with the newest force."""
+"""The values of the output channels at a measurement or at any moment, with the newest force."""
 
 from __future__ import annotations
 
 import math
+import time
 from collections import deque
 from collections.abc import Callable, Mapping
 
 from live.pipeline.measurement import Measurement, TimeStep
-from live.pipeline.snapshot import Snapshot
+from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
 
 RATE_S = 1.0
 """The strain rate is the slope of the axial strain over this time."""
@@ -21,41 +22,64 @@ class ChannelValues:
     start : float, s
         Time zero, monotonic.
     snapshot : callable
-        Takes a time (s, monotonic) and a TimeStep, gives the Snapshot
+        Takes a time (s, monotonic) and a TimeStep or None, gives the Snapshot
         (``live.pipeline.run_state.RunState.snapshot``).
     more : callable
         Gives the values of further channels.
+    clock : callable giving monotonic seconds
+
+    Attributes
+    ----------
+    now : Snapshot
+        That of the last reading.
     """
 
     def __init__(
         self,
         start: float,
-        snapshot: Callable[[float, TimeStep], Snapshot],
+        snapshot: Callable[[float, TimeStep | None], Snapshot],
         more: Callable[[], Mapping[str, float]] = dict,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._start, self._snapshot, self._more = start, snapshot, more
+        self._start, self._snapshot, self._more, self._clock = start, snapshot, more, clock
         self._recent: deque[tuple[float, float]] = deque()
+        self.now = Snapshot(math.nan)
 
-    def read(self, measurement: Measurement) -> dict[str, float]:
-        """All channels by name; NaN where one is not known."""
-        step = measurement.time_step
-        now = self._snapshot(step.t, step)
+    def read(self, measurement: Measurement | None = None) -> dict[str, float]:
+        """All channels by name, NaN where one is not known; without a measurement those of this moment."""
+        step = None if measurement is None else measurement.time_step
+        self.now = now = self._snapshot(self._clock(), step)
+        axial, force = now.figure(AXIAL), now.figure(FORCE)
         values = {
-            "time_s": step.t - self._start,
+            "time_s": (now.t if step is None else step.t) - self._start,
+            "axial": axial.value,
+            "sigma_axial": axial.sigma,
+            "age_s": axial.age,
+            "force_N": force.value,
+            "force_age_s": force.age,
+            "stress_MPa": now.figure(STRESS).value * 1e-6,
+        }
+        if measurement is not None:
+            values |= self._measured(measurement, measurement.time_step)
+        return {**values, **self._more()}
+
+    @property
+    def states(self) -> dict[str, str]:
+        """The channels that are words, of the last reading."""
+        return {"state": str(self.now.figure(AXIAL).state), "force_state": str(self.now.figure(FORCE).state)}
+
+    def _measured(self, measurement: Measurement, step: TimeStep) -> dict[str, float]:
+        values: dict[str, float] = {
             "frame": measurement.burst.first_index,
-            "axial": now.axial,
-            "sigma_axial": now.sigma_axial,
-            "strain_rate": self._rate(step.t, now.axial),
-            "force_N": now.force_N,
-            "stress_MPa": now.stress_Pa * 1e-6,
+            "strain_rate": self._rate(step.t, self.now.figure(AXIAL).value),
             "lost_share": 1 - step.n_valid / max(step.n_zoi, 1),
         }
-        values |= {
-            name: getattr(step, name) for name in ("exx", "eyy", "exy", "largest", "latency_s", "noise_GL")
-        }
-        for name, gauge in step.gauges.items():
-            values |= {f"gauge_{name}": gauge.value, f"sigma_gauge_{name}": gauge.sigma}
-        return {**values, **self._more()}
+        values |= {name: getattr(step, name) for name in ("latency_s", "noise_GL")}
+        values |= {name: self.now.figure(name).value for name in ("exx", "eyy", "exy", "largest")}
+        for name in (f"gauge_{gauge}" for gauge in step.gauges):
+            figure = self.now.figure(name)
+            values |= {name: figure.value, f"sigma_{name}": figure.sigma}
+        return values
 
     def _rate(self, t: float, axial: float) -> float:
         """The slope of the least-squares line through the last second, three points or more."""

@@ -15,6 +15,7 @@ from analysis.evaluate import Curve, GaugeValue, LoadAxis, load_axis
 from live.pipeline.columns import BlockFile, NumberColumn, TextColumn
 from live.pipeline.measurement import AXIAL, TRANSVERSE, TimeStep, extension_along, strains_along
 from live.pipeline.queues import Thinned
+from live.pipeline.timed.figure import Arrivals
 
 Array = NDArray[np.float64]
 
@@ -180,13 +181,20 @@ class History:
     ----------
     axis : "x", "y" or "auto"
         Of the load, as configured.
+
+    Attributes
+    ----------
+    time_steps : TimeSeries
+    arrivals : Arrivals
+        Of the measured bursts.
     """
 
     def __init__(self, axis: str = "y") -> None:
-        self.time_steps, self._finder = TimeSeries(), AxisFinder(axis)
+        self.time_steps, self.arrivals, self._finder = TimeSeries(), Arrivals(), AxisFinder(axis)
 
     def add(self, time_step: TimeStep) -> None:
         """Keep ``time_step``."""
+        self.arrivals.add(time_step.t)
         self.time_steps.append(time_step)
         self._finder.add(time_step)
 
@@ -204,6 +212,11 @@ class History:
     def has_values(self) -> bool:
         """Whether any ZOI had a value at any time step."""
         return bool(self.column("n_valid").any())
+
+    @property
+    def ends_with_values(self) -> bool:
+        """Whether any ZOI had a value at the last time step."""
+        return bool(self.column("n_valid")[-1:].any())
 
     def column(self, name: str) -> Array:
         """One quantity over time, (N,) float64."""

@@ -223,6 +223,8 @@ class NewReference:
 
 
 Timer = Callable[[], float]
+OnFailure = Callable[[int, "Burst | NewReference", Exception], object]
+"""Called with the number of a burst, the burst or the new reference before it, and what measuring it raised."""
 
 
 def measure(
@@ -235,6 +237,7 @@ def measure(
     strain: Measure = "small",
     guards: Sequence[Guard] = (),
     timer: Timer = lambda: 0.0,
+    on_failure: OnFailure | None = None,
 ) -> Iterator[Measurement]:
     """Measure one burst after the other.
 
@@ -255,24 +258,32 @@ def measure(
         Check every field (``standard_guards``).
     timer : callable
         Gives seconds; only for ``Measurement.measure_s``.
+    on_failure : callable, optional
+        Takes what a burst raises, and the next one is measured; without it the error ends the measurement.
 
     Yields
     ------
     Measurement
-        One for each burst, in order.
+        One for each burst, in order, but for those that failed.
     """
-    number = 0
+    number = -1
     for item in bursts:
-        if isinstance(item, NewReference):
-            tracker.renew_on_demand(corrections.sensor(item.burst))
+        number += isinstance(item, Burst)
+        try:
+            if isinstance(item, NewReference):
+                tracker.renew_on_demand(corrections.sensor(item.burst))
+                continue
+            began = timer()
+            whole = tracker.measure(corrections.sensor(item))
+            field, of_plates, of_lens = corrections.applied(whole, item, strain)
+            took = timer() - began
+            measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, of_plates)
+            measurement = replace(measurement.with_lens(of_lens), as_measured=whole)
+            for guard in guards:
+                guard.check(field, measurement.time_step)
+        except Exception as error:
+            if on_failure is None:
+                raise
+            on_failure(max(number, 0), item, error)
             continue
-        began = timer()
-        whole = tracker.measure(corrections.sensor(item))
-        field, of_plates, of_lens = corrections.applied(whole, item, strain)
-        took = timer() - began
-        measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, of_plates)
-        measurement = replace(measurement.with_lens(of_lens), as_measured=whole)
-        for guard in guards:
-            guard.check(field, measurement.time_step)
         yield measurement
-        number += 1

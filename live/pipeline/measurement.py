@@ -126,6 +126,18 @@ class TimeStep:
             return self.gauges[name].value, self.gauges[name].sigma
         return getattr(self, name), getattr(self, f"sigma_{name}")
 
+    def strains(self, axis: str) -> dict[str, tuple[float, float, str]]:
+        """Value, sigma and why there is none: of ``axial``, of the region, of gauges; of ``burst`` the valid share."""
+        why = self.refused or "no ZOI has a value"
+        region = {
+            name: (getattr(self, name), getattr(self, f"sigma_{name}"), why) for name in ("exx", "eyy", "exy")
+        }
+        gauges = {f"gauge_{name}": (one.value, one.sigma, one.reason) for name, one in self.gauges.items()}
+        along, _ = strains_along(self.gauges, axis)
+        found = {"largest": (self.largest, math.nan, why), **region, **gauges}
+        burst = (self.n_valid / max(self.n_zoi, 1), math.nan, "")
+        return {"axial": found[f"gauge_{along}" if along == AXIAL else along], "burst": burst, **found}
+
 
 def strains_along(gauges: Container[str], axis: str) -> tuple[str, str]:
     """Names of the strains along and across the load, which runs along ``axis`` ("x" or "y").

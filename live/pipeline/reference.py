@@ -16,6 +16,7 @@ from acquire.burst import BurstAccumulator, PictureMemory
 from acquire.errors import ConfigError, DataError, MachineUnfit, PhasedicError
 from acquire.frame import Burst, Frame
 from analysis.field import Status, StrainField
+from analysis.quality.steadiness import strain_drifts
 
 if TYPE_CHECKING:
     from analysis import KernelSettings, PhaseKernel, ZoiGrid
@@ -98,14 +99,37 @@ def prepare(
         raise numerics_error(error, what) from error
 
 
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """The motion of the picture from one half of the reference burst to the other.
+
+    Attributes
+    ----------
+    px : float, px
+        The median over the ZOIs; NaN where no more than the share ``MIN_FOUND`` of the ZOIs with a pattern are found.
+    strain, sigma : float
+        Change of the mean exx or eyy, the larger one, and its standard uncertainty; NaN where it is not known.
+    """
+
+    px: float
+    strain: float = math.nan
+    sigma: float = math.nan
+
+    @property
+    def pulled(self) -> bool:
+        """Whether the strain has changed: a pull moves the middle of the picture by hardly anything."""
+        return strain_drifts(self.strain, self.sigma)
+
+    @property
+    def amount(self) -> str:
+        """Its px, after the strain where that has changed."""
+        return f"{self.strain * 1e6:+.0f} µm/m, " * self.pulled + f"{self.px:.3f}"
+
+
 def motion_between(
     kernel: PhaseKernel, first: Burst, second: Burst, correct: Correction = unchanged
-) -> float:
-    """The motion of the picture from one half of the reference burst to the other, px.
-
-    The median over the ZOIs of the displacement between the two; NaN where no more than the share
-    ``MIN_FOUND`` of the ZOIs with a pattern are found in both.
-    """
+) -> Motion:
+    """The motion of the picture from one half of the reference burst to the other."""
     first, second = correct(first), correct(second)
     # A start without a search: a still picture has not moved, and the test can begin sooner.
     still = StrainField.from_values(kernel.grid, {})
@@ -113,7 +137,13 @@ def motion_between(
     b = kernel.measure(second.mean, start=a, clipped=second.clipped)
     motion = np.hypot(b.u - a.u, b.v - a.v)
     found, usable = np.isfinite(motion), ~np.isin(a.status, (Status.NOT_MEASURED, Status.NO_PATTERN))
-    return float(np.median(motion[found])) if found.sum() > MIN_FOUND * usable.sum() else math.nan
+    if not found.sum() > MIN_FOUND * usable.sum():
+        return Motion(math.nan)
+    changes = []
+    for name in ("exx", "eyy"):
+        (before, sigma), (after, sigma_after) = a.mean(name, found), b.mean(name, found)
+        changes.append((after - before, math.hypot(sigma, sigma_after)))
+    return Motion(float(np.median(motion[found])), *max(changes, key=lambda change: abs(change[0])))
 
 
 def repetition_text(period: NDArray[np.float64]) -> str:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from dataclasses import dataclass, field, fields
 
+from acquire.events import Event, EventKind
 from acquire.load_cell import LoadLog
 from live.config.sections import SpecimenConfig
-from live.pipeline.event_log import EventLog
+from live.pipeline.event_log import EventLog, sentence
 from live.pipeline.history import History
 from live.pipeline.measurement import TimeStep, strains_along
-from live.pipeline.snapshot import Snapshot, peak_force
+from live.pipeline.snapshot import FORCE, STRESS, Snapshot
+from live.pipeline.timed.figure import FigureState, TimedFigure
+from live.pipeline.timed.health import Health, force_at, strains_at
 
 
 @dataclass(slots=True)
@@ -28,10 +30,14 @@ class FrameCounts:
     reference, measured, skipped, left_out : int
         Part of the reference burst; of a measured burst; of a burst that a newer one replaced or that
         came while measuring was paused; of no complete burst, or damaged.
+    failed : int
+        Of a burst that could not be measured (``live.pipeline.burst_failures``).
     lost : int
-        Frames that the camera or its connection lost.
+        Frames that the camera or its connection lost, or that came damaged.
     load_samples, load_lost : int
         Samples of the load cell; samples that were missing when the test ended.
+    without_force : int
+        Measured bursts whose force is not known although there is a load cell.
     """
 
     grabbed: int = 0
@@ -42,9 +48,11 @@ class FrameCounts:
     measured: int = 0
     skipped: int = 0
     left_out: int = 0
+    failed: int = 0
     lost: int = 0
     load_samples: int = 0
     load_lost: int = 0
+    without_force: int = 0
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False, compare=False)
 
     def add(self, **counts: int) -> None:
@@ -60,14 +68,14 @@ class FrameCounts:
     @property
     def adds_up(self) -> bool:
         """Whether every grabbed frame is counted once for measuring, and once for recording where that was on."""
-        used = self.reference + self.measured + self.skipped + self.left_out
+        used = self.reference + self.measured + self.skipped + self.left_out + self.failed
         stored = self.recorded + self.unrecorded + self.thinned
         return used == self.grabbed and stored in (0, self.grabbed)
 
     @property
     def loss(self) -> bool:
         """Whether frames, or load samples at the end, are missing for good."""
-        return self.lost > 0 or self.unrecorded > 0 or self.load_lost > 0
+        return max(self.lost, self.unrecorded, self.load_lost, self.failed) > 0
 
     @property
     def skipped_share(self) -> float:
@@ -79,65 +87,14 @@ class FrameCounts:
         on_purpose = f" and {self.thinned} on purpose" * (self.thinned > 0)
         share = f" ({self.skipped_share:.1%})" * (self.skipped > 0)
         load = f" / load samples lost {self.load_lost}" * (self.load_lost > 0)
+        load += f" / bursts without a force {self.without_force}" * (self.without_force > 0)
+        failed = f" / failed {self.failed}" * (self.failed > 0)
         return (
             f"grabbed {self.grabbed} / recorded {self.recorded} / measured {self.measured}"
-            f" / skipped {self.skipped}{share} / lost {self.lost}{load}"
+            f" / skipped {self.skipped}{share}{failed} / lost {self.lost}{load}"
             f"  (reference {self.reference}, left over {self.left_out}, not recorded {self.unrecorded}"
             f"{on_purpose}; {'adds up' if self.adds_up else 'DOES NOT ADD UP'})"
         )
-
-
-@dataclass(slots=True)
-class Health:
-    """Health values, each written in one assignment by the thread that measures it.
-
-    Attributes
-    ----------
-    began_t, frame_t, load_t : float, s
-        Times of the begin of the test, of the last frame and of the last load sample, monotonic; NaN before.
-    fps : float, 1/s
-        As frames come.
-    disk_s : float, s
-        Until the disk is full; infinite where nothing is written.
-    peak_N : float, N
-        The force of largest magnitude so far, with its sign; NaN before the first.
-    latency_p95_s : float, s
-        Of the last seconds (``live.pipeline``).
-    state : str
-        What a live run does with its frames; empty in a replay.
-    view_port : int or None
-        Port of the view; None while there is none.
-    camera_failed : bool
-        The camera has ended with an error.
-    """
-
-    began_t: float = math.nan
-    frame_t: float = math.nan
-    fps: float = 0.0
-    load_t: float = math.nan
-    disk_s: float = math.inf
-    peak_N: float = math.nan
-    latency_p95_s: float = math.nan
-    state: str = ""
-    view_port: int | None = None
-    camera_failed: bool = False
-
-    def loaded(self, t: float, force_N: float) -> None:
-        """Note a load sample that arrived at ``t`` (s, monotonic)."""
-        self.load_t = t
-        self.peak_N = peak_force(self.peak_N, force_N)
-
-    def channels(self, now: float) -> dict[str, float]:
-        """The channels of the machine (``live.config.channels``) at ``now``, monotonic s.
-
-        Before the first frame or sample, the silence is that since the test began.
-        """
-        frame_t, load_t = (self.began_t if math.isnan(t) else t for t in (self.frame_t, self.load_t))
-        return {
-            "silent_s": now - frame_t,
-            "load_silent_s": now - load_t,
-            "disk_min": self.disk_s / 60,
-        }
 
 
 class ActiveAlarms:
@@ -151,6 +108,12 @@ class ActiveAlarms:
         """An alarm comes on, or has a new text."""
         with self._lock:
             self._on[name] = text
+
+    def renew(self, name: str, text: str) -> None:
+        """A new text of an alarm, unless it was silenced."""
+        with self._lock:
+            if name in self._on:
+                self._on[name] = text
 
     def clear(self, name: str) -> None:
         """An alarm goes off."""
@@ -181,8 +144,12 @@ class RunState:
     loads : LoadLog
     history : History
     alarms : ActiveAlarms
+    faults : ActiveAlarms
+        Errors that are not over, by their source.
     health : Health
     specimen : SpecimenConfig
+    with_load : bool
+        There is a load cell, or recorded forces.
     """
 
     event_log: EventLog
@@ -190,48 +157,76 @@ class RunState:
     loads: LoadLog
     history: History
     alarms: ActiveAlarms = field(default_factory=ActiveAlarms)
+    faults: ActiveAlarms = field(default_factory=ActiveAlarms)
     health: Health = field(default_factory=Health)
     specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
+    with_load: bool = True
 
     @classmethod
-    def new(cls, max_gap_s: float, lag_s: float = 0.0, specimen: SpecimenConfig | None = None) -> RunState:
+    def new(
+        cls,
+        max_gap_s: float,
+        lag_s: float = 0.0,
+        specimen: SpecimenConfig | None = None,
+        *,
+        with_load: bool = True,
+    ) -> RunState:
         """Empty ones; ``max_gap_s`` and ``lag_s`` (s) as for ``LoadLog``."""
         specimen = specimen or SpecimenConfig()
         loads, history = LoadLog(max_gap_s, lag_s), History(specimen.axis)
-        return cls(EventLog(), FrameCounts(), loads, history, specimen=specimen)
+        found = cls(EventLog(), FrameCounts(), loads, history, specimen=specimen, with_load=with_load)
+        found.event_log.add_listener(found.note)
+        return found
+
+    def note(self, event: Event) -> None:
+        """Keep an error until its source reports that it is over."""
+        if event.level == "error":
+            self.faults.set(event.source, sentence(event, self.event_log.names))
+        elif event.level == "info" or event.kind is EventKind.RECORDER:
+            self.faults.clear(event.source)
+            if event.kind is EventKind.REFERENCE:
+                self.faults.clear("reference")
 
     def snapshot(self, t: float, time_step: TimeStep | None = None) -> Snapshot:
         """The state of the test at ``t`` (s, monotonic), with ``time_step`` or else the last that was measured.
 
-        The force is the newest of the load cell; in a replay, and before the first sample, that of the time step.
+        The force is the newest of the load cell. In a replay, and of recorded pictures, now is the instant of the
+        newest time step, and so is the force.
         """
-        if time_step is None and self.history.time_steps:
-            time_step = self.history.time_steps[-1]
-        health, area, axis = self.health, self.specimen.area_m2, self.history.current_axis
-        sample = self.loads.latest if health.state else None
-        force = math.nan if time_step is None else time_step.force
-        if sample is not None:
-            force = sample.force
-        axial, sigma = time_step.axial(axis) if time_step else (math.nan, math.nan)
+        health, axis = self.health, self.history.current_axis
+        step, ended = time_step, health.ended and time_step is None
+        if step is None and self.history.time_steps:
+            step = self.history.time_steps[-1]
+        now = t if health.live or step is None else step.t
+        figures = (
+            health.machine(now) | {FORCE: self.force(now, step)} | strains_at(now, health, self.history, step)
+        )
+        if ended:
+            there = (
+                (name, figure) for name, figure in figures.items() if figure.state is not FigureState.NONE
+            )
+            figures = {name: figure.but(FigureState.ENDED) for name, figure in there}
+        if self.specimen.area_m2 and FORCE in figures:
+            figures[STRESS] = figures[FORCE].scaled(1 / self.specimen.area_m2)
         return Snapshot(
-            t=t,
-            state=health.state or "REPLAY",
+            t=now,
+            state="ENDED" if ended else health.state or "REPLAY",
             elapsed_s=t - health.began_t,
-            fps=health.fps,
-            force_N=force,
-            stress_Pa=force / area if area else math.nan,
+            figures=figures,
             peak_N=health.peak_N,
-            axial_name=strains_along(time_step.gauges if time_step else (), axis)[0],
+            axial_name=strains_along(step.gauges if step else (), axis)[0],
             axis=axis,
             axis_assumed=self.history.axis_assumed,
-            axial=axial,
-            sigma_axial=sigma,
-            valid=time_step.n_valid if time_step else 0,
-            zois=time_step.n_zoi if time_step else 0,
-            area_share=time_step.least_share if time_step else 1.0,
+            valid=step.n_valid if step else 0,
+            zois=step.n_zoi if step else 0,
+            area_share=step.least_share if step else 1.0,
             latency_p95_s=health.latency_p95_s,
-            disk_s=health.disk_s,
             alarms=self.alarms.texts,
+            faults=self.faults.texts,
             frames=self.frame_counts.as_dict(),
-            time_step=time_step,
+            time_step=step,
         )
+
+    def force(self, now: float, step: TimeStep | None = None) -> TimedFigure:
+        """The force at ``now`` (s, monotonic): the newest of the load cell, of recorded pictures that of ``step``."""
+        return force_at(now, self.health, self.loads, step) if self.with_load else TimedFigure()

@@ -6,7 +6,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from live.config.channels import SYSTEM_CHANNELS, is_joint
 from live.pipeline.measurement import TimeStep
+from live.pipeline.timed.figure import TimedFigure
+
+FORCE, STRESS, AXIAL, BURST, FPS, DISK = "force", "stress", "axial", "burst", "fps", "disk"
+"""Names of figures; those of gauges and of the region are the names of their channels (``live.config.channels``)."""
+_OF_CHANNEL = {"force_N": FORCE, "stress_MPa": STRESS}
+_OF_REGION = ("exx", "eyy", "exy", "largest")
+_NO_FIGURE = TimedFigure()
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,10 +29,9 @@ class Snapshot:
         What is done with the frames: "REC", "ARMED" ...
     elapsed_s : float, s
         Since the test began.
-    fps : float, 1/s
-        Rate of the frames as they arrive.
-    force_N, stress_Pa : float
-        The newest force, and the force divided by the section.
+    figures : mapping of str to TimedFigure
+        Force in N, stress in Pa, ``AXIAL`` strain along the load, strains of the region and of gauges, frames per
+        second, time until the disk is full in s; ``BURST``: the share of valid ZOIs of the newest burst.
     peak_N : float, N
         The force of largest magnitude so far, with its sign.
     axial_name : str
@@ -33,18 +40,14 @@ class Snapshot:
         Of the load.
     axis_assumed : bool
         It is neither given nor found yet.
-    axial, sigma_axial : float
-        Strain along the load and its standard uncertainty.
     valid, zois : int
         ZOIs with a value, and all.
     area_share : float
         The smallest share of an area that the strains stand for (``TimeStep.least_share``).
     latency_p95_s : float, s
         Of the last seconds.
-    disk_s : float, s
-        Until the disk is full; infinite where nothing is written.
-    alarms : tuple of str
-        Texts of the alarms that are on.
+    alarms, faults : tuple of str
+        Texts of the alarms that are on, and of errors that are not over.
     frames : mapping of str to int
         The counts of frames by name.
     time_step : TimeStep or None
@@ -54,23 +57,41 @@ class Snapshot:
     t: float
     state: str = ""
     elapsed_s: float = math.nan
-    fps: float = math.nan
-    force_N: float = math.nan
-    stress_Pa: float = math.nan
+    figures: Mapping[str, TimedFigure] = field(default_factory=dict)
     peak_N: float = math.nan
     axial_name: str = ""
     axis: str = "y"
     axis_assumed: bool = False
-    axial: float = math.nan
-    sigma_axial: float = math.nan
     valid: int = 0
     zois: int = 0
     area_share: float = 1.0
     latency_p95_s: float = math.nan
-    disk_s: float = math.inf
     alarms: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
     frames: Mapping[str, int] = field(default_factory=dict)
     time_step: TimeStep | None = None
+
+    def figure(self, name: str) -> TimedFigure:
+        """The figure of this name, of state "none" where there is no such source."""
+        return self.figures.get(name, _NO_FIGURE)
+
+    def of_channel(self, channel: str) -> TimedFigure:
+        """The figure that a channel has its value from."""
+        if is_joint(channel) or channel in SYSTEM_CHANNELS:
+            return _NO_FIGURE
+        name = _OF_CHANNEL.get(channel, channel.removeprefix("sigma_"))
+        return self.figure(name if name in self.figures or channel in _OF_CHANNEL else BURST)
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """Why the state of the test is not good: alarms, errors, and figures that are old, unknown or beyond."""
+        names = {AXIAL: self.axial_name, FPS: "the frame rate", DISK: "the room on the disk"}
+        lacking = (
+            figure.trouble(names.get(name, name.removeprefix("gauge_")))
+            for name, figure in self.figures.items()
+            if name not in (STRESS, BURST, *_OF_REGION)
+        )
+        return tuple(dict.fromkeys(filter(None, (*self.alarms, *lacking, *self.faults))))
 
     @property
     def lost(self) -> int:

@@ -1,223 +1,202 @@
-"""Forces from a CSV for a replay, by the time of the test or the name of a picture.
+"""Forces from a file for a replay, by the time of the test, the name of a picture, or one row a picture.
 
-The heading has the names of the columns and their units (``file,force_kN``; ``Time [s];Extension [mm];Load [N]``), or
-a second line has the units; without a heading there are two columns, name or seconds, and newtons. Columns are
-separated by commas, tabs or semicolons (then with decimal commas); a line that begins with ``#`` is a comment.
+``live.replay.export_file`` reads the file; here its forces are put at the pictures.
 """
 
 from __future__ import annotations
 
-import csv
-import itertools
+import dataclasses
 import math
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from acquire.clock import ClockPair
 from acquire.errors import ConfigError, DataError
-from acquire.files.picture import read_bytes
+from acquire.files.picture import MAX_BYTES, check_regular
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
-from acquire.protocols.units import newtons_per
+from live.config.sections import LoadConfig
+from live.replay.export_file import Export, read_export
 
-_HEADING = re.compile(r"^\s*([A-Za-z]+)(?:[\s_]*[\[(]?\s*([A-Za-z]+)\s*[\])]?)?\s*$")
-_FORCE, _TIME = ("force", "load", "f"), ("time", "t", "seconds")
-_NAME = ("file", "filename", "picture", "image", "name")
-_LONGEST_UNIT = 6
-_SECONDS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "sec": 1.0, "": 1.0}
+_MOST_SHOWN = 20_000  # samples for the display
+_SHARE = 0.5  # of names without a picture, or pictures without a force, from which the forces are in doubt
+_UNIX_S = 1e8
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ForceTable:
-    """The content of the file.
+class PlacedForces:
+    """Forces at times of the source.
 
     Attributes
     ----------
-    path : Path
-    names : tuple of str
-        Of the pictures; empty where times are given.
-    times : tuple of float, s
-        Ascending; empty where names are given.
-    forces : tuple of float, N
-        NaN where the cell is empty.
-    unit : str
-        As given; "" where it is not, and the forces are in newtons.
+    times, forces : (N,) float64, s and N
+        NaN where a picture has none.
+    by_picture : bool
+        Each is that of one picture, so that nothing is between them.
+    remarks : tuple of str
+    doubts : tuple of str
+        Remarks on what makes the result incomplete.
     """
 
-    path: Path
-    names: tuple[str, ...]
-    times: tuple[float, ...]
-    forces: tuple[float, ...]
-    unit: str
+    times: Array
+    forces: Array
+    by_picture: bool
+    remarks: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
-    def samples(self, pictures: Mapping[str, float] | None, origin: float) -> list[LoadSample]:
-        """The forces as samples of a load cell.
+    def log(self, load: LoadConfig) -> LoadLog:
+        """A closed log; a gap is at least three median steps of a table with times."""
+        steps = np.diff(self.times)
+        usual = math.inf if self.by_picture else 3 * float(np.median(steps)) if len(steps) else 0.0
+        log = LoadLog(max(load.max_gap_s, usual), load.lag_s, by_name=self.by_picture)
+        log.extend(self.times, self.forces)
+        log.close()
+        return log
+
+    def samples(self) -> tuple[LoadSample, ...]:
+        """The forces as samples of a load cell for the display, evenly thinned."""
+        chosen = np.unique(np.linspace(0, len(self.times) - 1, min(len(self.times), _MOST_SHOWN)).astype(int))
+        return tuple(LoadSample(float(self.times[k]), float(self.forces[k])) for k in chosen)
+
+    def at_pictures(self, where: str, load: LoadConfig, times: Array | None) -> PlacedForces:
+        """The same, with a remark on how many pictures have a force.
 
         Parameters
         ----------
-        pictures : mapping of name to s, or None
-            Times of the pictures by name; None where the source has no names.
-        origin : float, s
-            Zero of the times of the file.
+        times : (P,) float64 or None, s
+            Of the pictures; None where they are not known before they are read.
 
         Raises
         ------
         DataError
-            No name is that of a picture.
-        ConfigError
-            The table has names, and the source has none.
+            None of them has a force.
         """
-        if not self.names:
-            return [
-                LoadSample(origin + t, f, self.unit) for t, f in zip(self.times, self.forces, strict=True)
-            ]
+        if times is None or not len(times):
+            return self
+        log = self.log(load)
+        known = sum(math.isfinite(log.force_at(t)) for t in times.tolist())
+        words = f"{known} of {len(times)} pictures have a force"
+        if not known:
+            start = float(times[0])
+            own, theirs = (f"{x[0] - start:.6g} to {x[-1] - start:.6g} s" for x in (self.times, times))
+            raise DataError(
+                f"{where}: no picture has a force: its times are {own} from the first picture, those of the pictures"
+                f" {theirs}; mend them, or give fps= or stamps= of the pictures, or --load-unit N,ms"
+            )
+        if known > (1 - _SHARE) * len(times):
+            return dataclasses.replace(self, remarks=(words, *self.remarks))
+        return dataclasses.replace(self, doubts=(f"{where}: {words}", *self.doubts))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceTable:
+    """The content of the file at ``path``."""
+
+    path: Path
+    export: Export
+
+    def placed(
+        self, pictures: Mapping[str, float] | None, start: ClockPair, *, recorded: bool
+    ) -> PlacedForces:
+        """The forces at the times of a source.
+
+        Parameters
+        ----------
+        pictures : mapping of name to s, or None
+            Times of the pictures by name, in their order; None where the source has no names.
+        start : ClockPair
+            Zero of the times of the file.
+        recorded : bool
+            The clock of ``start`` is that of the recording; otherwise nobody knows when the pictures were taken.
+
+        Raises
+        ------
+        DataError
+            No name is that of a picture, a picture is named twice, or the number of rows is not that of the pictures.
+        ConfigError
+            There are names or one row a picture, and the source has no names; or times of the day for a recording.
+        """
+        e = self.export
+        if e.times is not None:
+            return self._at_times(e.times, pictures, start, recorded=recorded)
         if pictures is None:
             raise ConfigError(
-                f"{self.path}: names pictures, but this source has times alone; give a column time_s"
+                f"{self.path}: has a row for each picture, but this source has times alone; give a column time_s, or"
+                " its name: --load-column FORCE,TIME"
             )
-        known = self._by_name()
-        found = [(t, known.get(name, known.get(Path(name).stem))) for name, t in pictures.items()]
-        if all(force is None for _, force in found):
+        if e.names:
+            return self._by_name(pictures)
+        if len(e.forces) != len(pictures):
             raise DataError(
-                f"{self.path}: none of its {len(known)} names is that of a picture; they begin with {self.names[0]!r}"
+                f"{self.path}: has no times and no names, and {len(e.forces):,} rows for {len(pictures):,} pictures;"
+                " give a column time_s or file, or name it: --load-column FORCE,TIME"
             )
-        return [LoadSample(t, math.nan if force is None else force, self.unit) for t, force in found]
+        remark = "no times and no names: row k is taken as the force of picture k"
+        return PlacedForces(np.array(list(pictures.values())), e.forces, True, (remark, *e.remarks))
 
-    def _by_name(self) -> dict[str, float]:
-        known = dict(zip((Path(name).name for name in self.names), self.forces, strict=True))
-        if len(known) < len(self.names):
+    def _at_times(
+        self, times: Array, pictures: Mapping[str, float] | None, start: ClockPair, *, recorded: bool
+    ) -> PlacedForces:
+        e, origin, remarks = self.export, start.monotonic, self.export.remarks
+        first = min(pictures.values(), default=origin) if pictures else origin
+        if e.clock == "unix" and recorded:
+            origin -= start.utc.timestamp()
+        elif e.clock and recorded:
+            raise ConfigError(
+                f"{self.path}: has times of the day, the recording has Unix times; give these, or seconds from its"
+                " start: time_s"
+            )
+        elif e.clock and not (e.clock == "unix" and first > _UNIX_S):
+            origin = first - float(times[0])
+            remarks = (
+                "the pictures have no such times: the first row is taken as the first picture",
+                *remarks,
+            )
+        return PlacedForces(times + origin, e.forces, False, remarks)
+
+    def _by_name(self, pictures: Mapping[str, float]) -> PlacedForces:
+        names = [Path(name.replace("\\", "/")).name for name in self.export.names]
+        known = dict(zip(names, self.export.forces.tolist(), strict=True))
+        if len(known) < len(names):
             raise DataError(f"{self.path}: a picture is named twice; give each one force")
-        return known
+        here = pictures.keys() | {Path(name).stem for name in pictures}
+        lost = [name for name in names if name not in here]
+        if len(lost) == len(names):
+            raise DataError(
+                f"{self.path}: none of its {len(names)} names is that of a picture; they begin with {names[0]!r}, the"
+                f" pictures with {next(iter(pictures), '')!r}"
+            )
+        words = f"{len(lost)} of {len(names)} names are that of no picture: {', '.join(map(repr, lost[:3]))}"
+        forces = [known.get(name, known.get(Path(name).stem, math.nan)) for name in pictures]
+        doubtful = len(lost) >= _SHARE * len(names)
+        return PlacedForces(
+            np.array(list(pictures.values())),
+            np.array(forces),
+            True,
+            (*((words,) if lost and not doubtful else ()), *self.export.remarks),
+            (f"{self.path.name}: {words}",) if doubtful else (),
+        )
 
-    def log(self, samples: Sequence[LoadSample], max_gap_s: float, lag_s: float = 0.0) -> LoadLog:
-        """The samples as a closed log; a gap is at least three median intervals of a table with times."""
-        steps = np.diff([sample.t for sample in samples])
-        gap = math.inf if self.names else max(max_gap_s, 3 * float(np.median(steps)) if len(steps) else 0.0)
-        log = LoadLog(gap, lag_s)
-        for sample in samples:
-            log.append(sample)
-        log.close()
-        return log
 
-
-def read_forces(path: Path) -> ForceTable:
-    """The table at ``path``.
+def read_forces(path: Path, load: LoadConfig | None = None) -> ForceTable:
+    """The table at ``path``, as ``load`` settles what the file leaves open.
 
     Raises
     ------
     DataError
-        Unreadable, no such columns, a unit that is not known, not a number, or times that run backwards.
+        As ``read_export``; missing, no regular file, unreadable or larger than 2 GB.
     """
-    rows = _rows(path)
-    columns, rows = _columns(path, rows)
-    forces = tuple(columns.newtons * _number(path, row, columns.force, empty=True) for row in rows)
-    if columns.by_name:
-        names = tuple(row[columns.key] if columns.key < len(row) else "" for row in rows)
-        return ForceTable(path, names, (), forces, columns.unit)
-    times = tuple(columns.seconds * _number(path, row, columns.key) for row in rows)
-    for earlier, later in itertools.pairwise(times):
-        if later < earlier:
-            raise DataError(f"{path}: the times run backwards ({later:g} s after {earlier:g} s)")
-    return ForceTable(path, (), times, forces, columns.unit)
-
-
-@dataclass(frozen=True, slots=True)
-class _Columns:
-    """The numbers of the columns, and their units."""
-
-    key: int
-    force: int
-    by_name: bool
-    unit: str = ""
-    newtons: float = 1.0
-    seconds: float = 1.0
-
-
-def _rows(path: Path) -> list[list[str]]:
+    size = check_regular(path)
+    if size > MAX_BYTES:
+        raise DataError(f"{path}: {size / 1e9:.1f} GB are more than 2 GB; export fewer rows a second")
     try:
-        text = read_bytes(path).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise DataError(f"{path}: the forces cannot be read: {error}; save it as UTF-8") from error
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    if not lines:
-        raise DataError(f"{path}: holds no forces")
-    delimiter = max(";\t,", key=lambda mark: (mark in lines[0]) * (10 - ";\t,".index(mark)))
-    try:
-        rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=delimiter)]
-    except csv.Error as error:
-        raise DataError(f"{path}: not a CSV: {error}") from error
-    return [[cell.replace(",", ".") for cell in row] for row in rows] if delimiter == ";" else rows
-
-
-def _columns(path: Path, rows: list[list[str]]) -> tuple[_Columns, list[list[str]]]:
-    """The columns, and the rows without heading and units."""
-    if _is_number(rows[0][-1]) and len(rows[0]) == 2:
-        return _Columns(0, 1, not _is_number(rows[0][0])), rows
-    matches = [_HEADING.match(cell) for cell in rows[0]]
-    heads = [(head[1].lower(), head[2] or "") if head else ("", "") for head in matches]
-    force, time, name = (_find(path, heads, words) for words in (_FORCE, _TIME, _NAME))
-    key = time if name is None else name
-    if force is None or key is None:
-        raise DataError(
-            f"{path}: the heading is {', '.join(rows[0])[:100]!r}; wanted: a column force_N (or kN, lbf ...), and"
-            " one of: file, time_s"
-        )
-    rows = rows[1:]
-    unit, second = heads[force][1], heads[key][1]
-    under = _units_below(rows[:1], len(heads)) if not unit else None
-    if under is not None:
-        unit, second, rows = under[force], under[key], rows[1:]
-    if not rows:
-        raise DataError(f"{path}: holds no forces")
-    return _Columns(
-        key, force, name is not None, unit, _newtons(path, unit), _seconds(path, second, name)
-    ), rows
-
-
-def _units_below(rows: list[list[str]], n: int) -> list[str] | None:
-    """The units of each column where the line below the heading holds them; None where it holds numbers."""
-    if not rows or len(rows[0]) < n or any(_is_number(cell) for cell in rows[0]):
-        return None
-    cells = [cell.strip("[]() ") for cell in rows[0]]
-    return cells if all(len(cell) <= _LONGEST_UNIT and "." not in cell for cell in cells) else None
-
-
-def _find(path: Path, heads: Sequence[tuple[str, str]], words: tuple[str, ...]) -> int | None:
-    found = [k for k, (head, _) in enumerate(heads) if head in words]
-    if len(found) > 1:
-        raise DataError(f"{path}: {len(found)} columns are called {heads[found[0]][0]!r}; leave one")
-    return found[0] if found else None
-
-
-def _newtons(path: Path, unit: str) -> float:
-    try:
-        return newtons_per(unit) if unit else 1.0
-    except ConfigError:
-        raise DataError(f"{path}: forces in {unit!r} are not known; give N, kN, kgf or lbf") from None
-
-
-def _seconds(path: Path, unit: str, name: int | None) -> float:
-    if name is not None:
-        return 1.0
-    if unit.lower() not in _SECONDS:
-        raise DataError(f"{path}: times in {unit!r} are not known; give s, ms or min")
-    return _SECONDS[unit.lower()]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
-
-
-def _number(path: Path, row: Sequence[str], column: int, *, empty: bool = False) -> float:
-    text = row[column] if column < len(row) else ""
-    if _is_number(text):
-        return float(text)
-    if empty and text.lower() in ("", "nan", "-"):
-        return math.nan
-    raise DataError(f"{path}: {text[:40]!r} in the row {','.join(row)[:60]!r} is not a number")
+        with path.open("rb") as file:
+            return ForceTable(path, read_export(file, str(path), load or LoadConfig()))
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read ({error.strerror})") from error

@@ -16,7 +16,7 @@ from live.config.loading import AUTO_GAUGES, Config, load_config, settings_in
 from live.config.values import AUTO
 from live.pipeline.reference import averaged
 from live.pipeline.screen import Screen
-from live.replay.pictures import picture_source
+from live.replay.pictures import picture_source, with_reference
 from live.replay.session import session_config, session_path, session_source
 from live.replay.source import ReplayRequest, ReplaySource, check_window
 from live.results.folder import differing_versions
@@ -35,14 +35,15 @@ def open_session_source(
 ) -> Iterator[tuple[ReplaySource, Config]]:
     """Open a session for a replay and show the notes on it; raises as ``replay``."""
     with Session.open(path) as session:
-        for note in _notes(session, request):
-            screen.print(f"note: {note}")
         overrides = {"camera.address": f"session:{path}", "load.address": f"session:{path}"}
         config = session_config(session, request, overrides, path)
         if request.overrides.get("measure.roi") == AUTO and "measure.mask" not in request.overrides:
             config = replace(config, measure=replace(config.measure, mask=None))  # found again
-        config = _with_fitting_gauges(config, session.camera, request, screen)
-        yield session_source(session, request, config, path), config
+        source = session_source(session, request, config, path)
+        screen.print(source.words)
+        for note in _notes(session, request):
+            screen.print(f"note: {note}")
+        yield source, _with_fitting_gauges(config, session.camera, request, screen)
 
 
 def _with_fitting_gauges(
@@ -98,6 +99,7 @@ def open_source(request: ReplayRequest) -> Iterator[tuple[ReplaySource, Config]]
             config = session_config(session, request, {"camera.address": f"session:{path}"}, path)
             yield session_source(session, request, config, path), config
         return
+    request = with_reference(request)
     config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
     config = replace(config, load=replace(config.load, address="none:"))
     rig = open_rig(config.camera.address, "none:", ignore_event, crop=config.camera.crop)

@@ -46,7 +46,8 @@ def measure_part(request: ReplayRequest, file: IO[bytes], run_in: int, screen: S
     Returns
     -------
     bool
-        Whether the part agrees with the whole; False where a reference was renewed, which later parts do not have.
+        Whether the part agrees with the whole; False where a reference was renewed, which later parts do not have, or
+        where a burst failed.
 
     Raises
     ------
@@ -65,19 +66,20 @@ def measure_part(request: ReplayRequest, file: IO[bytes], run_in: int, screen: S
         if event.kind is EventKind.REFERENCE:
             renewed.append(event)
 
+    failed: list[object] = []
     with open_session_source(path, request, screen) as (source, config):
         ready = prepare_replay(source, config, request.source, screen)
         work = prefetch(source.bursts)
         try:
-            for m in ready.measurements(work, source.loads, listen):
-                if renewed:
+            for m in ready.measurements(work, source.loads, listen, lambda *what: failed.append(what)):
+                if renewed or failed:
                     return False
                 if m.number >= run_in:
                     _put(m, file)
                 screen.progress(m.time_step, m.number + 1, source.expected, 0.0)
         finally:
             work.close()
-    return not renewed
+    return not renewed and not failed
 
 
 def _put(m: Measurement, file: IO[bytes]) -> None:

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import csv
 import datetime
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from acquire.addresses import parse_address
+from acquire.addresses import parse_address, with_setting
 from acquire.burst import average_bursts, burst_of
 from acquire.camera import Camera, with_scheme
 from acquire.clock import ClockPair
 from acquire.errors import DataError
+from acquire.files.order import masks
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
-from acquire.opencv.images import picture_names
+from acquire.opencv.images import listed, picture_names
+from acquire.printable import counted
 from live.config.loading import Config
 from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Window
 
@@ -34,7 +38,70 @@ def picture_source(camera: Camera, request: ReplayRequest, config: Config) -> Re
     bursts = Window.of(request, 0.0).part(average_bursts(frames, config.measure.burst or 1))
     start = ClockPair(0.0, datetime.datetime.now(datetime.UTC))
     expected = _expected(camera.info, 0 if request.reference is not None else reference.n, config)
-    return ReplaySource(camera.info, reference, bursts, loads, start, expected=expected, count=count)
+    words = _words(request, reference, camera.info)
+    return ReplaySource(
+        camera.info, reference, bursts, loads, start, expected=expected, count=count, words=words
+    )
+
+
+def _words(request: ReplayRequest, reference: Burst, camera: CameraInfo) -> str:
+    address = parse_address(with_scheme(request.source))
+    if address.scheme != "files":
+        return reference_words(request, reference, camera.controls.get("frames"))
+    found = picture_names(address)
+    ends = masks([name for name, _ in found])
+    used = [(name, page) for name, page in found if name not in ends]
+    pages = {name for name, page in used if page}
+    names = [f"{name} page {page + 1}" if name in pages else name for name, page in used]
+    return reference_words(request, reference, len(names), names)
+
+
+def reference_words(
+    request: ReplayRequest,
+    reference: Burst,
+    count: int | None,
+    names: Sequence[str] = (),
+    last: int | None = None,
+) -> str:
+    """The first line of a replay: the reference, the last picture (number ``last``) and how many there are."""
+
+    def name(index: int) -> str:
+        return names[index] if names else f"frame {index + 1}"
+
+    first = name(reference.first_index)
+    if request.reference is not None:
+        first = f"{Path(request.reference).name} (as given)"
+    elif reference.last_index > reference.first_index:
+        first += f" to {name(reference.last_index)} (mean of {reference.n})"
+    if not count:
+        return f"reference {first}"
+    return f"reference {first}, last {name(count - 1 if last is None else last)}, {counted(count, 'picture')}"
+
+
+def with_reference(request: ReplayRequest) -> ReplayRequest:
+    """The request with the path of a reference that is one of its pictures, which come in an order that fits it."""
+    if request.reference is None:
+        return request
+    path = _among(request.source, request.reference)
+    if path is None:
+        return request
+    return replace(request, reference=str(path), source=with_setting(request.source, "first", path.name))
+
+
+def reference_file(source: str, name: str | None) -> str | None:
+    """The path of the picture of ``source`` that has this name or path; ``name`` where none has."""
+    return name if name is None else str(_among(source, name) or name)
+
+
+def _among(source: str, name: str) -> Path | None:
+    address, given = parse_address(with_scheme(source)), Path(name)
+    if address.scheme != "files":
+        return None
+    with suppress(DataError):
+        for path in listed(address.target):
+            if path.samefile(given) if given.exists() else path.name == given.name:
+                return path
+    return None
 
 
 def _expected(camera: CameraInfo, taken: int, config: Config) -> int | None:

@@ -8,35 +8,44 @@ from __future__ import annotations
 
 import datetime
 import itertools
+import math
 import threading
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from acquire.addresses import parse_address
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind, EventSink
+from acquire.frame import Burst
 from acquire.opencv.images import picture_times
+from acquire.printable import counted
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
+from live.pipeline.burst_failures import LOG, BurstFailures
 from live.pipeline.consumer import Compose, RunInfo
 from live.pipeline.consumer_thread import Outputs
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
 from live.pipeline.run_state import FrameCounts, RunState
 from live.pipeline.screen import Screen
+from live.pipeline.timed.force_watch import ForceWatch
 from live.replay.forces import read_forces
 from live.replay.opening import open_session_source, prepare_replay
 from live.replay.parts import StoredResults
-from live.replay.pictures import picture_of, picture_source, write_names
+from live.replay.pictures import picture_of, picture_source, with_reference, write_names
 from live.replay.session import session_path
-from live.replay.source import ReplayRequest, ReplaySource, Work, check_window, prefetch
+from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Work, check_window, prefetch
+from live.results.finished.figures_file import finished
+from live.results.finished.finished_test import FinishedTest
 from live.results.folder import check_folder, make_folder
 from live.results.writer import write_results
 from live.setup.devices import open_rig
-from live.setup.pictures import with_mask
+from live.setup.pictures import with_film, with_mask
 from live.setup.region import is_auto_region
 
 _MOST_TOLD = 5  # pictures that were left out, in the summary
@@ -54,6 +63,7 @@ class Replayed:
     exit_code : int
     lines : tuple of str
         A summary for a person: pictures that were left out, speed, the kernel's share of the time.
+    test : FinishedTest
     left_out : int
         Pictures that could not be read or are not like the first.
     """
@@ -62,6 +72,7 @@ class Replayed:
     run_state: RunState
     config: Config
     exit_code: int
+    test: FinishedTest
     lines: tuple[str, ...] = ()
     left_out: int = 0
 
@@ -81,7 +92,7 @@ def replay(
     if path is None:
         return _replay_pictures(request, screen, stopping, consumers)
     with open_session_source(path, request, screen) as (found, config):
-        source = _with_forces(found, request, config)
+        source = _with_forces(found, request, config, screen)
         return _run(source, config, request, screen, stopping, EventLog(), consumers)
 
 
@@ -93,6 +104,7 @@ def _replay_pictures(
 ) -> Replayed:
     if request.as_measured:
         raise ConfigError(f"{request.source}: --as-measured needs a session; pictures have none")
+    request = with_reference(request)
     config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
     region = AUTO if is_auto_region(config) else config.measure.roi
     config = replace(
@@ -104,24 +116,48 @@ def _replay_pictures(
     rig = open_rig(config.camera.address, "none:", _in_test_time(event_log), crop=config.camera.crop)
     try:
         with rig.camera as camera:
-            source = _with_forces(picture_source(camera, request, config), request, config)
+            found = picture_source(camera, request, config)
+            screen.print(found.words)
+            for warning in camera.info.warnings:
+                screen.print(f"warning: {warning}")
+            source = _with_forces(found, request, config, screen)
             return _run(source, config, request, screen, stopping, event_log, consumers)
     finally:
         rig.close()
 
 
-def _with_forces(source: ReplaySource, request: ReplayRequest, config: Config) -> ReplaySource:
-    """The same source with the forces of the given CSV."""
+def _with_forces(
+    source: ReplaySource, request: ReplayRequest, config: Config, screen: Screen
+) -> ReplaySource:
+    """The same source with the forces of the given file, after a line on what was taken from it."""
     if request.forces is None:
         return source
-    address, table = parse_address(with_scheme(request.source)), read_forces(request.forces)
-    names = picture_times(address) if table.names and address.scheme == "files" else None
-    samples = table.samples(names, source.start.monotonic)
+    table = read_forces(request.forces, config.load)
+    named = table.export.times is None
+    pictures = _picture_times(request.source, named=named)
+    placed = table.placed(pictures, source.start, recorded=source.count is None)
+    times = source.times if pictures is None else np.array([*pictures.values()])
+    placed = placed.at_pictures(str(request.forces), config.load, times)
+    screen.print("; ".join([f"{request.forces.name}: {table.export.taken}", *placed.remarks]))
     return replace(
         source,
-        samples=tuple(samples),
-        loads=table.log(samples, config.load.max_gap_s, config.load.lag_s),
+        samples=placed.samples(),
+        loads=placed.log(config.load),
+        doubts=placed.doubts,
     )
+
+
+def _picture_times(source: str, *, named: bool) -> dict[str, float] | None:
+    """Times of pictures by name; None where the source has none, or where they are pages and not ``named``."""
+    address = parse_address(with_scheme(source))
+    if address.scheme != "files":
+        return None
+    try:
+        return picture_times(address)
+    except ConfigError:
+        if named:
+            raise
+        return None
 
 
 def _in_test_time(event_log: EventLog) -> EventSink:
@@ -146,10 +182,11 @@ def _run(
     consumers: Compose,
 ) -> Replayed:
     check_folder(config.output.dir)
+    config = with_film(config, source.camera)
     ready = prepare_replay(source, config, request.source, screen, stopping.is_set)
     stored = StoredResults.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements
-    bursts = _not_empty(stored.bursts() if stored else source.bursts, request.source)
+    bursts = _not_empty(stored.bursts() if stored else source.bursts, request, source.count)
     folder = make_folder(ready.plan.config.output.dir, datetime.datetime.now(datetime.UTC))
     config = _with_final_folder(with_mask(ready.plan.config, ready.plan.mask, folder), request.final_folder)
     run_state = RunState(
@@ -158,6 +195,7 @@ def _run(
         source.loads,
         History(config.specimen.axis),
         specimen=config.specimen,
+        with_load=len(source.loads) > 0,
     )
     write_names(request.source, folder / "pictures.csv")
     screen.print(f"replaying {request.source} into {request.final_folder or folder}")
@@ -169,12 +207,17 @@ def _run(
         source.start,
         deferred=request.final_folder is not None,
     )
-    outputs = Outputs(consumers(about, run_state), run_state.loads, event_log, run_state.history)
+    watch = [ForceWatch(run_state)] if run_state.with_load else []
+    made = [*consumers(about, run_state), *watch]
+    outputs = Outputs(made, run_state.loads, event_log, run_state.history)
     began, work = time.perf_counter(), prefetch(bursts)
+    failures = BurstFailures(run_state, folder)
     try:
         _pass_on_recorded(source, outputs)
-        for m in measured(work, source.loads, run_state.event_log):
-            run_state.frame_counts.add(measured=m.burst.n, grabbed=m.burst.n, lost=m.burst.lost)
+        for m in measured(
+            _counted(work, run_state.frame_counts), source.loads, run_state.event_log, failures
+        ):
+            run_state.frame_counts.add(measured=m.burst.n)
             if outputs.wants_frames:
                 outputs.frame(picture_of(m.burst))
             screen.progress(outputs.add(m), m.number + 1, source.expected, time.perf_counter() - began)
@@ -184,16 +227,35 @@ def _run(
         took = time.perf_counter() - began
     finally:
         work.close()
+        run_state.health.ended = True
         outputs.end()
     speed = f"joined of {len(request.parts)} chunks" if request.parts else speed_line(run_state.history, took)
     lines = [*_account(source, run_state), speed]
     left_out = source.count.left_out if source.count else 0
     cut_off = [e.text for e in event_log.events("warning") if "missing" in e.data and not stopping.is_set()]
     stopped = [f"{report.name} stopped: {report.failed}" for report in outputs.reports if report.failed]
-    lines = [*cut_off, *stopped, *lines]
-    lossy = outputs.failed or not run_state.history.has_values or left_out > 0 or cut_off
+    failed = f"{counted(failures.count, 'burst')} could not be measured; {folder / LOG} has the details"
+    lines = [*[failed] * (failures.count > 0), *cut_off, *source.doubts, *stopped, *lines]
+    lossy = (
+        outputs.failed
+        or bool(source.doubts)
+        or not run_state.history.ends_with_values
+        or left_out > 0
+        or cut_off
+        or failures.count
+    )
     code = 130 if stopping.is_set() else 5 if lossy else 0
-    return Replayed(folder, run_state, config, code, tuple(lines), left_out)
+    at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
+    test = finished(folder, config, run_state, code, at_reference)
+    return Replayed(folder, run_state, config, code, test, tuple(lines), left_out)
+
+
+def _counted(work: Iterable[Work], frame_counts: FrameCounts) -> Iterator[Work]:
+    """The same bursts, their frames counted."""
+    for item in work:
+        if isinstance(item, Burst):
+            frame_counts.add(grabbed=item.n, lost=item.lost)
+        yield item
 
 
 def _with_final_folder(config: Config, folder: Path | None) -> Config:
@@ -232,13 +294,18 @@ def speed_line(history: History, seconds: float) -> str:
     )
 
 
-def _not_empty(bursts: Iterable[Work], source: str) -> Iterator[Work]:
+def _not_empty(bursts: Iterable[Work], request: ReplayRequest, count: PictureCount | None) -> Iterator[Work]:
     """The same bursts; raises DataError before anything is written where there are none."""
     rest = iter(bursts)
     first = [*itertools.islice(rest, 1)]
+    if not first and count and count.pictures - count.left_out == max(count.reference, 1) == 1:
+        raise DataError(
+            f"{request.source}: one picture alone has no strain; give the folder that the others are in, or the picture"
+            " before the test as --reference FILE"
+        )
     if not first:
         raise DataError(
-            f"{source}: no whole burst after the reference, nothing to measure; give a smaller --burst"
+            f"{request.source}: no whole burst after the reference, nothing to measure; give a smaller --burst"
         )
     return _after(first, rest)
 

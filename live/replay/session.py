@@ -20,7 +20,7 @@ from acquire.session import Session
 from live.config.loading import Config, from_dict, settings_in
 from live.pipeline.measure import NewReference
 from live.replay.burst_index import BurstStore, open_store
-from live.replay.pictures import reference_from
+from live.replay.pictures import reference_from, reference_words
 from live.replay.source import ReplayRequest, ReplaySource, Window, Work
 
 LIVE_ONLY = ("output", "record", "operate", "strain_out", "alarm")
@@ -79,10 +79,11 @@ def session_source(session: Session, request: ReplayRequest, config: Config, pat
             "--as-measured takes the references of the run; leave --reference out, or --as-measured"
         )
     loads = LoadLog(config.load.max_gap_s, config.load.lag_s)
-    samples = tuple(session.load_samples())
+    sign = config.load.sign
+    samples = tuple(replace(s, force=sign * s.force) if sign < 0 else s for s in session.load_samples())
     for sample in samples:
         loads.append(sample)
-    events = tuple(session.events())
+    events = tuple(_turned(event) if sign < 0 else event for event in session.events())
     for event in events:
         loads.take_event(event)
     loads.close()
@@ -102,9 +103,26 @@ def session_source(session: Session, request: ReplayRequest, config: Config, pat
         found = _all_after(stored, after, n, window, request.numbers)
     start = ClockPair(session.start_monotonic, session.start_utc)
     bursts = window.part(found.bursts)
+    numbers = session.indices if len(session) else session.burst_column("last_index")
+    words = reference_words(request, reference, len(numbers), last=int(numbers[-1]) if len(numbers) else None)
     return ReplaySource(
-        session.camera, reference, bursts, loads, start, events, samples, found.expected, found.times
+        session.camera,
+        reference,
+        bursts,
+        loads,
+        start,
+        events,
+        samples,
+        found.expected,
+        found.times,
+        words=words,
     )
+
+
+def _turned(event: Event) -> Event:
+    """The event of a tare with its step in the other sign."""
+    step = event.data.get("step_N")
+    return event if step is None else replace(event, data={**event.data, "step_N": -step})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

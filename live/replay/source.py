@@ -35,9 +35,9 @@ class ReplayRequest:
     start_s, end_s : float or None, s
         Part of the session, in seconds since its start.
     reference : str or None
-        An image file as the reference, in place of the first pictures.
+        An image file as the reference, or the name of one of the pictures, in place of the first.
     forces : Path or None
-        A CSV with the forces (``live.replay.forces``).
+        A file with the forces (``live.replay.forces``).
     config_file : Path or None
     overrides : mapping of "section.key" to value
     numbers : range or None
@@ -96,6 +96,10 @@ class ReplaySource:
         Times of the bursts, where they are known before the bursts are read.
     count : PictureCount or None
         The pictures so far; None for a session, whose bursts have the number of lost frames.
+    doubts : tuple of str
+        What makes the result incomplete.
+    words : str
+        Which picture is the reference, which the last, and how many there are.
     """
 
     camera: CameraInfo
@@ -108,6 +112,8 @@ class ReplaySource:
     expected: int | None = None
     times: NDArray[np.float64] | None = None
     count: PictureCount | None = None
+    doubts: tuple[str, ...] = ()
+    words: str = ""
 
 
 def check_window(request: ReplayRequest) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from acquire.load_cell import LoadLog
 from analysis.evaluate import (
+    AT_LEAST,
     CONFIDENCE,
     STANDARDS,
     ErrorLimits,
@@ -54,9 +55,10 @@ def value_text(value: float, sigma: float, unit: str) -> str:
 
 
 def figure_text(figure: Figure, unit_is: float = 1.0, unit: str = "") -> str:
-    """A figure with the larger half of its interval, in ``unit``, which is ``unit_is`` in SI units."""
+    """A figure with the larger half of its interval, or as a bound, in ``unit``, which is ``unit_is`` in SI units."""
     half = max(figure.high - figure.value, figure.value - figure.low)
-    return value_text(figure.value / unit_is, half / unit_is, unit)
+    words = f"{AT_LEAST} " if figure.is_bound else ""
+    return words + value_text(figure.value / unit_is, half / unit_is, unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,10 +148,13 @@ def tensile_options(specimen: SpecimenConfig) -> TensileOptions:
         _times(specimen.force_error_percent, 0.01),
         _times(specimen.section_error_percent, 0.01) if specimen.area_m2 else None,
         _times(specimen.strain_error_um_m, 1e-6),
+        _times(specimen.film_error_percent, 0.01),
     )
     if specimen.zero == "preload" and specimen.area_m2 is not None:
-        return TensileOptions(standard, "preload", specimen.preload_MPa * 1e6, limits)
-    return TensileOptions(standard, "toe" if specimen.zero == "toe" else "raw", limits=limits)
+        return TensileOptions(standard, "preload", specimen.preload_MPa * 1e6, limits, specimen.test)
+    return TensileOptions(
+        standard, "toe" if specimen.zero == "toe" else "raw", limits=limits, test=specimen.test
+    )
 
 
 def _times(value: float | None, unit: float) -> float | None:
@@ -163,12 +168,21 @@ def budget_of(figures: TensileFigures, view: CameraView, *, stresses: bool) -> l
     return budget_rows(figures.budget, figures.span.strain[1], figures.E.value, view, stresses=stresses)
 
 
-def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
-    """The lag of the load behind the frames, found from the test itself; nothing without a load."""
+def lag_of(history: History, loads: LoadLog, specimen: SpecimenConfig) -> Figure:
+    """The lag of the load behind the frames, s, found from the test itself."""
     t, force = loads.arrays()
     if not len(t):
+        return Figure.none("no readings of a load cell")
+    if loads.by_name:
+        return Figure.none("each force was given for a picture: there is none")
+    return find_lag(Track(history.column("t"), history.along(specimen.axis)[0]), Track(t, force))
+
+
+def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
+    """``lag_of`` as text; nothing without a load, or where there can be none."""
+    if not len(loads.arrays()[0]) or loads.by_name:
         return []
-    lag = find_lag(Track(history.column("t"), history.along(specimen.axis)[0]), Track(t, force))
+    lag = lag_of(history, loads, specimen)
     if not lag.known:
         return [f"lag of the load behind the frames: not known ({lag.why})"]
     how = "too small to matter"
@@ -196,6 +210,17 @@ def sharpness_line(blur: Sequence[float], sigma: Sequence[float]) -> list[str]:
         return []
     largest = max(known, key=lambda one: abs(one.px))
     return [f"sharpness since the reference: {largest.text} at most, {known[-1].text} in the last picture"]
+
+
+def film_line(specimen: SpecimenConfig) -> list[str]:
+    """The limit of error of strains of a compressed film; nothing for others."""
+    limit = specimen.film_error_percent
+    if not limit:
+        return []
+    return [
+        f"strains of a compressed film: not better than {limit:g} %, beside ± (the codec holds motion back; record"
+        " MJPG, FFV1 or pictures)"
+    ]
 
 
 def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
@@ -231,7 +256,8 @@ def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str
     of = f" of {figures.elastic_strain}" if figures.elastic_strain else ""
     beyond = f", of E with {beyond_scatter(figures)}" if beyond_scatter(figures) else ""
     words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, ±: {CONFIDENCE:.0%} interval{beyond})"
-    return [_text(rows, "E") + hint + words, _known_texts(rows, _STRENGTHS)]
+    strengths = _known_texts(rows, _STRENGTHS)
+    return [_text(rows, "E") + hint + words, *([strengths] if strengths else [])]
 
 
 def beyond_scatter(figures: TensileFigures) -> str:
@@ -262,7 +288,8 @@ def figure_lines(
     rows, span = _rows(figures, specimen), figures.span
     lines = elastic_lines(figures, specimen) or [line for line in [_known_texts(rows, _STRENGTHS)] if line]
     if not lines:
-        return []
+        return list(figures.notes)
+    lines += figures.notes
     if span is not None:
         low, high = span.strain
         lines.append(

@@ -14,7 +14,7 @@ from acquire.errors import ConfigError
 from acquire.printable import printable
 from live import VERSION
 
-FILES = ("session.h5", "mask.png", "strain.h5", "strain.csv", "view.rrd", "config.json")
+FILES = ("session.h5", "mask.png", "strain.h5", "strain.csv", "view.rrd", "config.json", "figures.json")
 _PACKAGES = ("numpy", "scipy", "numba", "opencv-python-headless", "h5py", "rerun-sdk", "pyserial")
 
 

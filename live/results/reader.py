@@ -26,6 +26,7 @@ from acquire.hdf5 import (
     check_size,
     open_dataset,
     open_datasets,
+    open_file,
     open_group,
     probe,
     read_attribute,
@@ -233,7 +234,7 @@ def _open(path: Path, probed: bool) -> tuple[Any, bool]:
     if block.unfinished and not probed:
         probe(path, "live.results")
     try:
-        file = h5py.File(path, "r", swmr=block.unfinished)
+        file = open_file(path, swmr=block.unfinished)
     except (OSError, RuntimeError) as error:
         raise DataError(f"{path}: cannot be opened ({error}); make it again with phasedic replay") from error
     if block.unfinished:

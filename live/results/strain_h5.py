@@ -17,7 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.hdf5 import COMPRESSED, FlushTimer, PictureStack, RowTable, abandon_file, create_file, reason
+from acquire.hdf5 import (
+    COMPRESSED,
+    FlushTimer,
+    PictureStack,
+    RowTable,
+    abandon_file,
+    create_file,
+    reason,
+    storable,
+)
 from acquire.printable import counted
 from analysis.evaluate import load_axis
 from live.results import layout
@@ -216,7 +225,7 @@ def _declare(file: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
     entry["start_time"] = info.start_utc
     entry["start_monotonic_s"] = info.start_monotonic
     entry["start_monotonic_s"].attrs["units"] = "s"
-    entry["title"] = str(info.metadata.get("specimen", "") or "phasedic")
+    entry["title"] = storable(str(info.metadata.get("specimen", "") or "phasedic"))
     _add_strain(entry, grid, info)
     _add_references(entry, grid.shape)
     _add_mean(entry, info)
@@ -340,9 +349,9 @@ def _add_notes(entry: Any, info: ResultsInfo) -> None:
     camera = _group(entry, "camera", "NXdetector")
     if info.camera is None:
         return
-    camera["description"] = info.camera.name
+    camera["description"] = storable(info.camera.name)
     for key in ("address", "width", "height", "bits", "fps", "exposure_s", "pixel_format", "clock"):
         value = getattr(info.camera, key)
         if value is not None:
-            camera.attrs[key] = value
+            camera.attrs[key] = storable(value) if isinstance(value, str) else value
     camera.attrs["controls"] = json.dumps(dict(info.camera.controls), default=str)

@@ -19,12 +19,23 @@ from live.results.figures import (
     elastic_lines,
     evaluate,
     figure_lines,
+    film_line,
     lag_line,
     sharpness_line,
     tare_line,
 )
+from live.results.finished.findings import doubts, findings
+from live.results.finished.finished_test import FinishedTest
 
 _CARD_EVERY_S = 1.0  # of the test
+
+
+def valid_line(history: History) -> str:
+    """How many bursts were measured, and how many ZOIs have a value in the last of them."""
+    last = history.time_steps[-1]
+    refused = f" ({last.refused})" if last.refused else ""
+    words = f"{last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}"
+    return f"measured {len(history.time_steps)} bursts, {words}"
 
 
 def noise_line(history: History) -> str:
@@ -59,26 +70,34 @@ def why_nothing(run_state: RunState) -> str:
     return f"nothing was measured: {grabbed} frames gave no burst after the reference; take shorter bursts"
 
 
-def summary_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
+def doubt_lines(test: FinishedTest) -> list[str]:
+    """What the data say against the figures, for the top of a summary."""
+    return [f"look: {text}" for text in doubts(findings(test))]
+
+
+def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     """The summary, a line each."""
-    history = run_state.history
+    history, specimen = run_state.history, test.specimen
     valid = np.flatnonzero(history.column("n_valid"))
     if not valid.size:
         return [why_nothing(run_state)]
-    last, strains = history.time_steps[int(valid[-1])], history.column("largest")[valid]
+    last, strains = history.time_steps[-1], history.column("largest")[valid]
     largest = strains[np.argmax(np.abs(strains))]
-    refused = f" ({last.refused})" if last.refused else ""
     part = share_text(last.least_share)
-    strain = f"exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
+    means = f"exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
+    means = f"none, {last.apart}" if last.apart else means
+    means = means if last.n_valid else f"no value, 0 of {last.n_zoi} ZOIs valid"
     lines = [
-        f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        f"last strain of the region: {f'none, {last.apart}' if last.apart else strain}{f' {part}' if part else ''};"
+        *doubt_lines(test),
+        valid_line(history),
+        f"last strain of the region: {means}{f' {part}' if part else ''};"
         f" largest of any ZOI {largest * 1e6:+.0f} µm/m",
+        *film_line(specimen),
         noise_line(history),
     ]
     lines += sharpness_line(history.column("blur").tolist(), history.column("sigma_blur").tolist())
     lines += latency_lines(history)
-    figures = figure_lines(evaluate(history, run_state.loads, specimen), specimen)
+    figures = figure_lines(test.figures, specimen)
     if figures:
         figures += tare_line(history, run_state.loads) + lag_line(history, run_state.loads, specimen)
     return lines + figures + alignment_line(history, specimen)
@@ -117,6 +136,7 @@ class StatusCard:
             f"**{i.n_valid} of {i.n_zoi}** ZOIs valid" + (f" ({i.refused})" if i.refused else ""),
             f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, region **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
         ]
+        lines += film_line(self._specimen)
         blur = Blur(i.blur, i.sigma_blur).text
         lines += [f"{blur} since the reference"] * bool(blur)
         if part := share_text(i.least_share):

@@ -15,19 +15,21 @@ from typing import Any, ClassVar
 
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
-from live.config.channels import SYSTEM_CHANNELS, is_joint
+from live.config.channels import OF_LOAD, is_joint
 from live.config.loading import Config
 from live.config.sections import AlarmConfig
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import ActiveAlarms
+from live.pipeline.snapshot import BURST, Snapshot
+from live.pipeline.timed.figure import BEYOND, LACKING, FigureState, TimedFigure
 from live.run.strain_output import StrainOut
 
 log = logging.getLogger(__name__)
 
 EVERY_S = 0.2
-"""The channels of the machine are checked at this interval."""
+"""What changes without a measurement is checked at this interval."""
 _STRAINS = ("axial", "exx", "eyy", "exy", "largest")
 _TWO_CAMERAS = "a camera on each side: give --back"
 _UNITS = {"_N": "N", "_MPa": "MPa", "_s": "s", "_min": "min", "_GL": "GL", "": ""}
@@ -120,7 +122,7 @@ def check_alarms(config: Config, *, both_sides: bool = False) -> None:
     joint = next((one for one in config.strain_out.channels or () if is_joint(one)), "")
     if joint and not both_sides:
         raise ConfigError(f"strain_out.channels: {joint} needs {_TWO_CAMERAS}")
-    missing = dict.fromkeys(("force_N", "stress_MPa", "load_silent_s"), "a load cell: give --load ADDRESS")
+    missing = dict.fromkeys((*OF_LOAD, "load_silent_s"), "a load cell: give --load ADDRESS")
     if config.load.address != "none:":
         missing.clear()
     if config.specimen.area_m2 is None:
@@ -163,50 +165,69 @@ class Alarm:
     config : AlarmConfig
     name : str
         As configured, else the channel and its limit.
-    on : bool
+    on, unknown : bool
+        Whether it is on, and whether it came because the value is not known.
     """
 
     def __init__(self, config: AlarmConfig, actions: Sequence[Action] = ()) -> None:
-        self.config, self.actions, self.on = config, actions, False
-        c = config
+        self.config, self.on, self.unknown = config, False, False
+        self._actions, c = actions, config
         limit = f"above {c.above:g}" if c.above is not None else f"below {c.below:g}"
         self.name = c.name or f"{c.channel} {limit}"
         self._sign, self._limit = (1.0, c.above) if c.above is not None else (-1.0, c.below or 0.0)
+
+    @property
+    def actions(self) -> list[Action]:
+        """What it does; a run is ended by a value, and only on demand by one that is not known."""
+        ends = self.config.end_on_unknown or not self.unknown
+        return [action for action in self._actions if ends or not isinstance(action, EndRun)]
 
     def check(self, value: float) -> bool:
         """Check a value; whether the alarm went on or off. A value that is not known changes nothing."""
         if math.isnan(value):
             return False
         beyond = self._sign * (value - self._limit)
-        before = self.on
-        self.on = beyond > 0 or (before and beyond > -self.config.hysteresis)
-        return self.on is not before
+        before = self.on, self.unknown
+        held = self.on and not self.unknown and beyond > -self.config.hysteresis
+        self.on, self.unknown = beyond > 0 or held, False
+        return (self.on, self.unknown) != before
+
+    def judge(self, figure: TimedFigure, value: float) -> bool:
+        """Check the value of a figure, or what takes its place; whether the alarm went on or off.
+
+        A figure that is old or unknown is no value within the limit. One beyond the range of its device is above a
+        limit, or below one; paused or not yet there it is neither.
+        """
+        if figure.state in LACKING:
+            return self.lose()
+        if figure.state in BEYOND:
+            beyond = math.inf if figure.state is FigureState.OVERLOAD else -math.inf
+            return self.lose() if beyond < 0 < self._sign else self.check(beyond)
+        if figure.known or figure.state is FigureState.NONE:
+            return self.check(value)
+        before, self.on, self.unknown = self.on, False, False
+        return before
 
     def lose(self) -> bool:
-        """Go on because the channel can have no value; whether it did. Only one of two cameras does so."""
-        before, self.on = self.on, self.on or is_joint(self.config.channel)
-        return self.on is not before
+        """Go on because the value is not known; whether it did."""
+        before, self.on = self.on, True
+        self.unknown = self.unknown or not before
+        return not before
 
-    def message(self, value: float, lost: str = "") -> str:
-        """Its text at ``value``, or where there is none because of ``lost``."""
+    def message(self, value: float, instead: str = "") -> str:
+        """Its text at ``value``, or with what is there ``instead`` of one."""
         c = self.config
         named = f"{c.name}: " if c.name else ""
-        words = f"{c.channel.replace('_', ' ')} is not known, {lost}" if lost else ""
-        return named + (words or in_words(c.channel, value, self._limit))
-
-
-def _is_due_by_itself(channel: str) -> bool:
-    """Whether a channel changes without a measurement."""
-    return channel in SYSTEM_CHANNELS or is_joint(channel)
+        return named + (instead or in_words(c.channel, value, self._limit))
 
 
 class AlarmWatch(Consumer):
-    """Checks the alarms with every measurement, and those on channels of the machine every ``EVERY_S``.
+    """Checks the alarms with every measurement, and every ``EVERY_S`` those on what changes without one.
 
     Parameters
     ----------
     alarms : sequence of Alarm
-    values : ChannelValues
+    values : ChannelValues or None
     machine : callable
         The channels of the machine at a monotonic time.
     active : ActiveAlarms
@@ -223,7 +244,7 @@ class AlarmWatch(Consumer):
     def __init__(
         self,
         alarms: Sequence[Alarm],
-        values: ChannelValues,
+        values: ChannelValues | None,
         machine: Callable[[float], Mapping[str, float]],
         active: ActiveAlarms,
         on_event: EventSink,
@@ -231,7 +252,11 @@ class AlarmWatch(Consumer):
         lost: Callable[[], str] = str,
     ) -> None:
         self._alarms, self._lost = alarms, lost
-        self._values, self._machine, self._active = values, machine, active
+        self._values, self._machine, self._active = (
+            values or ChannelValues(0.0, lambda t, _: Snapshot(t)),
+            machine,
+            active,
+        )
         self._on_event, self._clock = on_event, clock
         self._count = 0
 
@@ -241,11 +266,16 @@ class AlarmWatch(Consumer):
         stamp = math.nan if burst.clock == "nominal" else burst.t + burst.duration / 2
         self._check(self._values.read(measurement), stamp)
 
+    def event(self, event: Event) -> None:
+        """Wake the thread: the first event comes before the first frame."""
+
     def idle(self) -> float:
-        """Check the channels of the machine, and whether those of two cameras still have values."""
-        self._check(self._machine(self._clock()), math.nan)
+        """Check what is due by itself: age, force, machine, and whether two cameras still have values."""
+        values = {**self._values.read(), **self._machine(self._clock())}
+        if self._values.now.figure(BURST).state is not FigureState.ENDED:
+            self._check(values, math.nan)
         self._check_lost()
-        return EVERY_S if any(_is_due_by_itself(alarm.config.channel) for alarm in self._alarms) else math.inf
+        return EVERY_S
 
     def end(self) -> str:
         """How often an alarm came on; a camera that has failed ends the test of its side, and may be why."""
@@ -254,15 +284,25 @@ class AlarmWatch(Consumer):
 
     def _check(self, values: Mapping[str, float], stamp: float) -> None:
         for alarm in self._alarms:
-            value = values.get(alarm.config.channel, math.nan)
-            if alarm.check(value):
-                self._changed(alarm, value, stamp, alarm.message(value))
+            channel = alarm.config.channel
+            figure, value = self._values.now.of_channel(channel), values.get(channel, math.nan)
+            changed, words = alarm.judge(figure, value), channel.replace("_", " ")
+            instead = figure.trouble(channel.removesuffix("_N").removesuffix("_MPa").replace("_", " "))
+            if not (instead or figure.known or figure.state is FigureState.NONE):
+                instead = f"{words}: {figure.state}"
+            text = alarm.message(value, instead)
+            if changed:
+                self._changed(alarm, None if instead else value, stamp, text)
+            elif alarm.on and instead:
+                self._active.renew(alarm.name, text)
 
     def _check_lost(self) -> None:
         why = self._lost()
         for alarm in self._alarms:
-            if why and alarm.lose():
-                self._changed(alarm, None, math.nan, alarm.message(math.nan, why))
+            channel = alarm.config.channel
+            if why and is_joint(channel) and alarm.lose():
+                words = f"{channel.replace('_', ' ')} is not known, {why}"
+                self._changed(alarm, None, math.nan, alarm.message(math.nan, words))
 
     def _changed(self, alarm: Alarm, value: float | None, stamp: float, text: str) -> None:
         now = self._clock()

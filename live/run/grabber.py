@@ -197,6 +197,7 @@ class Grabber:
             log.exception("the grab thread failed")
             self._ended_by(error, f"a defect in the grab thread: {error!r}")
         finally:
+            self._health.camera_ended = True
             self._count_open_gap(time.monotonic() - self.arrived_t)
             self._frame_counts.add(left_out=self._unassigned)
             self.bursts.close()

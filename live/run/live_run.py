@@ -22,6 +22,10 @@ from live.pipeline.consumer_thread import Outputs
 from live.pipeline.latency import LatencyMonitor
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
+from live.pipeline.timed.figure import OLD_S
+from live.pipeline.timed.force_watch import ForceWatch
+from live.results.finished.figures_file import finished
+from live.results.finished.finished_test import reference_force
 from live.results.writer import write_results
 from live.run.burst_queue import TAKING, BurstQueue
 from live.run.control import ControlRefused
@@ -32,7 +36,7 @@ from live.run.outcome import Outcome, StopSignal
 from live.run.pre_trigger import PreTriggerBuffer
 from live.run.prepared_run import PreparedRun, new_run_state, set_up
 from live.run.recorder import open_recording
-from live.setup.devices import open_rig
+from live.setup.devices import Rig, check_load_sign, open_rig
 
 _ARMED = "; nothing is recorded until the command start"
 _SILENT_S = 1.0
@@ -74,6 +78,7 @@ class LiveRun:
         on_burst = self._take_burst if recording is not None and recording.takes_bursts else None
         self.grabber = Grabber(self._rig.camera, self._plan, run_state, self._take, on_burst)
         run_state.health.began_t, self._hinted = time.monotonic(), False
+        self._expect(run_state)
         self._has_recorded = self.recording
         memory = memory_of_measured(self._rig.camera.info, self._plan)
         self._burst_queue = BurstQueue(self.grabber, run_state.frame_counts, self._idle, memory)
@@ -83,6 +88,14 @@ class LiveRun:
         self._measure_thread = MeasureThread(
             prepared, run_state, outputs, self._burst_queue, latency, self._show
         )
+
+    def _expect(self, run_state: RunState) -> None:
+        """The usual intervals of frames and bursts until they are known."""
+        camera, health = self._rig.camera.info, run_state.health
+        health.recorded = not camera.live
+        if camera.fps:
+            health.frames.usual_s = 1 / camera.fps
+            run_state.history.arrivals.usual_s = self._plan.burst / camera.fps
 
     # -- what may be called from other threads ------------------------------------------------
 
@@ -101,6 +114,11 @@ class LiveRun:
     def live(self) -> bool:
         """Whether the camera is there now; else its pictures are recorded."""
         return self._rig.camera.info.live
+
+    @property
+    def rig(self) -> Rig:
+        """The devices."""
+        return self._rig
 
     @property
     def run_state(self) -> RunState:
@@ -142,10 +160,11 @@ class LiveRun:
             raise ControlRefused("measuring is paused already" if wanted else "measuring is not paused")
         kind = EventKind.PAUSE if wanted else EventKind.RESUME
         self._emit(kind, "measuring is paused" if wanted else "measuring goes on")
-        self._burst_queue.paused = wanted
+        self._burst_queue.paused = self._run_state.health.paused = wanted
+        self._run_state.health.since_t = time.monotonic()
 
     def _silence(self) -> None:
-        names = self._run_state.alarms.silence()
+        names = self._run_state.alarms.silence() + self._run_state.faults.silence()
         if not names:
             raise ControlRefused("no alarm is on")
         self._emit(EventKind.ALARM, f"silenced: {', '.join(names)}")
@@ -160,6 +179,7 @@ class LiveRun:
             stack.enter_context(self._rig.camera)
             stack.enter_context(self._rig.load)
             self._stop.on_request(self._rig.camera.stop)
+            self._run_state.health.began_t = time.monotonic()
             waits = "" if self.recording or self._recording is None else _ARMED
             self._run_state.health.state = self.state
             self._run_state.event_log.emit(EventKind.START, "phasedic", f"the test begins{waits}")
@@ -177,7 +197,8 @@ class LiveRun:
             raise
 
     def __exit__(self, *_: object) -> None:
-        """End all threads and close the devices, whatever happened before."""
+        """End all threads and close the devices, whatever happened before; no figure gets old by that."""
+        self._run_state.health.ended = True
         self._rig.camera.stop()
         self._load.stop()
         self.grabber.bursts.close()
@@ -203,11 +224,14 @@ class LiveRun:
         frame_counts = self._run_state.frame_counts
         unwritten = self._recording is not None and self._recording.failed is not None
         lossy = frame_counts.loss or self._outputs.failed or unwritten
-        return 5 if lossy or not frame_counts.adds_up or not self._run_state.history.has_values else 0
+        lossy = lossy or self._run_state.health.without_force_s > OLD_S
+        return 5 if lossy or not frame_counts.adds_up or not self._run_state.history.ends_with_values else 0
 
     def _take(self, frame: Frame) -> None:
         health = self._run_state.health
-        health.frame_t, health.fps = time.monotonic(), self.grabber.fps
+        health.framed(time.monotonic(), self.grabber.fps)
+        if self.grabber.taking_reference:
+            health.since_t = frame.t
         if self._recording is not None:
             self._recording.frame(frame, is_reference=self.grabber.taking_reference)
         self._outputs.frame(frame)
@@ -289,6 +313,7 @@ def run_live(
         The start failed; whatever was recorded by then is closed and readable.
     """
     stop, run_state = stop or StopSignal(), new_run_state(config, screen)
+    check_load_sign(config.load)
     rig = open_rig(
         config.camera.address,
         config.load.address,
@@ -316,9 +341,14 @@ def run_prepared(
     for line in prepared.announcement():
         screen.print(line)
     about = RunInfo(prepared.config, prepared.folder, rig.camera.info, grid, prepared.start, stop.request)
-    outputs = Outputs(consumers(about, run_state), run_state.loads, run_state.event_log, run_state.history)
+    watch = [ForceWatch(run_state)] if run_state.with_load else []
+    made = [*consumers(about, run_state), *watch]
+    outputs = Outputs(made, run_state.loads, run_state.event_log, run_state.history)
     code = _with_outputs(prepared, run_state, outputs, screen, stop, on_start)
-    return Outcome(prepared.folder, prepared.config, run_state, outputs, rig, grid, code)
+    test = finished(
+        prepared.folder, prepared.config, run_state, code, reference_force(run_state.event_log.events())
+    )
+    return Outcome(prepared.folder, prepared.config, run_state, outputs, rig, grid, code, test)
 
 
 def _with_outputs(

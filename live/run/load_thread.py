@@ -80,8 +80,9 @@ class LoadThread:
         try:
             for sample in self._cell:
                 self._arrived(time.monotonic())
-                self._run_state.loads.append(sample)
-                self._run_state.health.loaded(self._last_t, sample.force)
+                loads = self._run_state.loads
+                loads.append(sample)
+                self._run_state.health.loaded(self._last_t, sample.force, tells=loads.telling is sample)
                 self._run_state.frame_counts.add(load_samples=1)
                 if self._recording is not None:
                     self._recording.sample(sample)

@@ -14,10 +14,12 @@ from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind, EventSink, Level
 from acquire.frame import Burst
 from acquire.system import lower_priority
+from live.pipeline.burst_failures import BurstFailures
 from live.pipeline.consumer_thread import Outputs
 from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample
+from live.pipeline.measure import NewReference
 from live.pipeline.measurement import Measurement
-from live.pipeline.reference import ReferenceBurst, motion_between
+from live.pipeline.reference import Motion, ReferenceBurst, motion_between
 from live.pipeline.run_state import RunState
 from live.run.burst_queue import BurstQueue
 from live.run.prepared_run import PreparedRun
@@ -59,15 +61,18 @@ class ReferenceSelector:
         for attempt in itertools.count(1):
             ready = self._prepared.plan.on(reference.burst, what)
             motion = _motion(ready, reference)
-            if motion <= self._prepared.config.measure.reference_shift_px:
+            if motion.px <= self._prepared.config.measure.reference_shift_px and not motion.pulled:
                 break
             again = self._another(motion, attempt)
-            if again is None and math.isnan(motion):
+            if again is None and math.isnan(motion.px):
                 text = "no reference could be measured; keep the specimen still, look at light and focus"
                 self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "error")
                 return None
             if again is None:
-                text = f"the reference moved by {motion:.3f} px; keep the specimen still when strains must be absolute"
+                text = (
+                    f"the reference moved by {motion.amount} px; keep the specimen still when strains must be"
+                    " absolute"
+                )
                 self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "warning")
                 break
             self._run_state.frame_counts.add(reference=-reference.burst.n, left_out=reference.burst.n)
@@ -75,15 +80,15 @@ class ReferenceSelector:
         self._report(reference.burst, motion)
         return ready
 
-    def _another(self, motion: float, attempt: int) -> ReferenceBurst | None:
+    def _another(self, motion: Motion, attempt: int) -> ReferenceBurst | None:
         """The next reference; None where the run ends, or where one that moved must be used.
 
         A reference that cannot be measured is never used: the next one is tried until one is good.
         """
-        if attempt >= TRIES and not math.isnan(motion):
+        if attempt >= TRIES and not math.isnan(motion.px):
             return None
-        what = f"the picture moved by {motion:.3f} px during the reference burst"
-        if math.isnan(motion):
+        what = f"the picture moved by {motion.amount} px during the reference burst"
+        if math.isnan(motion.px):
             what = "the reference burst cannot be measured (fast motion, glare, no focus?)"
         if attempt < TRIES:
             self._run_state.event_log.emit(
@@ -94,7 +99,7 @@ class ReferenceSelector:
             self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "error")
         return self._burst_queue.retake_reference()
 
-    def _report(self, burst: Burst, motion: float) -> None:
+    def _report(self, burst: Burst, motion: Motion) -> None:
         force, n = self._run_state.loads.mean(burst.t - burst.duration / 2, burst.t + burst.duration / 2)
         data = {
             "first": burst.first_index,
@@ -102,19 +107,19 @@ class ReferenceSelector:
             "n": burst.n,
             "noise_GL": _or_none(burst.noise),
             "force_N": _or_none(force),
-            "shift_px": _or_none(motion),
+            "shift_px": _or_none(motion.px),
         }
-        noise = f", noise of one {burst.noise:.2f} GL, motion {motion:.4f} px" if burst.n > 1 else ""
+        noise = f", noise of one {burst.noise:.2f} GL, motion {motion.px:.4f} px" if burst.n > 1 else ""
         text = f"reference: {burst.n} frames{noise}" + (f", force {force:.2f} N" if n else "")
         self._run_state.event_log.record(
             Event(burst.t, EventKind.REFERENCE, "measurement", text, "info", data)
         )
 
 
-def _motion(ready: PreparedKernel, reference: ReferenceBurst) -> float:
-    """The motion within the burst, px; NaN where it cannot be measured, and then it is not still."""
+def _motion(ready: PreparedKernel, reference: ReferenceBurst) -> Motion:
+    """The motion within the burst; NaN where it cannot be measured, and then it is not still."""
     if reference.halves is None:
-        return 0.0
+        return Motion(0.0)
     return motion_between(ready.kernel, *reference.halves, ready.plan.correct)
 
 
@@ -229,7 +234,17 @@ class MeasureThread:
     def _measure(self, ready: PreparedKernel) -> None:
         event_log = self._run_state.event_log
         guard = SmearGuard(event_log.record)
-        for m in ready.measurements(self._burst_queue.bursts(), self._run_state.loads, event_log.record):
+        failures = BurstFailures(self._run_state, self._prepared.folder)
+
+        def failed(number: int, item: Burst | NewReference, error: Exception) -> None:
+            failures(number, item, error)
+            if isinstance(item, Burst):
+                event_log.record(
+                    _measured(item)
+                )  # replay --as-measured tries it too, and is as far as this run
+
+        bursts, loads = self._burst_queue.bursts(), self._run_state.loads
+        for m in ready.measurements(bursts, loads, event_log.record, failed):
             self._run_state.frame_counts.add(measured=m.burst.n)
             event_log.record(_measured(m.burst))
             m = self._timed(m)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from live.config.loading import Config
 from live.pipeline.consumer_thread import Outputs
 from live.pipeline.run_state import RunState
+from live.results.finished.finished_test import FinishedTest
 from live.setup.devices import Rig
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ class Outcome:
         Closed; its specimen has the true strain of a simulated test.
     grid : ZoiGrid
     exit_code : int
+    test : FinishedTest
     """
 
     folder: Path
@@ -43,6 +45,7 @@ class Outcome:
     rig: Rig
     grid: ZoiGrid
     exit_code: int
+    test: FinishedTest
 
 
 class StopSignal:

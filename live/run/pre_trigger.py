@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -17,6 +18,7 @@ from acquire.frame import Burst, Frame
 from acquire.load_sample import LoadSample
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import FrameCounts
+from live.pipeline.timed.figure import TimedFigure
 from live.run.control import START, ControlRefused
 
 _SMALL = 512  # bytes counted for an event
@@ -51,7 +53,8 @@ class PreTrigger:
     seconds : float, s
     max_bytes : int
     above_N : float, N
-        A force of this magnitude switches it on, once; infinite: only a command does.
+        A force of this magnitude, or one that is not known any more, switches it on, once; infinite: only a command
+        does.
     bursts : bool
         Bursts are recorded in place of frames.
     """
@@ -82,6 +85,7 @@ class PreTriggerBuffer:
         settings: PreTrigger,
         *,
         on: bool = True,
+        force: Callable[[], TimedFigure] = TimedFigure,
     ) -> None:
         self._recorder, self._frame_counts, self._event_log, self._settings = (
             recorder,
@@ -89,7 +93,7 @@ class PreTriggerBuffer:
             event_log,
             settings,
         )
-        self.on = on
+        self.on, self._force = on, force
         self._kept: deque[tuple[float, int, Item]] = deque()
         self._bytes = 0
         self._above_N = math.inf if on else settings.above_N
@@ -115,6 +119,7 @@ class PreTriggerBuffer:
 
     def frame(self, frame: Frame, *, is_reference: bool) -> None:
         """Take a frame; ``is_reference``: part of a reference."""
+        self._watch_force()
         with self._lock:
             if self._settings.bursts:
                 self._recorder.frame(frame)  # which only counts it
@@ -132,6 +137,12 @@ class PreTriggerBuffer:
         self._recorder.sample(sample)
         if abs(sample.force) > self._above_N and not self.on:
             self._switch_on(f"the force is above {self._above_N:g} N")
+
+    def _watch_force(self) -> None:
+        """A force that is not known is not one below the trigger: switch on where it is lost or beyond its range."""
+        trouble = self._force().trouble("force") if self._above_N < math.inf else ""
+        if trouble and not self.on:
+            self._switch_on(trouble)
 
     def event(self, event: Event) -> None:
         """Take an event; without the lock where it may come from the recorder's own thread."""

@@ -78,7 +78,8 @@ def new_run_state(config: Config, screen: Screen, *, both_sides: bool = False) -
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (phasedic devices lists what is there)")
     check_alarms(config, both_sides=both_sides)
-    run_state = RunState.new(config.load.max_gap_s, config.load.lag_s, config.specimen)
+    with_load = config.load.address != "none:"
+    run_state = RunState.new(config.load.max_gap_s, config.load.lag_s, config.specimen, with_load=with_load)
     run_state.event_log.names |= _device_names(config)
     screen.print(f"opening {config.camera.address}")
     return run_state

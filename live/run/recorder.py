@@ -24,8 +24,10 @@ from acquire.record_mode import RecordMode
 from acquire.session import RotatingWriter, SessionInfo, SessionWriter
 from live.pipeline.event_log import EventLog
 from live.pipeline.queues import BoundedQueue
-from live.pipeline.run_state import FrameCounts, Health, RunState
+from live.pipeline.run_state import FrameCounts, RunState
 from live.pipeline.screen import Screen
+from live.pipeline.timed.figure import TimedFigure
+from live.pipeline.timed.health import DISK_EVERY_S, Health
 from live.results.folder import versions
 from live.run.outcome import StopSignal
 from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
@@ -35,7 +37,6 @@ log = logging.getLogger(__name__)
 _SMALL = 512  # bytes counted for a sample or an event
 _MAX_WAIT_S = 0.5
 _CLOCK_EVERY_S = 60.0
-_DISK_EVERY_S = 5.0
 _DISK_WARN_S = 180.0
 
 Item = Frame | Burst | LoadSample | Event
@@ -56,7 +57,7 @@ def open_recording(
         return None
     path, mode = prepared.folder / "session.h5", RecordMode.parse(record.mode)
     writer = _open_writer(path, prepared, mode)
-    run_state.health.disk_s = _announce_disk(path, camera, mode, screen)
+    run_state.health.room(time.monotonic(), _announce_disk(path, camera, mode, screen))
     recorder = Recorder(
         writer,
         run_state.frame_counts,
@@ -70,8 +71,12 @@ def open_recording(
     settings = PreTrigger(
         record.keep_s, int(record.buffer_MB * 5e5), record.start_above_N or math.inf, mode.kind == "bursts"
     )
+
+    def force() -> TimedFigure:
+        return run_state.force(time.monotonic())
+
     pre_trigger = PreTriggerBuffer(
-        recorder, run_state.frame_counts, run_state.event_log, settings, on=not record.armed
+        recorder, run_state.frame_counts, run_state.event_log, settings, on=not record.armed, force=force
     )
     run_state.event_log.add_listener(pre_trigger.event)
     return pre_trigger
@@ -150,7 +155,7 @@ class Recorder:
         self._health, self._now = health or Health(), now
         self._began = now()
         self._next_clock = self._began + _CLOCK_EVERY_S
-        self._next_disk = self._began + _DISK_EVERY_S
+        self._next_disk = self._began + DISK_EVERY_S
         self._disk_warned = False
         self._wait_s = _MAX_WAIT_S
         self.failed: str | None = None
@@ -235,12 +240,13 @@ class Recorder:
             self._next_clock += _CLOCK_EVERY_S
             self._guarded(lambda: self._writer.write_clock(ClockPair.now()))
         if now > self._next_disk:
-            self._next_disk = now + _DISK_EVERY_S
+            self._next_disk = now + DISK_EVERY_S
             self._check_disk(now - self._began)
 
     def _check_disk(self, elapsed_s: float) -> None:
         rate = self._writer.bytes_written / elapsed_s
-        left = self._health.disk_s = forecast(self._writer.path, rate)
+        left = forecast(self._writer.path, rate)
+        self._health.room(self._now(), left)
         if left < _DISK_WARN_S and not self._disk_warned:
             text = f"the disk is full in {left:.0f} s at this rate; free some space, the recording goes on"
             self._event_log.emit(

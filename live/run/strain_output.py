@@ -1,5 +1,7 @@
 """Strain output: every measurement as a line of JSON or CSV to TCP clients, by UDP, or to a serial port.
 
+While nothing is measured a line says so, twice a second, without strains and with their age and state.
+
 Each output has its own thread and takes the newest measurement: one that stalls skips and counts, and
 delays neither the measurement nor another output.
 """
@@ -22,8 +24,11 @@ from acquire.serial_line.ports import LineSettings, open_port
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
 from live.pipeline.measurement import Measurement
+from live.pipeline.snapshot import AXIAL
 from live.run.tcp_lines import LineServer
 
+EVERY_S = 0.5
+"""While nothing is measured a line says so at this interval."""
 REOPEN_S = 1.0
 """A lost serial port is opened again at this interval."""
 
@@ -47,21 +52,26 @@ class LineFormat:
         self._values, self._channels, self._json = values, tuple(channels), form == "json"
         self.heading = "" if self._json else ",".join(channels)
 
-    def of(self, measurement: Measurement) -> str:
-        """The line, without its end; an unknown value is null in JSON and nan in CSV."""
-        values = self._values.read(measurement)
+    def of(self, measurement: Measurement | None) -> str:
+        """The line, without its end, of now where nothing is measured; an unknown value is null in JSON, nan in CSV."""
+        values: dict[str, float | str] = {**self._values.read(measurement), **self._values.states}
         if not self._json:
             return ",".join(_number(values.get(channel, math.nan)) for channel in self._channels)
         rounded = {channel: _rounded(values.get(channel, math.nan)) for channel in self._channels}
         return json.dumps(rounded, separators=(",", ":"))
 
+    def of_nothing(self) -> str:
+        """The line that is sent while no strain is live; empty while one is."""
+        line = self.of(None)
+        return "" if self._values.now.figure(AXIAL).known else line
 
-def _number(value: float) -> str:
-    return str(value) if isinstance(value, int) else f"{value:.8g}"
+
+def _number(value: float | str) -> str:
+    return str(value) if isinstance(value, int | str) else f"{value:.8g}"
 
 
-def _rounded(value: float) -> float | None:
-    if isinstance(value, int):
+def _rounded(value: float | str) -> float | str | None:
+    if isinstance(value, int | str):
         return value
     return float(f"{value:.8g}") if math.isfinite(value) else None
 
@@ -76,10 +86,21 @@ class StrainOut(Consumer, ABC):
     def __init__(self, name: str, lines: LineFormat) -> None:
         self.name, self._lines = name, lines
         self._posted: deque[str] = deque()
+        self._next = -math.inf  # when a line may say that nothing is measured
 
     def measurement(self, measurement: Measurement) -> None:
         """Send its line."""
         self.send(self._lines.of(measurement))
+        self._next = time.monotonic() + EVERY_S
+
+    def idle(self) -> float:
+        """Say now and then that nothing is measured: a client must not take the last line for the present."""
+        now = time.monotonic()
+        if now >= self._next:
+            self._next = now + EVERY_S
+            if line := self._lines.of_nothing():
+                self.send(line)
+        return EVERY_S
 
     def post(self, line: str) -> None:
         """Queue a line, from any thread; the next event sends it."""

@@ -18,10 +18,16 @@ from collections.abc import Callable, Iterator, Sequence
 from types import FrameType
 
 from acquire.errors import ConfigError, Interrupted
-from acquire.system import blocked_signals, signal_handler, unblock_signals
+from acquire.system import (
+    blocked_signals,
+    python_command,
+    python_environment,
+    signal_handler,
+    unblock_signals,
+)
 
 log = logging.getLogger(__name__)
-_POLL_S = 0.25
+_POLL_S, _MODULE = 0.25, "live.setup.compiling"
 BAR_LENGTH, KNOWN_SHARE = 30, 0.1  # an estimate from less is none
 _INTERRUPTED = (
     "interrupted while the loops were compiled; what is compiled is kept, the next start goes on from there"
@@ -59,9 +65,12 @@ def compile_ahead(
         return 0.0
     began, began_file = time.monotonic(), time.time()
     words = [",".join(kinds), "phase" if phase else "-"]
-    commands = [[sys.executable, "-m", __name__, part, *words] for part in COMPILE_PARTS]
+    commands = [python_command(_MODULE, part, *words) for part in COMPILE_PARTS]
     with blocked_signals(signal.SIGINT):
-        processes = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands]
+        processes = [
+            subprocess.Popen(command, stdout=subprocess.DEVNULL, env=python_environment())
+            for command in commands
+        ]
     try:
         with _interruptions() as interrupted:
             while any(process.poll() is None for process in processes):

@@ -79,9 +79,11 @@ def open_two_rigs(
     cameras : sequence of CameraConfig
         Simulated ones look at the specimen of the first address.
     load : LoadConfig
+        Its sign is 1.
     sinks : sequence of callables taking an Event
         One of each camera; all take the events of the load cell.
     """
+    check_load_sign(load)
     _check_one_specimen([camera.address for camera in cameras])
     simulated = [camera.address for camera in cameras if _simulated(camera.address)]
     specimen = _specimen(simulated[0] if simulated else "none:", load.address)
@@ -118,6 +120,14 @@ def check_load_port(address: str) -> None:
         from acquire.serial_line.ports import check_present
 
         check_present(parsed.target)
+
+
+def check_load_sign(load: LoadConfig) -> None:
+    """Refuse the sign of forces that are not live; raises ConfigError."""
+    if load.sign < 0 and load.address != "none:":
+        raise ConfigError(
+            "load.sign is for files and recordings (replay, batch); for a load cell give sign=-1 in its address"
+        )
 
 
 def at_rest(address: str) -> str:

@@ -17,7 +17,7 @@ from analysis.optics import LensCorrection, LensModel, PlateFit, ShutterCorrecti
 from live.config.gauges import gauges_for
 from live.config.loading import Config
 from live.pipeline.guards import DilatationGuard, TiltGuard, standard_guards
-from live.pipeline.measure import Corrections, NewReference, PlateCorrection, Tracker, measure
+from live.pipeline.measure import Corrections, NewReference, OnFailure, PlateCorrection, Tracker, measure
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import Correction, prepare
 from live.setup.compiling import compile_ahead
@@ -138,7 +138,11 @@ class PreparedKernel:
     timer: Callable[[], float] = time.perf_counter
 
     def measurements(
-        self, bursts: Iterable[Burst | NewReference], loads: LoadLog, on_event: EventSink
+        self,
+        bursts: Iterable[Burst | NewReference],
+        loads: LoadLog,
+        on_event: EventSink,
+        on_failure: OnFailure | None = None,
     ) -> Iterator[Measurement]:
         """The measurement of each burst (``live.pipeline.measure.measure``)."""
         plan, config = self.plan, self.plan.config
@@ -159,6 +163,7 @@ class PreparedKernel:
             strain=strain,
             guards=guards,
             timer=self.timer,
+            on_failure=on_failure,
         )
 
 

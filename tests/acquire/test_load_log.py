@@ -175,3 +175,14 @@ def test_an_empty_log_covers_nothing_and_a_mean_has_both_its_ends() -> None:
     assert not log.covers(0.0) and len(log) == 0 and log.latest is None
     log = log_of((0.0, 1.0), (0.1, 2.0), (0.2, 6.0))
     assert log.mean(0.0, 0.2) == (3.0, 3) and log.mean(0.0, 0.19) == (1.5, 2)
+
+
+def test_many_samples_at_once_are_as_one_by_one() -> None:
+    times, forces = np.arange(5) * 0.1, np.array([0.0, 1.0, math.nan, 3.0, 4.0])
+    one, many = LoadLog(), LoadLog()
+    for t, force in zip(times, forces, strict=True):
+        one.append(LoadSample(float(t), float(force)))
+    many.extend(times, forces)
+    at = [-0.1, 0.0, 0.05, 0.15, 0.35, 0.4, 0.5]
+    np.testing.assert_array_equal([many.force_at(t) for t in at], [one.force_at(t) for t in at])
+    assert len(many) == len(one) == 5 and many.latest == one.latest

@@ -173,13 +173,52 @@ class StampedCapture(FakeCapture):
 
 
 def test_stamps_of_the_driver_tell_how_many_were_lost() -> None:
-    capture = StampedCapture([100.0, 100.1, 100.1 + 1 / 30, 100.1 + 4 / 30, 100.1 + 5 / 30])
+    steps = [0, 1, 2, 3, 4, 5, 8, 9, 10, 12, 13]
+    capture = StampedCapture([100.0, *(100.1 + k / 30 for k in steps), 100.1 + 14 / 30])
     camera = OpenCVCamera("opencv:0", lambda: capture, OpenCVSettings(), ignore_event, now=lambda: 100.0)
-    frames = take(camera, 3)
+    frames = take(camera, len(steps))
     assert {frame.clock for frame in frames} == {"device"}
-    assert [frame.lost_before for frame in frames] == [0, 0, 2]
-    assert [frame.index for frame in frames] == [0, 1, 4]
-    assert [frame.t for frame in frames] == pytest.approx([100.1, 100.1 + 1 / 30, 100.1 + 4 / 30])
+    assert [frame.lost_before for frame in frames] == [0, 0, 0, 0, 0, 0, 2, 0, 0, 1, 0]
+    assert [frame.index for frame in frames] == steps
+    assert [frame.t for frame in frames] == pytest.approx([100.1 + k / 30 for k in steps])
+
+
+def test_a_camera_that_gives_half_of_the_rate_it_says_loses_nothing_and_is_named() -> None:
+    events: list[Event] = []
+    capture = StampedCapture([100.0 + k / 15 for k in range(42)])
+    camera = OpenCVCamera("opencv:0", lambda: capture, OpenCVSettings(), events.append, now=lambda: 100.0)
+    frames = take(camera, 40)
+    assert sum(frame.lost_before for frame in frames) == 0 and frames[-1].index == 39
+    told = [event.text for event in events if "frames a second come" in event.text]
+    assert len(told) == 1 and "15 frames" in told[0] and "30" in told[0]
+
+
+def test_a_camera_that_slows_down_in_low_light_loses_one_frame_at_most() -> None:
+    stamps = [100.0 + k / 30 for k in range(30)]
+    stamps += [stamps[-1] + k / 15 for k in range(1, 31)]
+    capture = StampedCapture(stamps)
+    camera = OpenCVCamera("opencv:0", lambda: capture, OpenCVSettings(), ignore_event, now=lambda: 100.0)
+    assert sum(frame.lost_before for frame in take(camera, 58)) <= 1
+
+
+class Unsettable(FakeCapture):
+    """Takes settings without a word, and changes nothing."""
+
+    def set(self, prop: int, value: float) -> bool:
+        return True
+
+
+def test_automatics_are_switched_off_and_read_back_or_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    automatics = (cv2.CAP_PROP_AUTO_EXPOSURE, cv2.CAP_PROP_AUTO_WB, cv2.CAP_PROP_AUTOFOCUS)
+    for system, manual in (("linux", 1), ("win32", 0)):
+        monkeypatch.setattr("acquire.opencv.webcam.sys.platform", system)
+        capture = FakeCapture(shots(1))
+        info = camera_of(capture).info
+        assert [capture.values[prop] for prop in automatics] == [manual, 0, 0]
+        assert not any("automatic" in text for text in info.warnings)
+        info = camera_of(Unsettable(shots(1), AUTO_EXPOSURE=3, AUTOFOCUS=1)).info
+        (told,) = [text for text in info.warnings if "automatic" in text]
+        assert "exposure, focus;" in told
 
 
 def test_a_camera_that_does_not_open_or_gives_nothing() -> None:

@@ -42,6 +42,7 @@ SPECIMEN = {
     "rotation_deg": "a number from -45 to 45",
     "lockstep": "yes or no",
     "machine": "a whole number from 0 to 65535",
+    "waits": "yes or no",
 }
 CAMERA = {
     "bits": "one of 8, 10, 12, 16",

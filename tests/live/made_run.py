@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,8 +19,11 @@ from acquire.session import SessionInfo, SessionWriter
 from analysis.field.strain_field import StrainField
 from live.config.gauges import gauges_for
 from live.config.loading import from_dict
+from live.config.sections import SpecimenConfig
 from live.pipeline.measurement import Measurement
+from live.pipeline.run_state import RunState
 from live.results import Results, ResultsInfo
+from live.results.finished.finished_test import FinishedTest
 from tests.live.made_up import CAMERA, START, make_field, make_frame, make_grid, make_measurement
 
 E_PA, YIELD, HARDENING_PA, WIDTH_MM, THICKNESS_MM = 70e9, 0.003, 1e8, 10.0, 2.0
@@ -45,6 +49,13 @@ def force_of(strain: float) -> float:
     """N; elastic, then all but flat."""
     stress = E_PA * min(strain, YIELD) + HARDENING_PA * max(strain - YIELD, 0.0)
     return stress * WIDTH_MM * THICKNESS_MM * 1e-6
+
+
+def finished(
+    run_state: RunState, specimen: SpecimenConfig | None = None, reference_N: float = math.nan
+) -> FinishedTest:
+    """The test of a run that has ended; without gauges."""
+    return FinishedTest.of_run(run_state, specimen or run_state.specimen, {}, reference_N)
 
 
 def make_run(

@@ -13,6 +13,7 @@ from acquire.load_sample import LoadSample
 from analysis.field.grid import Roi, ZoiGrid
 from analysis.field.strain_field import StrainField
 from live.pipeline.measurement import Measurement
+from live.pipeline.timed.figure import TimedFigure
 
 START = 1000.0
 CAMERA = CameraInfo("sim:made-up", "made up", 128, 96, 12, live=False, clock="nominal", fps=10.0)
@@ -55,6 +56,14 @@ def make_measurement(
         clock="device",
     )
     return Measurement.of(number, burst, make_field(grid, strain), force)
+
+
+def figures(**values: float | tuple[float, float]) -> dict[str, TimedFigure]:
+    """Live figures by name, each a value or a value with its sigma; one that is NaN is unknown."""
+    pairs = {name: one if isinstance(one, tuple) else (one, math.nan) for name, one in values.items()}
+    return {
+        name: TimedFigure.at(0.0, 0.0, value, sigma, why="lost") for name, (value, sigma) in pairs.items()
+    }
 
 
 def make_frame(index: int, t: float, shape: tuple[int, int] = (96, 128)) -> Frame:

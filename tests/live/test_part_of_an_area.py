@@ -24,6 +24,7 @@ from live.results.report.curves import parts
 from live.results.summary import StatusCard, summary_lines
 from live.ui.rerun.drawing.large_figures import paint
 from live.ui.terminal.status_line import gauge_texts, status_line
+from tests.live.made_run import finished
 from tests.live.made_up import START, make_grid, make_measurement
 
 GRID = make_grid(256, 192)
@@ -88,7 +89,7 @@ def test_status_line_card_summary_and_view_are_marked(lost: bool) -> None:
     run_state.health.began_t = 0.0
     now = run_state.snapshot(0.0, step)
     card = StatusCard(run_state.specimen, run_state.loads).written(now, run_state.history)
-    summary = "\n".join(summary_lines(run_state, run_state.specimen))
+    summary = "\n".join(summary_lines(run_state, finished(run_state)))
     mean, least = (f"of {math.floor(100 * share_of(GRID, gauge))} % of the area" for gauge in (None, HALF))
     assert (mean in status_line(now, 300)) == lost
     assert (least in card) == (least in summary) == lost

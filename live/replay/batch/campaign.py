@@ -29,6 +29,7 @@ from live.replay.batch.task import Task, row_done
 from live.replay.batch.test_list import BatchJob
 from live.replay.batch.workdir import sweep, sweep_done
 from live.replay.batch.worker_processes import Pool, WorkerProcesses
+from live.replay.pictures import reference_file
 from live.setup.compiling import compile_ahead
 
 
@@ -54,7 +55,7 @@ def as_csv(rows: Sequence[BatchRow]) -> bytes:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     writer.writerows([_cell(row.values[name]) for name in COLUMNS] for row in rows)
-    return text.getvalue().encode()
+    return text.getvalue().encode("utf-8", "backslashreplace")
 
 
 def as_parquet(rows: Sequence[BatchRow]) -> bytes | None:
@@ -107,6 +108,8 @@ class CampaignRequest:
     as_measured : bool
     chunk_s : float or None, s
         Cut longer sessions into chunks of about this length.
+    reference : str or None
+        Name or file of the reference of all; that of a test replaces it.
     scheduler : str or None
         Address of a Dask cluster, used instead of ``workers`` processes of this machine.
     """
@@ -121,6 +124,7 @@ class CampaignRequest:
     as_measured: bool = False
     chunk_s: float | None = None
     scheduler: str | None = None
+    reference: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -235,7 +239,7 @@ def _task(wanted: CampaignRequest, test: BatchJob) -> Task:
         out=str(wanted.out.absolute()),
         source=test.source,
         config=_absolute(test.config or wanted.config),
-        reference=_absolute(test.reference),
+        reference=_absolute(reference_file(test.source, test.reference or wanted.reference)),
         forces=_absolute(test.forces),
         start_s=wanted.start_s,
         end_s=wanted.end_s,

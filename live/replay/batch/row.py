@@ -16,7 +16,7 @@ from live.config.loading import Config
 from live.pipeline.history import History
 from live.replay.replay import Replayed
 from live.results import Strain, still_phase_of
-from live.results.figures import HEADLINE, evaluate, tensile_table
+from live.results.figures import HEADLINE, tensile_table
 
 Value = str | int | float | None
 COLUMNS: dict[str, type] = {
@@ -88,7 +88,7 @@ def row_of(name: str, source: str, done: Replayed, seconds: float) -> BatchRow:
             **_settings(done.config),
             "burst": done.config.measure.burst or _burst(done),
             **_counts(history),
-            **_figures(evaluate(history, done.run_state.loads, done.config.specimen), done.config),
+            **_figures(done.test.figures, done.config),
             **_noise(history),
             **_noise_floor(done.folder / "strain.h5"),
             "frames_lost": done.run_state.frame_counts.lost,

@@ -200,10 +200,10 @@ def _as_published(task: Task, staging: Path, words: str) -> str:
 
 
 def _replayed(task: Task, staging: Path, on_progress: OnProgress) -> BatchRow:
-    with (staging / LOG_FILE).open("w", encoding="utf-8") as file:
+    with (staging / LOG_FILE).open("w", encoding="utf-8", errors="backslashreplace") as file:
         screen, began = _LogScreen(file, on_progress), time.monotonic()
         done = replay(task.request(staging), screen, threading.Event())
-        for line in [*summary_lines(done.run_state, done.config.specimen), *done.lines]:
+        for line in [*summary_lines(done.run_state, done.test), *done.lines]:
             screen.print(line)
     on_progress(screen.last)
     before = sum(_seconds(Path(chunk)) for chunk in task.chunks)
@@ -218,7 +218,7 @@ def _measured(task: Task, staging: Path, on_progress: OnProgress) -> BatchRow:
     """Measure a chunk."""
     began = time.monotonic()
     with (
-        (staging / LOG_FILE).open("w", encoding="utf-8") as log_file,
+        (staging / LOG_FILE).open("w", encoding="utf-8", errors="backslashreplace") as log_file,
         (staging / FIELDS_FILE).open("wb") as file,
     ):
         screen = _LogScreen(log_file, on_progress)

@@ -9,15 +9,13 @@ from __future__ import annotations
 import contextlib
 import json
 import logging
-import os
 import signal
 import subprocess
-import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from acquire.system import blocked_signals
+from acquire.system import blocked_signals, python_command, python_environment
 from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress
 from live.replay.batch.worker import ONE_THREAD
@@ -81,10 +79,10 @@ class WorkerProcess:
     def __init__(self) -> None:
         with blocked_signals(signal.SIGINT):
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "live.replay.batch.worker"],
+                python_command("live.replay.batch.worker"),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                env=_LEAN | os.environ | dict.fromkeys(ONE_THREAD, "1"),
+                env=_LEAN | python_environment() | dict.fromkeys(ONE_THREAD, "1"),
                 text=True,
                 encoding="utf-8",
             )

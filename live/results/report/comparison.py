@@ -11,7 +11,7 @@ import numpy as np
 
 from acquire.errors import ConfigError, DataError
 from analysis.evaluate import CONFIDENCE
-from live.results.figures import TensileRow, headline, value_text
+from live.results.figures import TensileRow, figure_text, headline
 from live.results.report.curves import load_unit, strain_unit
 from live.results.report.evaluation import EvaluatedCurve
 from live.results.report.page import Html, element, joined, page, paragraph, safe, section, table
@@ -94,9 +94,14 @@ def write_table(tests: Sequence[ComparedTest], file: TextIO) -> None:
         file.write(
             f"{_quoted(test.title)},{_quoted(test.path)},{values},{_quoted(test.curve.figures.elastic_strain)}\n"
         )
-    found = [summary([row.figure.value for row in rows]) for rows in figures]
+    found = [_summary(rows) for rows in figures]
     for name, part in (("mean", 0), ("standard deviation", 1), ("n", 2)):
         file.write(f"{name},,{','.join(f'{one[part]:.8g},' for one in found)},\n")
+
+
+def _summary(rows: Sequence[TensileRow]) -> tuple[float, float, int]:
+    """Of the values; a bound is none."""
+    return summary([math.nan if row.figure.is_bound else row.figure.value for row in rows])
 
 
 def _quoted(words: str) -> str:
@@ -131,7 +136,7 @@ def _table(tests: Sequence[ComparedTest]) -> Html:
         ]
         for k, test in enumerate(tests)
     ]
-    found = [summary([row.figure.value for row in of_tests]) for of_tests in figures]
+    found = [_summary(of_tests) for of_tests in figures]
     rows.append(["mean", *(_number(mean) for mean, _, _ in found), ""])
     rows.append(["standard deviation", *(_number(deviation) for _, deviation, _ in found), ""])
     rows.append(["n", *(str(n) for _, _, n in found), ""])
@@ -142,7 +147,7 @@ def _cell(row: TensileRow) -> Html:
     """Value and half of the interval in the unit of the column; where it is not known, the reason as a tooltip."""
     if not row.figure.known:
         return element("span", "not known", title=row.figure.why)
-    return safe(value_text(row.figure.value, row.half, ""))
+    return safe(figure_text(row.figure))
 
 
 def _number(value: float) -> str:

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate import Figure, TensileFigures, Track, evaluate_test, find_lag, neck
+from analysis.evaluate import TensileFigures, evaluate_test, neck
 from live.results.figures import tensile_options
 from live.results.run_folder import RunFolder
 
 Array = NDArray[np.float64]
+FIGURES = "figures.json"
 _BROKEN = 0.02  # of the highest force: below it there is no specimen any more
 
 
@@ -73,17 +74,6 @@ def intercept_of(axial: Array, load: Array, figures: TensileFigures) -> float:
     """The load of the elastic line at no strain, in the unit of ``load``; NaN where there is no line."""
     part = _elastic(axial, load, figures) & np.isfinite(load)
     return float(np.mean(load[part]) - figures.E.value * np.mean(axial[part])) if part.any() else math.nan
-
-
-def lag_of(run: RunFolder) -> Figure:
-    """The lag of the recorded load behind the frames, s, found from the test itself."""
-    samples = run.load_samples
-    if not samples:
-        return Figure.none("no readings of a load cell were recorded")
-    t = np.array([sample.t - run.start_monotonic for sample in samples])
-    force = np.array([sample.force for sample in samples])
-    strain = Track(np.asarray(run.strain.time_s, np.float64), run.axial_strain)
-    return find_lag(strain, Track(t, force))
 
 
 def time_steps(run: RunFolder, curve: EvaluatedCurve) -> dict[int, str]:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
 from live.results.figures import figure_text, value_text
+from live.results.finished.finished_test import FinishedTest
 from live.results.folder import versions
 from live.results.maps.colours import unit_for
 from live.results.quantities import MEANS, quantity_of
-from live.results.report.evaluation import lag_of
 from live.results.report.page import Html, element, facts, joined, paragraph, table
 from live.results.run_folder import RunFolder
 
@@ -63,19 +63,16 @@ def _plain(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def times(run: RunFolder) -> Html:
+def times(run: RunFolder, test: FinishedTest) -> Html:
     """The lag of the load behind the frames, and the latency of the results."""
-    lag = lag_of(run)
+    lag = test.lag
     words = figure_text(lag, 1e-3, "ms") if lag.known else f"not known: {lag.why}"
     sign = f" ({CONFIDENCE:.0%} interval; positive: the load is late)" if lag.known else ""
     late = np.asarray(run.strain.values.get("latency_s", ()), np.float64) * 1e3
     late = late[np.isfinite(late)]
-    corrected = run.section("load").get("lag_s")
     found = {
         "lag of the load behind the frames": words + sign,
-        "lag corrected in the force": f"{corrected:g} s"
-        if isinstance(corrected, int | float) and corrected
-        else "none",
+        "lag corrected in the force": f"{test.corrected_s:g} s" if test.corrected_s else "none",
     }
     if late.size:
         p50, p95 = np.percentile(late, (50, 95))

@@ -9,10 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquire.errors import DataError
+from acquire.hdf5 import storable
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
 from live.results.budget import CameraView, budget_cells
-from live.results.figures import axis_text, budget_of, figure_lines, headline, sharpness_line
+from live.results.figures import axis_text, budget_of, figure_lines, film_line, headline, sharpness_line
+from live.results.finished.figures_file import finished_in
+from live.results.finished.findings import doubts, findings
+from live.results.finished.finished_test import FinishedTest
 from live.results.report import curves
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
 from live.results.report.maps import MapPictures, map_pictures, maps, statuses
@@ -59,10 +63,11 @@ class ReportRequest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Report:
-    """A page and the figures on it."""
+    """A page, the figures on it, and the test; None of several tests."""
 
     html: str
     figures: tuple[Plot, ...]
+    test: FinishedTest | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,6 +75,7 @@ class _Content:
     """What does not depend on the size of the pictures."""
 
     run: RunFolder
+    test: FinishedTest
     curve: EvaluatedCurve
     figures: tuple[Plot, ...]
     time_steps: dict[int, str]
@@ -90,19 +96,19 @@ def make_report(run: RunFolder, wanted: ReportRequest, screen: Screen) -> Report
         raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to report")
     content = _content(run, wanted, screen)
     for side in _SIDES:
-        text = page(f"{run.title}: phasedic report", _parts(content, wanted, side))
+        text = storable(page(f"{run.title}: phasedic report", _parts(content, wanted, side)))
         if len(text.encode()) < MAX_BYTES:
             break
-    return Report(text, content.figures)
+    return Report(text, content.figures, content.test)
 
 
 def _content(run: RunFolder, wanted: ReportRequest, screen: Screen) -> _Content:
     curve = EvaluatedCurve.of(run)
     chosen = nearest_rows(run, wanted.times) if wanted.times else time_steps(run, curve)
-    still = still_phase_of(run.strain)
     return _Content(
-        run, curve, _figures(run, curve), chosen, map_pictures(run, list(chosen)), still, hashes(run, screen)
-    )
+        run, finished_in(run), curve, _figures(run, curve), chosen, map_pictures(run, list(chosen)),
+        still_phase_of(run.strain), hashes(run, screen),
+    )  # fmt: skip
 
 
 def _figures(run: RunFolder, curve: EvaluatedCurve) -> tuple[Plot, ...]:
@@ -123,13 +129,13 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
     reference = next((image for image in pictures.images.values() if image is not None), None)
     known = PracticeValues(run, pictures.camera, reference, content.still.floors, wanted.mm_per_px)
     return [
-        _head(run, content.curve),
+        _head(run, content.curve, content.test),
         section("Specimen and rig", facts(_rig(run, pictures))),
         section("Curves", plots(content.figures), _about_parts(run), _about_curves(content.curve)),
         section("Figures of the test", *figure_table(run, content.curve)),
         section("Budget of E", *budget_table(run, content.curve)),
         section("Virtual gauges", gauges(run)),
-        section("Lag and latency", times(run)),
+        section("Lag and latency", times(run, content.test)),
         section("Maps", *(maps(run, name, chosen, pictures, side) for name in fields)),
         section("Noise floor", *_noise_section(content)),
         *_sharpness_section(run),
@@ -146,7 +152,7 @@ def _unreadable(run: RunFolder) -> list[Html]:
     return [paragraph(note, "warning") for note in run.notes]
 
 
-def _head(run: RunFolder, curve: EvaluatedCurve) -> Html:
+def _head(run: RunFolder, curve: EvaluatedCurve, test: FinishedTest) -> Html:
     now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
     words = f"Test of {run.strain.start_utc}: {run.strain.n} measurements in {run.strain.time_s[-1]:.4g} s."
     unfinished = "The results were not closed by their writer; the report has all complete rows."
@@ -155,6 +161,7 @@ def _head(run: RunFolder, curve: EvaluatedCurve) -> Html:
             element("h1", run.title),
             paragraph(f"{words} Report made by phasedic on {now}.", "dim"),
             paragraph(unfinished, "warning") if run.strain.unfinished else Html(""),
+            *(paragraph(text, "warning") for text in doubts(findings(test))),
             tiles({**tensile(curve), **_extent(run, curve)}),
         ]
     )
@@ -244,11 +251,11 @@ def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
 
 
 def _sharpness_section(run: RunFolder) -> list[Html]:
-    """Nothing for results of earlier versions, which do not have the blur."""
+    """What a film holds back, and the blur, which results of earlier versions do not have."""
     values = run.strain.values
-    if "blur_px" not in values:
-        return []
-    lines = sharpness_line(values["blur_px"].tolist(), values["sigma_blur_px"].tolist())
+    lines = film_line(run.specimen)
+    if "blur_px" in values:
+        lines += sharpness_line(values["blur_px"].tolist(), values["sigma_blur_px"].tolist())
     return [section("Sharpness", *(paragraph(line.replace("+-", "±")) for line in lines))] * bool(lines)
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.quality.pattern import SPECKLE_RADIUS_PX
-from analysis.quality.steadiness import Steadiness, aliased, mains_of
+from analysis.quality.steadiness import Steadiness, aliased, mains_of, strain_drifts
 from live.setup.check.check_list import CheckFigures, median
 from live.setup.check.noise_floor import ZoiFloor
 from live.setup.check.sample import MIN_FRAMES
@@ -230,9 +230,13 @@ def _motion(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
     if not math.isfinite(s.drift_px):
         yield CheckLine("drift", "not measured", f.zois.without_pattern < 1, "no ZOI can be followed")
         return
-    strain = max((s.exx, s.eyy), key=lambda one: abs(one.drift))
+    pulled = [one for one in (s.exx, s.eyy) if strain_drifts(one.drift, one.sigma_drift)]
+    strain = max(pulled or (s.exx, s.eyy), key=lambda one: abs(one.drift))
+    words = "keep specimen and camera still"
+    if pulled:
+        words = "strain changes: stop the machine, take the load off, let the specimen rest, then check again"
     yield CheckLine("drift", f"{s.drift_px:.4f} px and {strain.drift * 1e6:+.0f} µm/m in {s.u.seconds:.3g} s",
-               s.drift_px <= max_px, "keep specimen and camera still")  # fmt: skip
+               s.drift_px <= max_px and not pulled, words)  # fmt: skip
     if s.dilatation:
         yield CheckLine("distance", f"exx and eyy drift alike, {s.dilatation * 1e6:+.0f} µm/m: it changes by"
                    f" {abs(s.dilatation):.1e} of the stand-off", abs(s.dilatation) < MAX_DILATATION,

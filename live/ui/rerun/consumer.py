@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import time
+from collections.abc import Callable
 from dataclasses import replace
 
 from acquire.errors import DataError
@@ -72,7 +74,10 @@ class CardWriter(Consumer):
 
     name = "status card"
 
-    def __init__(self, view: View, card: StatusCard, run_state: RunState) -> None:
+    def __init__(
+        self, view: View, card: StatusCard, run_state: RunState, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._clock = clock
         self._view, self._card, self._run_state = view, card, run_state
         self._time_steps: Thinned[TimeStep] = Thinned(CARD_TIME_STEPS)
 
@@ -83,7 +88,7 @@ class CardWriter(Consumer):
             history = History()
             for time_step in self._time_steps.items():
                 history.add(time_step)
-            snapshot = self._run_state.snapshot(measurement.t, measurement.time_step)
+            snapshot = self._run_state.snapshot(self._clock(), measurement.time_step)
             self._view.status(self._card.written(snapshot, history))
 
 
@@ -92,21 +97,23 @@ class FiguresWriter(Consumer):
 
     name = "figures"
 
-    def __init__(self, view: View, run_state: RunState) -> None:
-        self._view, self._run_state = view, run_state
-        self._last: TimeStep | None = None
+    def __init__(self, view: View, run_state: RunState, clock: Callable[[], float] = time.monotonic) -> None:
+        self._view, self._run_state, self._clock = view, run_state, clock
 
     def measurement(self, measurement: Measurement) -> None:
         """Show the newest measurement."""
-        self._last = measurement.time_step
-        self._view.figures(self._run_state.snapshot(measurement.t, self._last))
+        self._view.figures(self._run_state.snapshot(self._clock(), measurement.time_step))
 
     def event(self, event: Event) -> None:
         """Wake the thread: the first event comes before the first frame."""
 
     def idle(self) -> float:
         """Show the newest load and state, also before the first measurement."""
-        health = self._run_state.health
-        if health.state and not math.isnan(health.frame_t):
-            self._view.figures(self._run_state.snapshot(health.frame_t, self._last))
+        if self._run_state.health.live and not math.isnan(self._run_state.health.frame_t):
+            self._view.figures(self._run_state.snapshot(self._clock()))
         return IDLE_S
+
+    def end(self) -> str:
+        """Show that the test has ended, and no value as if it went on."""
+        self._view.figures(self._run_state.snapshot(self._clock()))
+        return ""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import astuple, dataclass, field, fields
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -17,7 +17,8 @@ from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from analysis.field import Measure, StrainField, ZoiGrid
 from live.pipeline.measurement import Measurement
-from live.pipeline.snapshot import Snapshot
+from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
+from live.pipeline.timed.figure import FigureState, TimedFigure
 from live.ui.rerun.wire import Kind, Message, WireError
 
 STRAINS = ("exx", "eyy", "exy")
@@ -91,7 +92,9 @@ For 20 megapixels, slicing takes 0.7 ms of the test, sending them whole 4 ms, an
 COLUMNS = {Kind.MEANS: 1 + 2 * len(STRAINS), Kind.LOADS: 2, Kind.POINTS: 2, Kind.GAUGE: 3}
 """Columns: t and mean, sigma of each strain; t and N; strain and N; t and strain, sigma of a gauge."""
 
-_NUMBERS = ("t", "axial", "sigma_axial", "force_N", "stress_Pa", "area_share")
+_NUMBERS = ("t", "area_share")
+_FIGURES = (AXIAL, FORCE, STRESS)
+_TEXTS = ("alarms", "faults")
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,8 +232,18 @@ def events_of(message: Message) -> list[Event]:
 
 def figures_message(snapshot: Snapshot) -> Message:
     """The large figures of ``snapshot``."""
-    shown = {name: getattr(snapshot, name) for name in (*_NUMBERS, "valid", "zois", "state", "alarms")}
-    return Message(Kind.FIGURES, {k: v for k, v in shown.items() if v == v})  # NaN is no JSON
+    meta = {
+        name: getattr(snapshot, name) for name in (*_NUMBERS, "valid", "zois", "state", "axial_name", *_TEXTS)
+    }
+    figures = {
+        name: [
+            one if isinstance(one, str) or math.isfinite(one) else None
+            for one in astuple(snapshot.figures[name])
+        ]
+        for name in _FIGURES
+        if name in snapshot.figures
+    }
+    return Message(Kind.FIGURES, {**meta, "figures": figures})  # NaN is no JSON
 
 
 def figures_of(message: Message) -> Snapshot:
@@ -239,10 +252,28 @@ def figures_of(message: Message) -> Snapshot:
     try:
         shown: dict[str, Any] = {name: float(meta.get(name, math.nan)) for name in _NUMBERS}
         shown |= {name: int(meta[name]) for name in ("valid", "zois")}
-        alarms = tuple(str(alarm) for alarm in meta["alarms"])
-        return Snapshot(**shown, state=str(meta["state"]), alarms=alarms)
-    except (KeyError, TypeError, ValueError) as error:
+        shown |= {name: tuple(str(text) for text in meta[name]) for name in _TEXTS}
+        figures = {str(name): _figure(*values) for name, values in meta["figures"].items()}
+        return Snapshot(
+            **shown, state=str(meta["state"]), axial_name=str(meta["axial_name"]), figures=figures
+        )
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise WireError(f"figures to the view are damaged: {error}") from error
+
+
+def _figure(
+    value: float | None,
+    sigma: float | None,
+    t: float | None,
+    age: float | None,
+    state: str,
+    why: str,
+    last: float | None,
+) -> TimedFigure:
+    value, sigma, t, last = (math.nan if one is None else float(one) for one in (value, sigma, t, last))
+    return TimedFigure(
+        value, sigma, t, math.inf if age is None else float(age), FigureState(state), str(why), last
+    )
 
 
 def _measure(message: Message) -> Measure:

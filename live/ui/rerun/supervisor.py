@@ -9,12 +9,10 @@ where the test is killed.
 from __future__ import annotations
 
 import contextlib
-import os
 import select
 import signal
 import socket
 import subprocess
-import sys
 import threading
 import time
 from collections import deque
@@ -23,7 +21,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquire.events import Level
-from acquire.system import HANGUP, KILLED, blocked_signals, lower_priority, send_some, start_with_socket
+from acquire.system import (
+    HANGUP,
+    KILLED,
+    blocked_signals,
+    lower_priority,
+    python_command,
+    python_environment,
+    send_some,
+    start_with_socket,
+)
 from live.pipeline.latency import OUTPUT
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox
@@ -43,7 +50,6 @@ Notify = Callable[[str, Level], None]
 """Takes a message for a person and its level."""
 
 _SEND_BYTES = 1 << 20
-_ROOT = str(Path(__file__).parents[3])
 _MODULE = "live.ui.rerun.drawing"
 _KILLED_S = 5.0
 
@@ -61,8 +67,7 @@ class RenderProcess:
     def __init__(self) -> None:
         with blocked_signals(signal.SIGINT, *HANGUP):
             # The process unblocks them once it ignores them.
-            command = [sys.executable, "-P", "-m", _MODULE]
-            self._process, ours = start_with_socket(command, _environment())
+            self._process, ours = start_with_socket(python_command(_MODULE), _environment())
         with contextlib.suppress(OSError):
             ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BYTES)
         ours.setblocking(False)
@@ -132,14 +137,13 @@ class RenderProcess:
 
 
 def _environment() -> dict[str, str]:
-    """The environment of the process, with this code first in its path; -P keeps the current folder out of it.
+    """The environment of the process.
 
     The allocator of rerun returns freed memory at once: a tenth less memory in a long test. Its file has no footer
     (``sinks.write``), of which it would warn.
     """
-    paths = [_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])]
     own = {"MIMALLOC_PURGE_DELAY": "0", "RUST_LOG": "warn,re_log_encoding::rrd::file_sink=error"}
-    return {**own, **os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    return own | python_environment()
 
 
 class Stuck(OSError):

@@ -46,7 +46,7 @@ VIEWER_PACKAGES = "apt install libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0
 LOAD_STEP_S = 0.02
 """Of load samples that come faster, one in this time is shown."""
 
-_OPENING_S = 10.0
+_OPENING_S, _OFF = 10.0, ("off", "0", "false", "no")
 _ANSI_CODES, _OS_ERROR = re.compile(r"\x1b\[[0-9;]*m"), re.compile(r"os error at \S+ ")
 
 
@@ -82,6 +82,8 @@ class View:
         self._setup, self._pending = setup, Pending()
         self._outbox = Outbox(setup, self._pending, playback)
         target = ViewTarget(port, None if rrd is None else str(rrd.absolute()), str(uuid.uuid4()))
+        if os.environ.get("RERUN", "").lower() in _OFF:
+            notify("RERUN=off is set: the view stays empty, and view.rrd too; unset the variable", "warning")
         self._supervisor = Supervisor(self._outbox, target, notify, lambda: on_serving(self))
         self._picture_t = self._load_t = -math.inf
         self._supervisor.start()

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from live.pipeline.snapshot import Snapshot
 
 _TERMINAL_EVERY_S, _FILE_EVERY_S = 0.25, 5.0
-_IN_ASCII = str.maketrans({"µ": "u", "±": "+-"})
+_IN_ASCII = str.maketrans({"µ": "u", "±": "+-", "–": "-"})
 _UNKNOWN_WIDTH, _FILE_WIDTH = 119, 1000
 
 

@@ -7,11 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from acquire.printable import duration, share_text
+from live.pipeline.snapshot import AXIAL, BURST, DISK, FORCE, FPS, STRESS
+from live.pipeline.timed.figure import BEYOND, LACKING, FigureState
 
 if TYPE_CHECKING:
     from analysis.evaluate import GaugeValue
     from live.pipeline.measurement import TimeStep
     from live.pipeline.snapshot import Snapshot
+    from live.pipeline.timed.figure import TimedFigure
 
 GAP = "  "
 MAX_GAUGES = 4
@@ -24,7 +27,7 @@ SideValues = tuple[float, float, float]
 
 def status_line(s: Snapshot, width: int, words: str = "") -> str:
     """The line, at most ``width`` characters; ``words`` name what the run waits for."""
-    return fitted([*_test(s), (3, words), *_strain(s.time_step), _assumed(s), *_machine(s)], width)
+    return fitted([*_test(s), (3, words), *_strain(s), _assumed(s), *_machine(s)], width)
 
 
 def sides_line(
@@ -48,8 +51,9 @@ def sides_line(
 def _each(sides: Mapping[str, Snapshot]) -> Iterator[Item]:
     """The strain of each camera, where there is no mean."""
     for name, s in sides.items():
-        if not math.isnan(s.axial):
-            yield 5, f"{name} {strain_text(s.axial, s.sigma_axial)} µm/m"
+        axial = s.figure(AXIAL)
+        if text := figure_text(axial, strain_text(axial.value, axial.sigma), f"{axial.last * 1e6:+,.0f}"):
+            yield 5, f"{name} {text} µm/m"
 
 
 def _both(both: Mapping[str, SideValues]) -> Iterator[Item]:
@@ -77,15 +81,22 @@ def fitted(items: Sequence[Item], width: int) -> str:
 
 def _test(s: Snapshot) -> list[Item]:
     alarm = " ".join(f"ALARM {text}" for text in s.alarms)
-    stress = "" if math.isnan(s.stress_Pa) else f"{s.stress_Pa * 1e-6:.1f} MPa"
+    force, stress = s.figure(FORCE), s.figure(STRESS)
+    shown = figure_text(force, force_text(force.value), force_text(force.last))
+    over = f"{stress.value * 1e-6:.1f} MPa" if stress.known else ""
     peak = "" if math.isnan(s.peak_N) else f"peak {force_text(s.peak_N)}"
-    load = [(0, force_text(s.force_N)), (4, stress), (12, peak)]
+    load = [(0, shown if force.known or not shown else f"force {shown}"), (4, over), (12, peak)]
     return [(1, alarm), (2, s.state), (7, duration(s.elapsed_s)), *load]
 
 
-def _strain(i: TimeStep | None) -> list[Item]:
+def _strain(s: Snapshot) -> list[Item]:
+    i = s.time_step
     if i is None:
         return []
+    burst = s.figure(BURST)
+    if not burst.known:
+        last = f"{s.axial_name} {s.figure(AXIAL).last * 1e6:+z,.0f} µm/m"
+        return [(5, f"strain {figure_text(burst, '', last)}")]
     items = [(5 if number == 0 else 10, text) for number, text in enumerate(gauge_texts(i))]
     items[-1] = items[-1][0], f"{items[-1][1]} µm/m"
     return [*items, (5, share_text(i.area_share)), (8, f"{i.n_valid}/{i.n_zoi} ZOIs")]
@@ -100,14 +111,36 @@ def _machine(s: Snapshot) -> list[Item]:
     frames = s.frames
     late = "" if math.isnan(s.latency_p95_s) else f"p95 {s.latency_p95_s * 1e3:.0f} ms"
     measured = f"measured {frames['measured']}" if s.time_step is not None else f"{frames['grabbed']} frames"
+    fps, disk = s.figure(FPS), s.figure(DISK)
+    bare = frames.get("without_force", 0)
     return [
-        (9, f"{s.fps:.0f} fps"),
+        (9, f"{figure_text(fps, f'{fps.value:.0f}')} fps"),
+        (6, f"WITHOUT FORCE {bare}" if bare else ""),
         (12, measured),
         (11, f"skipped {frames['skipped']}"),
         (6, f"LOST {s.lost}") if s.lost else (13, "lost 0"),
         (12, late),
-        (14, "" if math.isinf(s.disk_s) else f"disk {s.disk_s / 60:.0f} min"),
+        (14, f"disk {text} min" if (text := figure_text(disk, f"{disk.value / 60:.0f}")) else ""),
     ]
+
+
+def figure_text(figure: TimedFigure, live: str, last: str = "") -> str:
+    """What is shown of a figure: ``live``, or what it has instead of a value; empty where there is no such source.
+
+    Of one that is old, ``last`` and its age are shown too.
+    """
+    if figure.known or figure.state is FigureState.NONE:
+        return live if figure.known else ""
+    if figure.state in BEYOND:
+        return figure.state.upper()
+    if figure.state not in LACKING:
+        return f"– ({figure.state})"
+    words = (
+        f"{last}, {figure.age:.0f} s ago"
+        if last and math.isfinite(figure.age) and figure.last == figure.last
+        else figure.why
+    )
+    return f"– ({words})" if words else "–"
 
 
 def force_text(value: float) -> str:

@@ -10,21 +10,22 @@ from pathlib import Path
 import numpy as np
 
 from acquire.printable import counted
-from live.config.sections import SpecimenConfig
 from live.pipeline.consumer import ConsumerReport
 from live.pipeline.event_log import sentence
+from live.pipeline.history import History
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.results.figures import (
     alignment_line,
     elastic_lines,
-    evaluate,
     figure_lines,
-    lag_line,
+    film_line,
     plastic_lines,
     tare_line,
 )
-from live.results.summary import file_lines, noise_line, summary_lines, why_nothing
+from live.results.finished.findings import doubts, findings
+from live.results.finished.finished_test import FinishedTest
+from live.results.summary import doubt_lines, file_lines, noise_line, summary_lines, valid_line, why_nothing
 from live.ui.terminal.status_line import strain_text
 
 SMALL_MB = 10.0  # below it with a decimal
@@ -34,7 +35,7 @@ TURNED = math.radians(5)  # off the axis of the load, from which on the summary 
 def print_summary(
     screen: Screen,
     run_state: RunState,
-    specimen: SpecimenConfig,
+    test: FinishedTest,
     folder: Path,
     lines: Sequence[str],
     *,
@@ -44,53 +45,63 @@ def print_summary(
     """Print the figures of a test, then ``lines``, then where the files are; ``with_report``: one will be made."""
     screen.print()
     if verbose:
-        shown = [*summary_lines(run_state, specimen), *lines, *file_lines(folder)]
+        shown = [*summary_lines(run_state, test), *lines, *file_lines(folder)]
     else:
         following = "" if with_report else f"; next: phasedic report {shlex.quote(str(folder))}"
-        shown = [*brief_lines(run_state, specimen), *lines, _files(folder) + following]
+        shown = [*brief_lines(run_state, test), *lines, _files(folder) + following]
     for line in shown:
         screen.print(line)
 
 
-def brief_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
+def brief_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     """State, strain, E, nu and strengths or why they are not known, noise, and what is odd."""
-    history = run_state.history
-    valid = np.flatnonzero(history.column("n_valid"))
-    if not valid.size:
+    history, specimen = run_state.history, test.specimen
+    if not history.has_values:
         return [why_nothing(run_state)]
-    last = history.time_steps[int(valid[-1])]
-    refused = f" ({last.refused})" if last.refused else ""
-    axis = history.axis(specimen.axis).axis
-    strain, sigma = last.axial(axis)
     lines = [
-        f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        f"strain along {axis} at the end: {strain_text(strain, sigma)} µm/m"
-        + f" ({last.apart})" * bool(last.apart),
-        *_figures(run_state, specimen),
+        *doubt_lines(test),
+        valid_line(history),
+        *_at_end(history, test.axis.axis),
+        *film_line(specimen),
+        *_figures(run_state, test),
         noise_line(history),
-        *_remarks(run_state, specimen),
+        *_remarks(run_state, test),
     ]
     return [line.strip() for line in lines]
 
 
-def _figures(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
-    figures = evaluate(run_state.history, run_state.loads, specimen)
+def _at_end(history: History, axis: str) -> list[str]:
+    """The strain of the last burst; where it has none, also of the last that has one."""
+    n, known = len(history.time_steps), np.flatnonzero(np.isfinite(history.along(axis)[0]))
+    texts = [f"{strain_text(*history.time_steps[int(k)].axial(axis))} µm/m" for k in known[-1:]]
+    if n - 1 in known[-1:]:
+        return [f"strain along {axis} at the end: {texts[0]}"]
+    last = history.time_steps[-1]
+    why = last.apart or f"{last.n_valid} of {last.n_zoi} valid"
+    none = f"strain along {axis} at the end: no value, {why}"
+    return [none, *(f"the last burst with a value is {known[-1] + 1} of {n}: {text}" for text in texts)]
+
+
+def _figures(run_state: RunState, test: FinishedTest) -> list[str]:
+    figures, specimen = test.figures, test.specimen
     if figures.E.known:
         return [
             line for line in [*elastic_lines(figures, specimen), *plastic_lines(figures, specimen)] if line
         ]
-    if not np.isfinite(run_state.history.forces(run_state.loads)).any():
-        return ["E is not known: no force is known (--load)"]
-    return [f"E is not known: {figures.E.why}", *figure_lines(figures, specimen)[:1]]
+    if not test.has_force:
+        last_t = run_state.history.time_steps[-1].t
+        why = f"no burst has a force: {run_state.loads.why_none_at(last_t)}"
+        return [f"E is not known: {why if run_state.with_load else 'no force is known (--load)'}"]
+    odd = doubts(findings(test))
+    why = figures.E.why + "; the first line above says what to look at" * bool(odd)
+    return [f"E is not known: {why}", *figure_lines(figures, specimen)[:1]]
 
 
-def _remarks(run_state: RunState, specimen: SpecimenConfig) -> Iterator[str]:
-    history, loads = run_state.history, run_state.loads
-    yield from tare_line(history, loads)
-    yield from (line for line in lag_line(history, loads, specimen) if "--lag" in line)
-    angle = history.axis(specimen.axis).angle
+def _remarks(run_state: RunState, test: FinishedTest) -> Iterator[str]:
+    yield from tare_line(run_state.history, run_state.loads)
+    angle = test.axis.angle
     if angle.known and abs(angle.value) > TURNED:
-        yield from alignment_line(history, specimen)
+        yield from alignment_line(run_state.history, test.specimen)
 
 
 def trouble_lines(

@@ -25,7 +25,8 @@ from live.pipeline.consumer import Consumer, Policy
 from live.pipeline.event_log import sentence
 from live.pipeline.measurement import AXIAL, Measurement, TimeStep
 from live.pipeline.run_state import RunState
-from live.pipeline.snapshot import Snapshot, peak_force
+from live.pipeline.snapshot import BURST, DISK, FORCE, FPS, STRESS, Snapshot, peak_force
+from live.pipeline.timed.figure import TimedFigure
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.curve_history import CurveHistory
 from live.ui.web.map_view import MapView, gauge_shapes, plate_shapes
@@ -203,7 +204,7 @@ class PageConsumer(Consumer):
         return {
             "peak": peak,
             "atpeak": words,
-            "gauges": _gauges(m.time_step),
+            "gauges": _gauges(m.time_step, {}),
             "points": self.curve.position,
         }
 
@@ -219,10 +220,12 @@ class PageConsumer(Consumer):
             "state": self._state_name(s),
             "elapsed_s": s.elapsed_s,
             "recording": None if running is None else running.recording,
-            "force_N": s.force_N,
+            "figures": {name: shown(s.figure(name)) for name in (FORCE, STRESS, AXIAL)},
+            "troubles": [printable(text) for text in s.troubles],
+            "force_N": s.figure(FORCE).value,
             "peak_N": s.peak_N,
-            "stress_Pa": s.stress_Pa,
-            "strain_rate": self._rate,
+            "stress_Pa": s.figure(STRESS).value,
+            "strain_rate": self._rate if s.figure(BURST).known else math.nan,
             "elongation_mm": self._elongation(s),
             "points": self.curve.position,
             "picture": {
@@ -232,29 +235,26 @@ class PageConsumer(Consumer):
                 **self._scale,
             },
             "events": [{"s": max(at - self._start_t, 0.0), **event} for at, event in self._events],
-            "late_s": s.latency_p95_s,
-            "fps": s.fps,
+            "late_s": s.latency_p95_s if s.figure(BURST).known else math.nan,
+            "fps": s.figure(FPS).value,
             "ledger": s.frames,
-            "alarms": [printable(text) for text in s.alarms],
-            "disk_min": s.disk_s / 60,
+            "disk_min": s.figure(DISK).value / 60,
             "sides": None if self._sides is None else self._sides.state(),
         }
         return values | _measured(s)
 
     def _snapshot(self, running: Running, now: float) -> Snapshot:
         """The state of the test; of a recording all figures are of one instant, and nothing is late."""
-        if running.live or self._matched is None:
+        if running.live or self._matched is None or running.run_state.health.ended:
             return running.run_state.snapshot(now)
-        step, area = self._matched.time_step, self._config.specimen.area_m2
-        s = running.run_state.snapshot(now, step)
-        stress = step.force / area if area else math.nan
-        return replace(s, force_N=step.force, stress_Pa=stress, peak_N=self._peak_N, latency_p95_s=math.nan)
+        s = running.run_state.snapshot(now, self._matched.time_step)
+        return replace(s, peak_N=self._peak_N, latency_p95_s=math.nan)
 
     def _elongation(self, s: Snapshot) -> float | None:
         if self._length_mm is None:
             return None
-        gauge = s.time_step and s.time_step.gauges.get(self._elongation_gauge)
-        return self._length_mm * (gauge.value if gauge else s.axial)
+        name = f"gauge_{self._elongation_gauge}"
+        return self._length_mm * s.figure(name if name in s.figures else AXIAL).value
 
     def _state_name(self, s: Snapshot) -> str:
         if self._running is None:
@@ -293,17 +293,23 @@ def elongation_length(config: Config) -> tuple[str, float | None]:
     return "", config.specimen.gauge_length_mm
 
 
-def _gauges(step: TimeStep) -> list[dict[str, Any]]:
-    return [
-        {
-            "name": name,
-            "value": gauge.value,
-            "sigma": gauge.sigma,
-            "reason": gauge.reason,
-            "part": share_text(gauge.share),
-        }
-        for name, gauge in step.gauges.items()
-    ]
+def shown(figure: TimedFigure) -> dict[str, Any]:
+    """A figure as the page draws it; ``value`` is null unless it is live, and then ``last`` is shown with its age."""
+    return {
+        "state": str(figure.state), "value": figure.value, "last": figure.last, "age_s": figure.age, "why": figure.why
+    }  # fmt: skip
+
+
+def _gauges(step: TimeStep, figures: Mapping[str, TimedFigure]) -> list[dict[str, Any]]:
+    """The gauges of a time step, without the values of those whose figure is not live."""
+    found = []
+    for name, gauge in step.gauges.items():
+        figure = figures.get(f"gauge_{name}", TimedFigure(gauge.value, gauge.sigma))
+        part, reason = share_text(gauge.share), gauge.reason
+        found.append(
+            {"name": name, "value": figure.value, "sigma": figure.sigma, "reason": reason, "part": part}
+        )
+    return found
 
 
 def _measured(s: Snapshot) -> dict[str, Any]:
@@ -313,13 +319,13 @@ def _measured(s: Snapshot) -> dict[str, Any]:
     return {
         "axial": {
             "name": s.axial_name,
-            "value": s.axial,
-            "sigma": s.sigma_axial,
+            "value": s.figure(AXIAL).value,
+            "sigma": s.figure(AXIAL).sigma,
             "assumed": "axis assumed" if s.axis_assumed else "",
         },
-        "gauges": _gauges(i),
+        "gauges": _gauges(i, s.figures),
         "valid": s.valid,
-        "zois": s.zois,
+        "zois": s.zois if s.figure(BURST).known else None,
         "refused": i.refused,
         "part": share_text(s.area_share),
         "kernel_s": i.measure_s,

@@ -12,7 +12,9 @@ from analysis.evaluate import TensileFigures
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import sentence
 from live.pipeline.run_state import RunState
-from live.results.figures import TensileRow, evaluate, tensile_table
+from live.results.figures import TensileRow, tensile_table
+from live.results.finished.findings import doubts, findings
+from live.results.finished.finished_test import FinishedTest
 from live.results.report.curves import load_unit, strain_unit, stress_strain
 from live.results.report.evaluation import EvaluatedCurve, intercept_of
 from live.results.summary import why_nothing
@@ -22,14 +24,15 @@ from live.ui.web.sides import figures_of, side_figures
 MAX_TROUBLES = 20
 
 
-def run_result(run_state: RunState, specimen: SpecimenConfig, folder: Path, words: str) -> dict[str, Any]:
-    """Warnings, figures, lines over the curve, and frame counts of a run.
+def run_result(run_state: RunState, test: FinishedTest, folder: Path, words: str) -> dict[str, Any]:
+    """What the data say against the figures, warnings, figures, lines over the curve, and frame counts of a run.
 
     ``words`` describe how the run ended; they are empty where it ended well.
     """
-    log, measured = run_state.event_log, run_state.history.has_values
-    troubles = [sentence(event, log.names) for event in log.events("warning", "error")][-MAX_TROUBLES:]
-    figures = evaluate(run_state.history, run_state.loads, specimen) if measured else None
+    log, measured, specimen = run_state.event_log, run_state.history.has_values, test.specimen
+    troubles = doubts(findings(test)) if measured else []
+    troubles += [sentence(event, log.names) for event in log.events("warning", "error")][-MAX_TROUBLES:]
+    figures = test.figures if measured else None
     return {
         "folder": str(folder),
         "words": words,
@@ -41,10 +44,11 @@ def run_result(run_state: RunState, specimen: SpecimenConfig, folder: Path, word
 
 
 def sides_result(
-    states: Mapping[str, RunState], specimen: SpecimenConfig, folder: Path, words: str
+    states: Mapping[str, RunState], tests: Mapping[str, FinishedTest], folder: Path, words: str
 ) -> dict[str, Any]:
     """The result of a test with two cameras: figures of the mean and of each, warnings of both, else the first."""
-    results = {side: run_result(state, specimen, folder / side, words) for side, state in states.items()}
+    results = {side: run_result(state, tests[side], folder / side, words) for side, state in states.items()}
+    specimen = next(iter(tests.values())).specimen
     found = figures_of(states, specimen)
     figures: list[dict[str, Any]] = [{**one, "interval": ""} for one in side_figures(found, specimen)]
     figures += [_interval_of_e(one) for one in list(found.values())[:1] if one.E.known]

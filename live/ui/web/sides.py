@@ -9,6 +9,7 @@ from analysis.evaluate import TensileFigures
 from live.config.sections import SpecimenConfig
 from live.config.sides import BACK, FRONT
 from live.pipeline.run_state import RunState
+from live.pipeline.snapshot import FPS
 from live.results.figures import evaluate, headline, tensile_options
 from live.results.sides.together import SideOfTest, SidesOfTest, newest
 
@@ -56,7 +57,7 @@ class SidesPanel:
             "failed": state.health.camera_failed,
             "valid": s.valid,
             "zois": s.zois,
-            "fps": s.fps,
+            "fps": s.figure(FPS).value,
             "skipped": s.frames["skipped"],
             "lost": s.lost,
         }

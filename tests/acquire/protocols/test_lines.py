@@ -208,11 +208,6 @@ def test_exception_is_an_error_not_a_value() -> None:
     assert math.isnan(reading.value) and reading.flags is LoadFlag.ERROR
 
 
-def test_an_echoing_adapter() -> None:
-    made = parser("modbus", "profile=pt113")
-    assert [r.value for r in made.feed(made.commands["poll"] + answer(0, 5, 2))] == [5.0]
-
-
 @given(st.integers(0, 10), st.integers(1, 255))
 def test_every_damaged_byte_is_noticed(at: int, change: int) -> None:
     whole = bytearray(answer(0, 12345, 2))

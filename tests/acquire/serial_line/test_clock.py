@@ -35,7 +35,8 @@ def test_the_device_clock_takes_jitter_away() -> None:
         true = 50.0 + 0.0125 * k
         t = clock.stamp(12.5 * k, true + rng.expovariate(1 / 0.004)).t
         errors.append(t - true)
-    assert max(errors[50:]) - min(errors[50:]) < 0.001
+    assert max(errors[50:]) - min(errors[50:]) < 0.003, "before the rate is known"
+    assert max(errors[800:]) - min(errors[800:]) < 0.0005
     assert 0.003 < clock.jitter_s < 0.007
 
 
@@ -78,11 +79,11 @@ def test_a_single_wrong_stamp_is_doubted_alone() -> None:
 
 def test_late_messages_keep_their_own_stamps() -> None:
     clock = DeviceClock()
-    for k in range(10):
+    for k in range(1000):
         clock.stamp(10.0 * k, 1.0 + 0.01 * k)
-    stamps = [clock.stamp(10.0 * k, 4.0) for k in range(10, 200)]
+    stamps = [clock.stamp(10.0 * k, 14.0) for k in range(1000, 1200)]
     assert not any(s.doubtful for s in stamps)
-    assert [s.t for s in stamps] == pytest.approx([1.0 + 0.01 * k for k in range(10, 200)], abs=2e-3)
+    assert [s.t for s in stamps] == pytest.approx([1.0 + 0.01 * k for k in range(1000, 1200)], abs=1e-3)
 
 
 def test_a_device_that_lost_time_is_tied_anew_in_the_end() -> None:
@@ -218,23 +219,26 @@ def test_of_an_unknown_pace_only_the_last_message_of_a_read_is_not_late() -> Non
     assert pace.late([0.0, 0.0, 0.0]) == [True, True, False] and pace.late([0.1]) == [False]
 
 
-def test_the_clock_of_a_device_is_let_go_slow_by_so_much_a_second() -> None:
-    """0.3 ms: a device clock that is 1 s slow in an hour; what comes later than that was delayed."""
+def test_the_clock_of_a_device_may_be_slow_by_its_bound_before_its_rate_is_known() -> None:
+    """By 2 %, of a ceramic resonator; what comes later than that was delayed."""
     clock = DeviceClock()
     clock.stamp(0.0, 100.0)
-    assert clock.stamp(1000.0, 101.1).t == pytest.approx(101 + 0.00033, abs=1e-9)
+    assert clock.stamp(1000.0, 101.1).t == pytest.approx(101.02)
     assert clock.stamp(2000.0, 101.9).t == pytest.approx(101.9), "and at once where it comes earlier"
-    assert clock.jitter_s == pytest.approx(0.09967 / math.sqrt(3))
+    assert clock.jitter_s == pytest.approx(0.08 / math.sqrt(3))
+    clock = DeviceClock(3e-4)
+    clock.stamp(0.0, 100.0)
+    assert clock.stamp(1000.0, 101.1).t == pytest.approx(101.0003)
 
 
-def test_the_drift_counts_from_the_end_of_the_first_five_seconds() -> None:
+def test_the_drift_is_told_from_fifteen_seconds_on() -> None:
     clock = DeviceClock()
-    for k in range(16):
+    for k in range(15):
         clock.stamp(1000.0 * k * (1 + 1e-4), 100.0 + k)
-    assert math.isnan(clock.drift), "15 s"
-    for k in range(16, 21):
+    assert math.isnan(clock.drift)
+    for k in range(15, 17):
         clock.stamp(1000.0 * k * (1 + 1e-4), 100.0 + k)
-    assert clock.drift == pytest.approx(16e-4 / 15)
+    assert clock.drift == pytest.approx(1e-4, rel=1e-3)
 
 
 @pytest.mark.parametrize(("late_s", "doubtful"), [(0.49, False), (3.0, False), (-0.49, False), (-0.51, True)])

@@ -153,10 +153,10 @@ def test_a_short_frame_counts_as_lost() -> None:
 
 def test_a_driver_that_does_not_count_is_told_and_stamps_tell_the_losses() -> None:
     rig = CameraRig(FakeCamera(counts=False))
-    rig.fake.script.extend([_nothing, _nothing, _set(skip_next=2)])
-    frames = rig.take(4)
-    assert [frame.index for frame in frames] == [0, 1, 4, 5]
-    assert [frame.lost_before for frame in frames] == [0, 0, 2, 0]
+    rig.fake.script.extend([*[_nothing] * 7, _set(skip_next=2)])
+    frames = rig.take(9)
+    assert [frame.index for frame in frames] == [0, 1, 2, 3, 4, 5, 6, 9, 10]
+    assert [frame.lost_before for frame in frames] == [0] * 7 + [2, 0]
     assert rig.texts().count("does not number") == 1
 
 

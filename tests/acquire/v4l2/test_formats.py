@@ -82,10 +82,12 @@ def test_after_a_restart_the_stamps_tell() -> None:
 
 
 def test_a_driver_that_does_not_count_is_noticed() -> None:
+    """And its gaps are those of the rate that comes, 10, not the 20 that it says."""
     counter = FrameCounter()
-    assert [counter.count(0, t, 10.0) for t in (0.0, 0.1, 0.4)] == [0, 0, 2]
+    times = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.9, 1.0)
+    assert [counter.count(0, t, 20.0) for t in times] == [0] * 7 + [2, 0]
     assert not counter.counts_itself
-    assert counter.index == 4
+    assert counter.index == 10
 
 
 @given(

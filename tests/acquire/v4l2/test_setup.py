@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import pytest
 
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError
+from acquire.v4l2 import api
 from acquire.v4l2.camera import v4l2_settings
 from acquire.v4l2.controls import changeable, exposure_s, list_controls
 from acquire.v4l2.device import Identity, SizeRange, V4L2Device
@@ -13,6 +17,7 @@ from acquire.v4l2.faults import find_again
 from acquire.v4l2.formats import preferred
 from acquire.v4l2.listing import _modes
 from acquire.v4l2.setup import Setup, set_up
+from tests.acquire.v4l2 import fake_kernel
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
 
 AUTO, EXPOSURE, GAIN, ANALOGUE = 0x9A0901, 0x9A0902, 0x980913, 0x9E0903
@@ -110,3 +115,35 @@ def test_of_two_cameras_of_its_name_neither_is_taken(others: tuple[str, ...], ex
     )
     known = [Identity("fake", "fake camera", bus) for bus in others]
     assert find_again(kernel, "/dev/video0", Identity("fake", "fake camera", "usb-1"), known) == expected
+
+
+WOVEN, APART = (4, 8, 9), (2, 3, 5, 6, 7)
+
+
+@pytest.fixture
+def interlaced(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """Has the driver keep to a way of interlacing whatever it is asked."""
+    plain = fake_kernel._ANSWERS[api.G_FMT]
+
+    def keep(field: int) -> None:
+        def answer(kernel: FakeKernel, camera: FakeCamera, argument: Any) -> None:
+            plain(kernel, camera, argument)
+            argument.fmt.pix.field = field
+
+        monkeypatch.setitem(fake_kernel._ANSWERS, api.G_FMT, answer)
+
+    return keep
+
+
+@pytest.mark.parametrize("field", [0, api.FIELD_NONE, *WOVEN])
+def test_rows_of_two_moments_are_named(interlaced: Callable[[int], None], field: int) -> None:
+    interlaced(field)
+    warnings = in_force(device_with(), "").warnings
+    assert any("two moments" in text for text in warnings) == (field in WOVEN)
+
+
+@pytest.mark.parametrize("field", APART)
+def test_fields_that_come_one_by_one_are_refused(interlaced: Callable[[int], None], field: int) -> None:
+    interlaced(field)
+    with pytest.raises(ConfigError, match="interlaced"):
+        in_force(device_with(), "")

@@ -14,7 +14,7 @@ from acquire.events import Event
 from acquire.v4l2.camera import V4L2Camera, v4l2_settings
 from acquire.v4l2.controls import MANUAL, changeable, control_name, exposure_s, list_controls, still_automatic
 from acquire.v4l2.faults import fault_in_words, why_not_open
-from acquire.v4l2.formats import FORMATS, decode, picture_size, warning_of
+from acquire.v4l2.formats import FORMATS, Plane, decode, picture_size, warning_of
 from acquire.v4l2.setup import V4L2Settings
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
 from tests.acquire.v4l2.test_setup import AUTO, EXPOSURE, GAIN, device_with, in_force
@@ -58,11 +58,16 @@ def test_sixteen_bits_come_low_byte_first_and_rows_may_be_padded() -> None:
 
 
 @pytest.mark.parametrize(
-    ("plane", "kind", "size"),
-    [("raw", "bayer", (9, 7)), ("g", "bayer", (4, 3)), ("g", "grey", (9, 7)), ("r", "luma", (9, 7))],
-)
-def test_a_plane_of_a_mosaic_has_half_its_size(plane: str, kind: str, size: tuple[int, int]) -> None:
-    assert picture_size(9, 7, plane, kind) == size  # type: ignore[arg-type]
+    ("plane", "name", "size"),
+    [
+        ("raw", "RGGB", (9, 7)), ("r", "RGGB", (5, 4)), ("g", "RGGB", (4, 4)), ("b", "RGGB", (4, 3)),
+        ("g", "GREY", (9, 7)), ("r", "YUYV", (9, 7)),
+    ],
+)  # fmt: skip
+def test_a_plane_of_a_mosaic_has_every_other_row_and_column(
+    plane: Plane, name: str, size: tuple[int, int]
+) -> None:
+    assert picture_size(9, 7, FORMATS[name], plane) == size
 
 
 def test_each_doubtful_format_is_warned_of_by_name() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,14 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquire.addresses import parse_address
 from acquire.errors import Interrupted
 from acquire.load_sample import LoadSample
 from analysis import PICTURE_KINDS, Roi, ZoiGrid
+from analysis.evaluate import Figure
+from hw_mocks.specimen import specimen_from
 from live.cli import main
 from live.commands import demo
 from live.commands.demo import MeansCollector, ZoiTruth, middle_of
 from live.config.loading import load_config
 from live.pipeline.run_state import RunState
+from live.results.figures import evaluate
 from tests.live.made_up import START, make_grid, make_measurement
 
 SHORT = ["--seconds", "2", "--fps", "10", "--reference-burst", "2", "--burst", "2", "--step", "64"]
@@ -182,7 +187,8 @@ def test_the_demo_compares_the_elastic_part_with_its_truth() -> None:
 def test_the_rig_of_the_demo() -> None:
     arguments = argparse.Namespace(specimen="hole", fps=None, **{"output.seconds": None})
     given = demo._defaults(arguments)
-    assert given["camera.address"] == "sim:hole?bits=12&fps=auto&buffers=64&section_mm2=40"
+    address = "sim:hole?bits=12&fps=auto&buffers=64&section_mm2=40&waits=yes&hold=120&seconds=137"
+    assert given["camera.address"] == address
     assert (given["specimen.width_mm"], given["specimen.thickness_mm"], given["load.address"]) == (
         20.0,
         2.0,
@@ -190,4 +196,105 @@ def test_the_rig_of_the_demo() -> None:
     )
     arguments = argparse.Namespace(specimen="hole", fps=12.5, **{"output.seconds": 7.0})
     assert "fps=12.5&" in demo._defaults(arguments)["camera.address"]
-    assert demo._defaults(arguments)["camera.address"].endswith("&seconds=7")
+    assert demo._defaults(arguments)["camera.address"].endswith("&waits=yes&hold=3.5&seconds=7")
+
+
+class MachineOf:
+    """A machine that measures a burst every ``period_s``, ``late_s`` after its frames at first and later and later."""
+
+    def __init__(self, kind: str, seconds: float | None = None) -> None:
+        address = demo._defaults(argparse.Namespace(specimen=kind, fps=None, **{"output.seconds": seconds}))[
+            "camera.address"
+        ]
+        self.specimen = specimen_from(parse_address(address))
+        self.specimen.clock.begin(START)
+        self.now = START
+        self.operator = demo.Operator(seconds, lambda: self.now)
+        self.operator.operate(self.specimen, 10.0)
+
+    def measure(self, number: int, t: float, now: float) -> None:
+        self.now = now
+        m = make_measurement(number, 0.0)
+        self.operator.measurement(replace(m, burst=replace(m.burst, t=t)))
+
+
+@pytest.mark.parametrize("kind", demo.SPECIMENS)
+@pytest.mark.parametrize(
+    ("taken_s", "measured_s", "lasts_s"),
+    [
+        (0.1, 0.1, 17.0),  # a fast machine: the test is as long as ever
+        (0.8, 0.8, 56 * 0.8 / 0.6),
+        (0.1, 0.9, 56 * 0.9 / 0.6),  # the camera keeps its rate, the kernel does not
+        (0.9, 0.1, 56 * 0.9 / 0.6),  # bursts that waited for the kernel come all at once
+        (5.0, 5.0, 150.0),
+    ],
+)
+def test_the_rig_pulls_so_slowly_that_forty_bursts_are_elastic(
+    kind: str, taken_s: float, measured_s: float, lasts_s: float
+) -> None:
+    machine = MachineOf(kind)
+    assert machine.specimen.duration_s == 137.0
+    for k in range(6):
+        assert machine.specimen.programme.pull is not None and machine.specimen.programme.pull.told is None
+        machine.measure(k, START + 10 + taken_s * k, START + 11 + measured_s * k)
+    begins, yields, ends = machine.specimen.programme.knots_s
+    assert begins == pytest.approx(11 + 5 * measured_s + 0.5 + 0.1) and ends - begins == pytest.approx(
+        lasts_s
+    )
+    assert machine.specimen.yield_s == pytest.approx(yields)
+    bursts = (yields - begins) / max(taken_s, measured_s)
+    assert bursts >= 40 or lasts_s == 150.0
+    machine.measure(7, START + 100, START + 100)  # told once
+    assert machine.specimen.programme.knots_s == (begins, yields, ends)
+    assert float(machine.specimen.axial_strain(begins)) == 0.0
+    assert float(machine.specimen.axial_strain(ends)) == pytest.approx(8e-3)
+
+
+def test_a_test_of_a_given_length_is_pulled_in_what_is_left_of_it() -> None:
+    machine = MachineOf("uniform", 20.0)
+    machine.measure(0, START + 3, START + 4)
+    begins, _, ends = machine.specimen.programme.knots_s
+    assert (begins, ends) == pytest.approx((4.6, 19.0)) and machine.specimen.duration_s == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize(("fps", "width"), [(4.9, "320"), (5.0, None), (30.0, None)])
+def test_the_picture_is_as_large_as_the_machine_renders(
+    fps: float, width: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hw_mocks.sim_camera.fps_on_this_machine", lambda address: fps)
+    settings = dict(parse_address(demo.fitting("sim:hole?fps=auto&bits=12")).settings)
+    assert settings.get("width") == width and settings.get("hole") == (width and "30")
+    assert demo.fitting("sim:hole?fps=10") == "sim:hole?fps=10"
+
+
+def figures_of(modulus: Figure) -> Any:
+    known = evaluate(RunState.new(1.0).history, RunState.new(1.0).loads, load_config(None, {}).specimen)
+    return replace(known, E=modulus, elastic_strain="eyy of the region")
+
+
+@pytest.mark.parametrize(
+    ("value", "agrees", "words"),
+    [
+        (61.4, True, "within its interval"),
+        (62.4, True, "off by 2.0 times"),
+        (63.4, False, "off by 4.0 times"),
+    ],
+)
+def test_the_modulus_is_held_against_that_of_what_was_measured(
+    value: float, agrees: bool, words: str
+) -> None:
+    """The strain of a region with a hole in it is larger than that of the material: 61.4 GPa are right there."""
+    lines, specimen = list[str](), MachineOf("hole").specimen
+    modulus = Figure(value * 1e9, (value - 0.5) * 1e9, (value + 0.5) * 1e9)
+    assert demo._print_modulus(figures_of(modulus), specimen, (61.4e9, 0.327), lines.append) is agrees
+    assert words in lines[0] and "true 61.4 GPa there" in lines[0] and "true 0.327 there" in lines[1]
+
+
+def test_a_machine_too_slow_to_measure_has_no_defect() -> None:
+    outcome: Any = SimpleNamespace(
+        rig=SimpleNamespace(specimen=Stretched()), grid=make_grid(), run_state=RunState.new(1.0), exit_code=0
+    )
+    outcome.run_state.loads.close()
+    lines, config = list[str](), load_config(None, {"specimen.area_mm2": 40.0})
+    assert demo.compare(outcome, MeansCollector(), config, lines.append) == 5
+    assert any("no instant of the elastic part was measured" in line for line in lines)

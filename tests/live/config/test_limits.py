@@ -63,7 +63,7 @@ COUNTS: dict[str, tuple[int | None, int, int]] = {
 }
 OTHERS = {
     "camera": {"address": "", "back": None, "beside": None, "crop": None, "dark": None, "flat": None},
-    "load": {"address": "none:"},
+    "load": {"address": "none:", "unit": None, "column": None, "decimal": None, "sign": 1},
     "measure": {
         "roi": None, "mask": None, "gauges": "given", "window": "gaussian", "estimator": "spectral",
         "strain": "engineering",
@@ -111,6 +111,7 @@ def test_no_key_is_left_out_here() -> None:
     assert rest == OTHERS
     assert dataclasses.asdict(AlarmConfig()) == {
         "channel": "", "above": None, "below": None, "hysteresis": 0.0, "name": "", "end": False, "line": "",
+        "end_on_unknown": False,
     }  # fmt: skip
     assert PlateConfig().box is None
     assert (DEFAULT_BURST, DEFAULT_REFERENCE_BURST) == (4, 32)
@@ -121,7 +122,8 @@ def test_some_options_are_switches_and_some_are_for_experts() -> None:
     assert {name for name, one in found.items() if one.on} == {"armed", "light", "report"}
     assert {name for name, one in found.items() if one.off} == {"no-record", "no-view", "no-rrd"}
     assert {name for name, one in found.items() if not one.expert} == {
-        "camera", "back", "beside", "load", "roi", "zoi", "step", "burst", "mask", "gauges", "strain", "scale",
+        "camera", "back", "beside", "load", "load-unit", "load-column", "load-decimal", "load-sign",
+        "roi", "zoi", "step", "burst", "mask", "gauges", "strain", "scale",
         "no-record", "armed", "orders", "strain-out", "no-view", "axis", "out", "seconds", "report",
     }  # fmt: skip
     keys = {name: key for name, (key, _) in options().items()}
@@ -143,6 +145,8 @@ def test_a_hysteresis_is_not_below_zero(hysteresis: float) -> None:
     [
         ("camera.crop", [0, 0, 1, 1], [0, 0, 1, 0]),
         ("measure.roi", "all", "ALL"),
+        ("load.sign", -1, 0),
+        ("load.decimal", "comma", ","),
         ("specimen.modulus_between", [0, 1], [0, 1.001]),
         ("specimen.modulus_between", [0.001, 0.002], [-0.001, 0.002]),
         ("specimen.modulus_between", [0.001, 0.002], [0.002, 0.002]),

@@ -22,7 +22,7 @@ def values() -> ChannelValues:
     run_state = RunState.new(1.0, specimen=SpecimenConfig(axis="y", area_mm2=40.0))
     run_state.health.state = "REC"
     run_state.loads.append(LoadSample(START, 800.0))
-    return ChannelValues(START, run_state.snapshot, lambda: {"more": 7.0})
+    return ChannelValues(START, run_state.snapshot, lambda: {"more": 7.0}, lambda: START + 0.3)
 
 
 def at(t: float, axial: float) -> Measurement:
@@ -41,6 +41,7 @@ def test_every_channel_has_the_value_of_its_name() -> None:
     read = values().read(replace(m, time_step=step))
     assert set(read) == {*MEASURED_CHANNELS, "gauge_left", "sigma_gauge_left", "more"}
     assert math.isnan(read.pop("strain_rate"))
+    assert (read.pop("age_s"), read.pop("force_age_s")) == (pytest.approx(0.1), pytest.approx(0.3))
     assert read == pytest.approx({
         "time_s": 0.2, "frame": 16, "axial": 1e-3, "sigma_axial": 4e-6, "force_N": 800.0, "stress_MPa": 20.0,
         "exx": -3e-4, "eyy": 1e-3, "exy": 2e-5, "largest": 2e-3, "lost_share": 0.25, "latency_s": 0.016,

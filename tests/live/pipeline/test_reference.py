@@ -11,7 +11,7 @@ import pytest
 from acquire.events import Event, EventKind
 from analysis import Roi, Status, StrainField, ZoiGrid
 from live.pipeline.measure import Tracker, _share
-from live.pipeline.reference import averaged, motion_between, repetition_text
+from live.pipeline.reference import Motion, averaged, motion_between, repetition_text
 from tests.live.made_up import START, make_field, make_grid, make_measurement
 
 GRID = ZoiGrid.cover(Roi(0, 0, 176, 32), 32, 16)  # ten side by side
@@ -57,14 +57,25 @@ def test_the_motion_is_known_where_more_than_a_fifth_of_the_zois_are_found(found
     burst = make_measurement(0).burst
     kernel: Any = Moving(seen(1.0, 2.0, 10), seen(1.3, 2.4, found))
     moved = motion_between(kernel, burst, burst)
-    assert moved == pytest.approx(0.5) if known else math.isnan(moved)
+    assert moved.px == pytest.approx(0.5) if known else math.isnan(moved.px)
     assert kernel.starts[0].u[0, 0] == 0.0 and kernel.starts[1].u[0, 0] == 1.0
 
 
 def test_zois_without_a_pattern_do_not_count() -> None:
     burst = make_measurement(0).burst
     first = seen(0.0, 0.0, 4, int(Status.NO_PATTERN))
-    assert motion_between(Moving(first, seen(0.3, -0.4, 1)), burst, burst) == pytest.approx(0.5)  # type: ignore[arg-type]
+    assert motion_between(Moving(first, seen(0.3, -0.4, 1)), burst, burst).px == pytest.approx(0.5)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("strain", "sigma", "pulled"),
+    [(2.1e-5, 4e-6, True), (-2.1e-5, 4e-6, True), (2.1e-5, 4.3e-6, False), (1.9e-5, 1e-7, False)],
+)
+def test_a_reference_is_pulled_beyond_five_sigma_and_twenty_micrometres_a_metre(
+    strain: float, sigma: float, pulled: bool
+) -> None:
+    assert Motion(0.01, strain, sigma).pulled is pulled
+    assert not Motion(0.01).pulled
 
 
 def test_the_noise_of_a_mean_has_at_least_that_of_the_rounding() -> None:

@@ -21,7 +21,7 @@ def test_the_counts_of_frames_in_a_line() -> None:
     assert FrameCounts(load_lost=1).loss and not FrameCounts(skipped=1).loss
     assert list(counts.as_dict()) == [
         "grabbed", "recorded", "unrecorded", "thinned", "reference", "measured", "skipped", "left_out", "lost",
-        "load_samples", "load_lost",
+        "load_samples", "load_lost", "without_force",
     ]  # fmt: skip
 
 

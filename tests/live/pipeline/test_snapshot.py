@@ -86,11 +86,13 @@ def test_the_snapshot_of_a_run() -> None:
     run_state = loaded(800.0, 900.0)
     run_state.frame_counts.add(grabbed=5, lost=2, unrecorded=1)
     run_state.alarms.set("a", "a: too much")
-    i = time_step(eyy=1e-3, sigma_eyy=2e-6)
+    i = time_step(eyy=1e-3, sigma_eyy=2e-6, t=2.0)
     run_state.history.add(i)
-    now = run_state.snapshot(5.0)
-    assert (now.elapsed_s, now.force_N, now.stress_Pa) == (5.0, 900.0, pytest.approx(900 / 40e-6))
-    assert (now.axial_name, now.axial, now.sigma_axial) == ("eyy", 1e-3, pytest.approx(2e-6))
+    now = run_state.snapshot(2.5)
+    force, stress, axial = (now.figure(name) for name in ("force", "stress", "axial"))
+    assert (now.elapsed_s, force.value, stress.value) == (2.5, 900.0, pytest.approx(900 / 40e-6))
+    assert (force.age, force.state, stress.state) == (1.5, "live", "live")
+    assert (now.axial_name, axial.value, axial.sigma) == ("eyy", 1e-3, pytest.approx(2e-6))
     assert (now.valid, now.zois, now.lost) == (i.n_valid, i.n_zoi, 3)
     assert now.alarms == ("a: too much",) and now.time_step is not None and now.time_step.t == i.t
     run_state.frame_counts.add(lost=5)
@@ -100,28 +102,35 @@ def test_the_snapshot_of_a_run() -> None:
 def test_in_a_replay_the_force_is_that_of_the_instant() -> None:
     run_state = loaded(800.0)
     run_state.health.state = ""
-    assert math.isnan(run_state.snapshot(0.0).force_N)
+    assert run_state.snapshot(0.0).figure("force").state == "not yet"
     now = run_state.snapshot(1.0, time_step(force=123.0))
-    assert (now.state, now.force_N) == ("REPLAY", 123.0)
+    assert (now.state, now.figure("force").value) == ("REPLAY", 123.0)
 
 
 @pytest.mark.parametrize(("axis", "mean"), [("x", "exx"), ("y", "eyy")])
 def test_axial_is_the_gauge_of_that_name_or_else_the_mean_along_the_load(axis: str, mean: str) -> None:
     run_state, plain = loaded(axis=axis), time_step(exx=1e-3, sigma_exx=1e-6, eyy=2e-3, sigma_eyy=2e-6)
     now = run_state.snapshot(0.0, plain)
-    assert (now.axial_name, now.axial, now.sigma_axial) == (
-        mean, getattr(plain, mean), getattr(plain, f"sigma_{mean}")
-    )  # fmt: skip
+    axial = now.figure("axial")
+    assert (now.axial_name, axial.value, axial.sigma) == (
+        mean,
+        getattr(plain, mean),
+        getattr(plain, f"sigma_{mean}"),
+    )
     lost = run_state.snapshot(0.0, replace(plain, gauges={"axial": GaugeValue(math.nan, math.nan, "lost")}))
-    assert lost.axial_name == "axial" and math.isnan(lost.axial), "a lost gauge is not replaced by the mean"
+    assert lost.axial_name == "axial" and lost.figure("axial").why == "lost", (
+        "a lost gauge is not replaced by the mean"
+    )
     other = run_state.snapshot(0.0, replace(plain, gauges={mean: GaugeValue(0.5, 0.1)}))
-    assert other.axial == getattr(plain, mean), "a gauge that has the name of a mean is a gauge like others"
+    assert other.figure("axial").value == getattr(plain, mean), (
+        "a gauge that has the name of a mean is a gauge like others"
+    )
 
 
 def test_before_anything_is_measured_the_page_can_be_told() -> None:
     page = PageConsumer(Broadcaster(), load_config(None, {}), lambda: 5.0)
     assert page.state()["state"] == "opening" and page.state()["elapsed_s"] == 0.0
-    assert math.isnan(Snapshot(0.0).axial)
+    assert Snapshot(0.0).figure("axial").state == "none"
     json.dumps(on_the_page(loaded(1.0)))
 
 

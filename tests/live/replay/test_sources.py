@@ -297,13 +297,13 @@ def test_a_study_along_x_has_the_strains_along_x() -> None:
 def test_a_table_of_forces_without_a_heading_has_names_or_times(tmp_path: Path) -> None:
     path = tmp_path / "forces.csv"
     path.write_text("a1,5,6\na2,7,8\n", encoding="utf-8")
-    with pytest.raises(DataError, match="the heading is 'a1, 5, 6'"):
+    with pytest.raises(DataError, match="no force against time or picture under the heading 'a1, 5, 6'"):
         read_forces(path)
     path.write_text("a1,5\na2,-\n", encoding="utf-8")
-    found = read_forces(path)
-    assert found.names == ("a1", "a2") and found.times == ()
+    found = read_forces(path).export
+    assert found.names == ("a1", "a2") and found.times is None
     assert found.forces[0] == 5.0 and math.isnan(found.forces[1])
     path.write_text("Name;Force\n;kN\na1;5,5\n", encoding="utf-8")
-    assert read_forces(path).forces == (5500.0,)
-    path.write_text("file,force\na1\n", encoding="utf-8")
-    assert math.isnan(read_forces(path).forces[0]), "a row without the cell"
+    assert read_forces(path).export.forces.tolist() == [5500.0]
+    path.write_text("file,force\na1,3\na2\n", encoding="utf-8")
+    assert math.isnan(read_forces(path).export.forces[1]), "a row without the cell"

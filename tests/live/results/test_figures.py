@@ -31,6 +31,7 @@ from live.results.figures import (
 )
 from live.results.summary import latency_lines, noise_line, summary_lines
 from tests.analysis.curves import Truth, composite, noisy, ramberg_osgood
+from tests.live.made_run import finished
 from tests.live.made_up import START, make_measurement
 
 AREA_M2 = 20e-6
@@ -63,9 +64,12 @@ def test_a_tare_in_mid_test_falsifies_no_figure() -> None:
     for name in ("E", "Rm"):
         assert getattr(tared, name).value == pytest.approx(getattr(plain, name).value, rel=2e-3)
     run_state = RunState(EventLog(), FrameCounts(), *reversed(kept(truth, tared_at=1.0)))
-    assert any(line.strip().startswith("tared in mid-test by +") for line in summary_lines(run_state, FLAT))
+    assert any(
+        line.strip().startswith("tared in mid-test by +")
+        for line in summary_lines(run_state, finished(run_state, FLAT))
+    )
     run_state = RunState(EventLog(), FrameCounts(), *reversed(kept(truth)))
-    assert not any("tared" in line for line in summary_lines(run_state, FLAT))
+    assert not any("tared" in line for line in summary_lines(run_state, finished(run_state, FLAT)))
 
 
 def test_a_metal_by_its_standard() -> None:
@@ -199,7 +203,7 @@ def test_the_direction_of_the_load_is_told() -> None:
     assert "is specimen.axis = 'x' right?" in alignment_line(history, replace(FLAT, axis="x"))[0]
     assert alignment_line(History(), FLAT) == []
     run_state = RunState(EventLog(), FrameCounts(), loads, history)
-    assert any("off y" in line for line in summary_lines(run_state, FLAT))
+    assert any("off y" in line for line in summary_lines(run_state, finished(run_state, FLAT)))
 
 
 def test_the_axis_is_found_where_it_is_not_given() -> None:

@@ -28,7 +28,7 @@ from live.results.run_folder import open_run
 from live.results.summary import summary_lines
 from live.ui.web.run_result import run_result
 from tests.analysis.curves import noisy, ramberg_osgood
-from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
+from tests.live.made_run import CONFIG, GAUGES, PULLED, finished, make_run
 from tests.live.results.test_figures import AREA_M2, FLAT, kept
 
 FORCES = {**CONFIG, "specimen": {"axis": "y"}}
@@ -63,8 +63,8 @@ def test_small_forces_are_shown_in_newtons(value: float, text: str) -> None:
 def test_summary_and_page_agree(specimen: SpecimenConfig) -> None:
     history, loads = kept(ramberg_osgood())
     run_state = RunState(EventLog(), FrameCounts(), loads, history)
-    summary = "\n".join(summary_lines(run_state, specimen))
-    figures = run_result(run_state, specimen, Path("runs"), "")["figures"]
+    summary = "\n".join(summary_lines(run_state, finished(run_state, specimen)))
+    figures = run_result(run_state, finished(run_state, specimen), Path("runs"), "")["figures"]
     shown = [one for one in figures if re.search(rf"(?<!\w){re.escape(one['name'])} = ", summary)]
     assert len(shown) >= 5 and "nu" in {one["name"] for one in shown}
     for one in shown:
@@ -124,7 +124,8 @@ def test_without_a_modulus_the_summary_has_the_strength_and_the_reason() -> None
     few = type(history)()
     for time_step in history.time_steps[::150]:
         few.add(time_step)
-    text = "\n".join(summary_lines(RunState(EventLog(), FrameCounts(), loads, few), FLAT))
+    state = RunState(EventLog(), FrameCounts(), loads, few)
+    text = "\n".join(summary_lines(state, finished(state, FLAT)))
     assert "Rm = " in text
     assert "not known: E, " in text
 
@@ -142,7 +143,7 @@ def test_what_the_interval_of_e_holds_is_named_wherever_e_shows(tmp_path: Path) 
         (replace(FLAT, force_error_percent=1.0), "scatter; load cell"),
     ):
         state = RunState(EventLog(), FrameCounts(), loads, history)
-        page = run_result(state, specimen, Path("runs"), "")["figures"]
+        page = run_result(state, finished(state, specimen), Path("runs"), "")["figures"]
         assert [one["text"] for one in page if one["name"] == "interval of E"] == [text]
 
 
@@ -157,7 +158,8 @@ def test_the_strain_of_e_is_named_wherever_e_shows(tmp_path: Path) -> None:
             assert f"points of {strain}," in "\n".join(figure_lines(curve.figures, run.specimen))
         assert row["strain of E and nu"] == strain and strain in html
     history, loads = kept(ramberg_osgood())
-    page = run_result(RunState(EventLog(), FrameCounts(), loads, history), FLAT, Path("runs"), "")["figures"]
+    state = RunState(EventLog(), FrameCounts(), loads, history)
+    page = run_result(state, finished(state, FLAT), Path("runs"), "")["figures"]
     assert [one["text"] for one in page if one["name"] == "strain of E and nu"] == ["eyy of the region"]
     config = load_config(None, {"specimen.width_mm": 20.0, "specimen.thickness_mm": 2.0})
     batch = batch_figures(evaluate(history, loads, FLAT), config)

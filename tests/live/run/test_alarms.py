@@ -162,13 +162,13 @@ def test_an_alarm_does_only_what_it_is_asked_for() -> None:
 
 
 def test_every_key_of_an_alarm_is_what_it_looks_at_or_an_action() -> None:
-    looked_at = {"channel", "above", "below", "hysteresis", "name"}
+    looked_at = {"channel", "above", "below", "hysteresis", "name", "end_on_unknown"}
     assert {field.name for field in fields(AlarmConfig)} == looked_at | {kind.key for kind in ACTIONS} - {""}
 
 
 def test_an_alarm_on_two_cameras_comes_when_there_is_no_value_any_more() -> None:
     bench = WatchSetup(
-        AlarmConfig(channel="mean_axial", above=2e-3, line="HALT", end=True),
+        AlarmConfig(channel="mean_axial", above=2e-3, line="HALT", end=True, end_on_unknown=True),
         AlarmConfig(channel="axial", above=1.0),
     )
     assert bench.check(mean_axial=1e-3) == [] and bench.check() == []

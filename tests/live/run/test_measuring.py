@@ -13,6 +13,7 @@ from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from live.pipeline import latency
 from live.pipeline.latency import LatencyMonitor, LatencySample, ProcessorUse
+from live.pipeline.reference import Motion
 from live.pipeline.run_state import RunState
 from live.run import measuring
 from live.run.measuring import MeasureThread, ReferenceSelector, SmearGuard, _measured
@@ -21,10 +22,14 @@ from tests.live.made_up import START, make_measurement
 N = 8  # frames of a reference
 
 
+def as_motion(motion: float | Motion) -> Motion:
+    return motion if isinstance(motion, Motion) else Motion(motion)
+
+
 class References:
     """A queue that gives one reference after the other, each with a motion of its halves, px."""
 
-    def __init__(self, *motions: float, n: int = N) -> None:
+    def __init__(self, *motions: float | Motion, n: int = N) -> None:
         self.state = RunState.new(0.5)
         for k in range(101):
             self.state.loads.append(LoadSample(START - 0.5 + k / 100, float(k)))
@@ -50,7 +55,7 @@ class References:
         monkeypatch.setattr(
             measuring,
             "_motion",
-            lambda ready, reference: 0.0 if reference.halves is None else reference.halves,
+            lambda ready, reference: as_motion(0.0 if reference.halves is None else reference.halves),
         )
         queue: Any = self
         return ReferenceSelector(self.prepared, self.state, queue).take()
@@ -71,6 +76,11 @@ UNSEEN = "the reference burst cannot be measured (fast motion, glare, no focus?)
         ((0.051, 0.01), 1, [("warning", AGAIN.format(0.051))]),
         ((0.3, 0.2, 0.1, 0.0), 2,
          [("warning", AGAIN.format(0.3)), ("warning", AGAIN.format(0.2)), ("warning", MOVED.format(0.1))]),
+        ((Motion(0.01, 7e-5, 1e-6), 0.01), 1,
+         [("warning", AGAIN.replace("{:.3f}", "+70 µm/m, 0.010"))]),
+        ((Motion(0.01, -7e-5, 1e-6),), 0,
+         [("warning", AGAIN.replace("{:.3f}", "-70 µm/m, 0.010")),
+          ("warning", MOVED.replace("{:.3f}", "-70 µm/m, 0.010"))]),
         ((0.3,), 0, [("warning", AGAIN.format(0.3)), ("warning", MOVED.format(0.3))]),
         ((math.nan, math.nan, math.nan, math.nan, 0.01), 4,
          [("warning", f"{UNSEEN}; taking another")] * 2
@@ -81,7 +91,10 @@ UNSEEN = "the reference burst cannot be measured (fast motion, glare, no focus?)
     ],
 )  # fmt: skip
 def test_a_reference_that_moves_is_taken_again_twice_and_one_that_is_not_seen_until_it_is(
-    monkeypatch: pytest.MonkeyPatch, motions: tuple[float, ...], used: int, told: list[tuple[str, str]]
+    monkeypatch: pytest.MonkeyPatch,
+    motions: tuple[float | Motion, ...],
+    used: int,
+    told: list[tuple[str, str]],
 ) -> None:
     bench = References(*motions)
     ready = bench.taken(monkeypatch)

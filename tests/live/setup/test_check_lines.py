@@ -181,6 +181,10 @@ def test_the_weakest_gradients_give_the_noise_of_a_place() -> None:
         ("drift_px", 0.05, "drift", True, "0.0500 px and +0 µm/m in 4 s"),
         ("exx", Steadiness(-3e-5, 0, 0, None, 4.0, None), "drift", True, "0.0000 px and -30 µm/m in 4 s"),
         ("eyy", Steadiness(4e-5, 0, 0, None, 4.0, None), "drift", True, "0.0000 px and +40 µm/m in 4 s"),
+        ("exx", Steadiness(-1.9e-5, 0, 0, None, 4.0, None, 1e-6), "drift", True, "0.0000 px and -19 µm/m in 4 s"),
+        ("exx", Steadiness(-2.1e-5, 0, 0, None, 4.0, None, 4e-6), "drift", False, "0.0000 px and -21 µm/m in 4 s"),
+        ("eyy", Steadiness(9.75e-4, 0, 0, None, 4.0, None, 2e-4), "drift", True, "0.0000 px and +975 µm/m in 4 s"),
+        ("eyy", Steadiness(9.75e-4, 0, 0, None, 4.0, None, 1.9e-4), "drift", False, "0.0000 px and +975 µm/m in 4 s"),
         ("worse", Steadiness(0, 0.0501, 0, None, 4.0, None), "vibration", False, "0.0501 px rms"),
         ("worse", Steadiness(0, 0.05, 0, None, 4.0, None), "vibration", True, "0.0500 px rms"),
         ("worse_strain", Steadiness(0, 2e-5, 0, None, 4.0, None), "vibration", True,
@@ -327,3 +331,16 @@ def test_where_nothing_is_known_of_the_burst_of_the_test_the_table_is_named() ->
     other = ZoiFloor(32, 1, 70.0, 22.0, 50, (StrainNoise(4, 1e-4, 1e-4),), 32)
     assert advice(made(floors=(other,)), 1e-5).startswith("nothing here reaches it: ")
     assert advice(made(floors=(other,)), 2e-4) == "ZOI 32"
+
+
+def test_a_strain_that_is_clear_is_told_before_a_larger_one_of_noise() -> None:
+    clear, noise = (
+        Steadiness(3e-5, 0, 0, None, 4.0, None, 1e-6),
+        Steadiness(5e-5, 0, 0, None, 4.0, None, 2e-5),
+    )
+    line = found(_motion(made(still__exx=clear, still__eyy=noise), 0.05))["drift"]
+    assert (
+        not line.good
+        and "+30 µm/m" in line.value
+        and line.advice.startswith("strain changes: stop the machine")
+    )

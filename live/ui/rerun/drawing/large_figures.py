@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from acquire.printable import share_text
-from live.pipeline.snapshot import Snapshot
+from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
+from live.pipeline.timed.figure import BEYOND, LACKING, FigureState, TimedFigure
 from live.ui.rerun.drawing.shapes import BACKGROUND
 
 WIDTH, HEIGHT = 1600, 168
@@ -31,7 +32,7 @@ _STATES = {"REC": RED, "ARMED": AMBER, "NOT RECORDING": AMBER, "REPLAY": GREY}
 
 def paint(snapshot: Snapshot) -> NDArray[np.uint8]:
     """(HEIGHT, WIDTH, 3) uint8, blue, green, red."""
-    alarmed = bool(snapshot.alarms)
+    alarmed = bool(snapshot.troubles)
     picture = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     picture[:] = RED if alarmed else BACKGROUND[::-1]
     labels = WHITE if alarmed else GREY
@@ -43,27 +44,34 @@ def paint(snapshot: Snapshot) -> NDArray[np.uint8]:
 
 
 def _cells(s: Snapshot) -> tuple[tuple[str, str, Colour], ...]:
-    sigma = "" if math.isnan(s.sigma_axial) else f"+- {s.sigma_axial * 1e6:.0f} "
-    state = s.state.partition(",")[0]
+    axial, force, stress = s.figure(AXIAL), s.figure(FORCE), s.figure(STRESS)
+    sigma = "" if math.isnan(axial.sigma) else f"+- {axial.sigma * 1e6:.0f} "
+    large, state = abs(force.last) >= 1e4, s.state.partition(",")[0]
     return (
         ("STATE", "PAUSED" if "PAUSED" in s.state else state, _STATES.get(state, GREEN)),
-        (f"STRAIN {sigma}um/m", _number(s.axial * 1e6, "+,.0f"), WHITE),
-        ("FORCE kN" if abs(s.force_N) >= 1e4 else "FORCE N", _force(s.force_N), WHITE),
-        ("STRESS MPa", _number(s.stress_Pa * 1e-6, ".1f"), WHITE),
+        _cell(f"STRAIN {sigma}um/m", axial, 1e6, "+,.0f"),
+        _cell("FORCE kN", force, 1e-3, ".3f") if large else _cell("FORCE N", force, 1.0, ".1f"),
+        _cell("STRESS MPa", stress, 1e-6, ".1f"),
     )
 
 
-def _force(value: float) -> str:
-    return _number(value, ".1f") if not abs(value) >= 1e4 else _number(value / 1e3, ".3f")
-
-
-def _number(value: float, form: str) -> str:
-    return "-" if math.isnan(value) else format(value, form).replace(",", " ")
+def _cell(label: str, figure: TimedFigure, factor: float, form: str) -> tuple[str, str, Colour]:
+    """Label and value; without a value what is there instead, and in the label the last one with its age."""
+    if figure.known:
+        return label, format(figure.value * factor, form).replace(",", " "), WHITE
+    if figure.state in BEYOND:
+        return label, figure.state.upper(), RED
+    if figure.state in LACKING and figure.last == figure.last:
+        last = format(figure.last * factor, form).replace(",", " ")
+        return f"{label.split()[-1]}  {last}, {figure.age:.0f} s ago", "-", GREY
+    return label if figure.state is FigureState.NONE else f"{label}  {figure.state}", "-", GREY
 
 
 def _line(s: Snapshot) -> str:
     if s.alarms:
         return "ALARM  " + "   ".join(s.alarms)
+    if s.troubles:
+        return "   ".join(s.troubles)
     if not s.zois:
         return "nothing measured yet"
     lost = s.zois - s.valid

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from acquire.printable import printable
 from live.results.maps.colours import MICROSTRAIN
 from live.ui.rerun.drawing.layout import blueprint
 from live.ui.rerun.drawing.proxy import ViewerProxy, hidden_address, wait_for
@@ -207,6 +208,6 @@ def _sink(
     parcels = rr.ChunkBatcherConfig(flush_tick=rates.gather_s, flush_num_bytes=rates.parcel_bytes)
     stream = rr.RecordingStream(APPLICATION, recording_id=recording, batcher_config=parcels)
     stream.set_sinks(rerun_sink)
-    stream.send_recording_name(setup.title)
+    stream.send_recording_name(printable(setup.title))
     stream.send_blueprint(blueprint(setup))
     return RerunSink(stream, rates, drawn)

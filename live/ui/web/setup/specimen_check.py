@@ -18,6 +18,7 @@ from acquire.system import lower_priority
 from live.config.sections import DEFAULT_REFERENCE_BURST
 from live.pipeline.latency import OUTPUT
 from live.setup.check.check_list import CheckFigures, examine
+from live.setup.check.disk import disk_lines, write_rate
 from live.setup.check.quick_check import QuickChecker
 from live.setup.check.verdict import CheckLine, check_lines
 from live.setup.compiling import compile_ahead
@@ -168,10 +169,12 @@ class SpecimenCheck:
     def _check(self, frames: list[Frame], info: CameraInfo) -> None:
         edition, config = self._region.edition, self._region.config(self._folder)
         load = None if self._load is None else self._load.report()
-        figures = examine(frame_stack(frames, info), config, load)
+        stack = frame_stack(frames, info)
+        figures = examine(stack, config, load)
         shift = config.measure.reference_shift_px
         of_load = () if self._load is None else self._load.lines(load)
-        lines = [*check_lines(figures, None, shift), *of_load, self._gauge_line()]
+        disk = disk_lines(write_rate(stack, config), config)
+        lines = [*check_lines(figures, None, shift), *disk, *of_load, self._gauge_line()]
         self._keep_figures(figures)
         self.values["checking"] = False
         if edition == self._region.edition:  # else the region has changed meanwhile

@@ -20,7 +20,7 @@ export function beginRun(stage) {
   clearCurves();
   beginMap(stage);
   beginViews("run", (value) => { if (value.picture) showMap(value.picture, value.side); });
-  showRun({ state: "opening", elapsed_s: 0, events: [], alarms: [], gauges: [], recording: null });
+  showRun({ state: "opening", elapsed_s: 0, events: [], troubles: [], figures: {}, gauges: [], recording: null });
 }
 
 export function showRun(value) {
@@ -41,8 +41,8 @@ function show(value) {
   $("pause").dataset.line = paused ? "resume" : "pause";
   $("pause").firstElementChild.dataset.t = paused ? "Resume" : "Pause";
   put($("pause").firstElementChild, t($("pause").firstElementChild.dataset.t));
-  put($("force"), fixed(value.force_N, 1));
-  put($("stress"), value.stress_Pa == null ? "–" : fixed(value.stress_Pa / 1e6, 2));
+  showFigure("force", value.figures.force, (one) => fixed(one, 1));
+  showFigure("stress", value.figures.stress, (one) => fixed(one / 1e6, 2));
   showStrains(value);
   put($("peak"), value.peak_N == null ? "–" : `${fixed(value.peak_N, 1)} N`);
   put($("elongation"), value.elongation_mm == null ? "–" : `${fixed(value.elongation_mm, 4)} mm`);
@@ -51,6 +51,21 @@ function show(value) {
   showStrip(value);
   showEvents(value.events);
   showAlarm(value);
+}
+
+// A figure that is not live has no value: a word instead, and of one that is old the last value, grey, with its age.
+const LABELS = {
+  overload: "OVERLOAD", underload: "UNDERLOAD", old: "old", unknown: "not known", "not yet": "not yet", paused: "paused", ended: "ended",
+};
+function showFigure(id, one, text, beside = "") {
+  const state = one?.state ?? "not yet", isBeyond = state.endsWith("load"), isOld = state === "old" || state === "unknown";
+  const age = one?.age_s == null ? "" : t("{} s ago").replace("{}", fixed(one.age_s));
+  const instead = isOld && one.last != null ? `${text(one.last)}, ${age}` : isBeyond ? "" : t(LABELS[state] ?? "");
+  $(id).parentElement.hidden = state === "none" && id !== "axial";
+  put($(id), state === "live" ? text(one.value) : isBeyond ? t(LABELS[state]) : "–");
+  put($(`${id}sigma`), state === "live" ? beside : instead);
+  $(id).classList.toggle("bad", isBeyond);
+  $(id).classList.toggle("isold", isOld);
 }
 
 // The other one of two cameras has its card, and its map where it is chosen; the figures too once the first has ended.
@@ -85,11 +100,10 @@ function rate(value) {
 const withPart = (text, part) => (part ? `${text} ${t(part)}` : text);
 
 function showStrains(value) {
-  const unit = strainUnit(), axial = value.axial, [text, sigma] = withSigma(axial?.value, axial?.sigma, unit);
+  const unit = strainUnit(), axial = value.axial, sigma = withSigma(axial?.value, axial?.sigma, unit)[1];
   const name = value.side ? `${axial?.name ?? ""}, ${t(value.side)}` : axial?.name;
   put($("axialname"), withPart(withPart(name ?? "", axial?.assumed), value.part));
-  put($("axial"), text);
-  put($("axialsigma"), sigma ? `± ${sigma} ${unit.name}` : "");
+  showFigure("axial", value.figures.axial, (one) => withSigma(one, axial?.sigma, unit)[0], sigma ? `± ${sigma} ${unit.name}` : "");
   const gauges = (value.gauges ?? []).map((one, k) => ({ ...one, k })), list = $("others");
   while (list.children.length > gauges.length) list.lastChild.remove();
   while (list.children.length < gauges.length) list.append(el("li", {}, el("i", { class: "key" }), el("span"), el("b")));
@@ -97,7 +111,7 @@ function showStrains(value) {
     const [key, name, number] = list.children[i].children;
     key.style.background = colourOf(one.k);
     put(name, one.name);
-    put(number, one.reason || one.value == null ? t("lost") : withPart(strainText(one.value, one.sigma), one.part));
+    put(number, one.reason ? t("lost") : one.value == null ? "–" : withPart(strainText(one.value, one.sigma), one.part));
     number.title = one.reason ? t(one.reason) : "";
   });
 }
@@ -118,16 +132,19 @@ function showSides(sides) {
 }
 
 const CELLS = ["ZOIs", "frames/s", "latency", "recorded", "skipped", "lost", "kernel", "disk"];
+const BOARD = { kernel: "without a force" };  // in its place where there are any
 function showStrip(value) {
   const l = value.ledger ?? {}, lost = (l.lost ?? 0) + (l.unrecorded ?? 0), ms = (s) => (s == null ? "–" : `${fixed(s * 1e3)} ms`);
   const values = [
     value.zois == null ? "–" : `${value.valid} / ${value.zois}`, fixed(value.fps, 0), ms(value.late_s),
-    String(l.recorded ?? "–"), String(l.skipped ?? "–"), String(lost), ms(value.kernel_s), value.disk_min == null ? "–" : disk(value.disk_min),
+    String(l.recorded ?? "–"), String(l.skipped ?? "–"), String(lost), l.without_force ? String(l.without_force) : ms(value.kernel_s), value.disk_min == null ? "–" : disk(value.disk_min),
   ];
   const box = $("strip");
-  fill(box, CELLS, (name) => el("div", {}, el("dt", { t: name }), el("dd")));
+  const cells = CELLS.map((name) => (l.without_force && BOARD[name]) || name);
+  fill(box, cells, (name) => el("div", {}, el("dt", { t: name }), el("dd")));
   values.forEach((text, i) => put(box.children[i].lastChild, text));
   box.children[5].lastChild.classList.toggle("bad", lost > 0);
+  box.children[6].lastChild.classList.toggle("bad", l.without_force > 0);
   box.children[0].lastChild.classList.toggle("bad", Boolean(value.part));
 }
 
@@ -137,10 +154,9 @@ function showEvents(list) {
   fill($("events"), list.toReversed(), (one) => el("li", {}, el("time", { text: time(one.s) }), el("span", { text: t(one.text), class: one.level })));
 }
 
-// An alarm stays until it clears or is switched off, an error for 20 s.
+// Alarms, errors that are not over, and figures that are old or unknown: until that is over.
 function showAlarm(value) {
-  const error = value.events.findLast((one) => one.level === "error" && value.elapsed_s - one.s < 20);
-  const words = [...(value.alarms ?? []), ...(error && !value.alarms?.length ? [error.text] : [])].map((one) => t(one)).join(" · ");
+  const words = (value.troubles ?? []).map((one) => t(one)).join(" · ");
   $("state").classList.toggle("alarm", Boolean(words));
   put($("alarm"), words);
 }

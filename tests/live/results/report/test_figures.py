@@ -13,6 +13,7 @@ import pytest
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
+from live.results.finished.finished_test import FinishedTest
 from live.results.report.comparison import _quoted as quoted
 from live.results.report.comparison import summary
 from live.results.report.curves import force_unit, stress_strain, valid_share
@@ -119,10 +120,11 @@ def test_the_curve_is_that_of_the_gauge_axial(gauged: Path, run_dir: Path) -> No
 
 def test_the_lag_is_told_or_why_not(gauged: Path, tmp_path: Path) -> None:
     with open_run(gauged) as run:
-        assert "lag of the load behind the frames" in times(run)
-        assert "not known: " in times(run) or " ms (95% interval" in times(run)
+        words = times(run, FinishedTest.of_folder(run))
+        assert "lag of the load behind the frames" in words
+        assert "not known: " in words or " ms (95% interval" in words
     with open_run(make_run(tmp_path, [0.0, 1e-3], session=False)) as bare:
-        assert "no readings of a load cell were recorded" in times(bare)
+        assert "no readings of a load cell are there" in times(bare, FinishedTest.of_folder(bare))
 
 
 def _means(folder: Path, *more: str) -> tuple[str, dict[str, np.ndarray]]:

@@ -20,6 +20,7 @@ from acquire.events import Event, EventKind
 from acquire.frame import CameraInfo
 from analysis.evaluate import Figure, NoiseFloor
 from live.pipeline.screen import Screen
+from live.results.finished.finished_test import FinishedTest
 from live.results.maps.colours import diverging_table
 from live.results.maps.scale import ColourScale
 from live.results.report import record, report
@@ -51,16 +52,19 @@ def test_gauges_have_their_largest_and_last_strain_and_how_often_they_were_lost(
     assert "value exy|not known|not known|12|" in found
 
 
-def test_times_of_the_load_and_of_the_results(run: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(record, "lag_of", lambda _: Figure(0.0123, 0.0103, 0.0143))
+def lagging(run: RunFolder) -> FinishedTest:
+    return replace(FinishedTest.of_folder(run), lag=Figure(0.0123, 0.0103, 0.0143))
+
+
+def test_times_of_the_load_and_of_the_results(run: RunFolder) -> None:
     run.strain.values["latency_s"] = np.array([*np.arange(101) * 1e-3, math.nan])
     run.strain.config["load"] = {"lag_s": 0.025}
-    found = plain(times(run))
+    found = plain(times(run, lagging(run)))
     assert "|12.3 ± 2.0 ms (95% interval; positive: the load is late)|" in found
     assert "|lag corrected in the force|0.025 s|" in found
     assert "|from the last frame of a burst to its result|p50 50 ms, p95 95 ms|" in found
     run.strain.config["load"], run.strain.values["latency_s"] = {"lag_s": 0.0}, np.full(3, math.nan)
-    found = plain(times(run))
+    found = plain(times(run, lagging(run)))
     assert "|lag corrected in the force|none|" in found and "p95" not in found
 
 
@@ -118,11 +122,13 @@ def test_the_head_of_the_report(run: RunFolder) -> None:
     extent = report._extent(run, replace(curve, axial=np.array([0.0, -0.03, 0.01, math.nan])))
     assert extent["ZOIs with a value, last"] == "33 of 34"
     assert extent[f"largest {curve.figures.strain}"] == "-3 %"
-    head = plain(report._head(run, curve))
+    head = plain(report._head(run, curve, FinishedTest.of_folder(run)))
     assert f"Test of 2030-01-02T03:04:05+00:00: {N} measurements in 9.5 s." in head
     assert "not closed" not in head
     run.strain.unfinished = True
-    assert "The results were not closed by their writer" in report._head(run, curve)
+    assert "The results were not closed by their writer" in report._head(
+        run, curve, FinishedTest.of_folder(run)
+    )
 
 
 def test_the_words_under_the_curves(run: RunFolder) -> None:

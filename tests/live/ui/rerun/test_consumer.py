@@ -103,13 +103,17 @@ def test_the_large_figures_before_and_after_the_first_measurement(state: str) ->
     run_state, view = RunState.new(1.0, specimen=SpecimenConfig(area_mm2=40.0)), RecordingView()
     run_state.loads.append(LoadSample(START, 800.0))
     run_state.health.state, run_state.health.frame_t = state, START + 1
-    writer = FiguresWriter(view, run_state)  # type: ignore[arg-type]
+    writer = FiguresWriter(view, run_state, lambda: START + 1)  # type: ignore[arg-type]
     writer.idle()
     shown = [what for _, (what,) in view.calls]
-    assert [(f.state, f.force_N, f.zois) for f in shown] == ([("ARMED", 800.0, 0)] if state else [])
+    assert [(f.state, f.figure("force").value, f.zois) for f in shown] == (
+        [("ARMED", 800.0, 0)] if state else []
+    )
     run_state.alarms.set("limit", "limit: too much")
     writer.measurement(make_measurement(1, 1e-3, force=500.0))
     _, (last,) = view.calls[-1]
-    assert (last.state, last.force_N) == (("ARMED", 800.0) if state else ("REPLAY", 500.0))
-    assert last.axial == pytest.approx(1e-3) and last.alarms == ("limit: too much",)
-    assert last.stress_Pa == pytest.approx(last.force_N / 40e-6)
+    assert (last.state, last.figure("force").value) == (("ARMED", 800.0) if state else ("REPLAY", 500.0))
+    assert last.figure("axial").value == pytest.approx(1e-3) and last.alarms == ("limit: too much",)
+    assert last.figure("stress").value == pytest.approx(last.figure("force").value / 40e-6)
+    run_state.health.ended = True
+    assert writer.end() == "" and view.calls[-1][1][0].figure("force").state == "ended"

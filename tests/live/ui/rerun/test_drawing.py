@@ -33,7 +33,7 @@ from live.ui.rerun.drawing.shapes import (
 )
 from live.ui.rerun.drawing.sinks import Rates, RerunSink, write
 from live.ui.rerun.messages import PictureMessage, ViewSetup, ViewTarget, row_of
-from tests.live.made_up import START, make_field, make_frame, make_grid, make_measurement
+from tests.live.made_up import START, figures, make_field, make_frame, make_grid, make_measurement
 
 
 def test_axes_start_at_zero_and_leave_room() -> None:
@@ -111,7 +111,9 @@ def draw_a_test(scene: ViewScene, seconds: float = 3.0) -> None:
         scene.points([(1e-4 * k, 10.0 * k)])
         scene.means([row_of(measurement)])
         scene.field(measurement.t, measurement.field)
-        scene.figures(Snapshot(measurement.t, "REC", axial=1e-3, force_N=10.0 * k, valid=12, zois=12))
+        scene.figures(
+            Snapshot(measurement.t, "REC", figures=figures(axial=1e-3, force=10.0 * k), valid=12, zois=12)
+        )
 
 
 STATIC = LAST = 1

@@ -10,22 +10,35 @@ from typing import Any
 import pytest
 
 from live.pipeline.snapshot import Snapshot
+from live.pipeline.timed.figure import TimedFigure
 from live.ui.rerun.drawing.large_figures import HEIGHT, WIDTH, _cells, paint
 from live.ui.rerun.messages import figures_message, figures_of
 from live.ui.rerun.wire import Kind, Message, WireError
+from tests.live.made_up import figures
 
 NOW = Snapshot(
-    1.0, "REC", axial=2.271e-3, sigma_axial=9e-6, force_N=5757.6, stress_Pa=143.9e6, valid=1008, zois=1008
+    1.0, "REC", figures=figures(axial=(2.271e-3, 9e-6), force=5757.6, stress=143.9e6), valid=1008, zois=1008
 )
 
 
 def test_figures_come_back_from_a_message() -> None:
-    sent = replace(NOW, stress_Pa=math.nan, alarms=("strain limit: axial is 0.02",))
+    lost = {
+        "force": TimedFigure.at(30.0, 6.0, 1200.0),
+        "stress": TimedFigure(),
+        "axial": TimedFigure.at(0, 0, 1e-3, 2e-6),
+    }
+    sent = replace(NOW, figures=lost, alarms=("strain limit: axial is 0.02",))
     meta = json.loads(json.dumps(figures_message(sent).meta, allow_nan=False))
     back = figures_of(Message(Kind.FIGURES, meta))
-    assert math.isnan(back.stress_Pa)
+    assert math.isnan(back.figure("stress").value) and back.figure("force") == lost["force"]
+    assert back.figure("axial") == lost["axial"] and back.troubles == sent.troubles
     assert paint(back).tobytes() == paint(sent).tobytes()
-    for damaged in ({"state": "REC"}, meta | {"zois": "many"}, meta | {"axial": [1]}):
+    for damaged in (
+        {"state": "REC"},
+        meta | {"zois": "many"},
+        meta | {"figures": [1]},
+        meta | {"figures": {"force": [1]}},
+    ):
         with pytest.raises(WireError):
             figures_of(Message(Kind.FIGURES, damaged))
 
@@ -42,9 +55,9 @@ def test_an_alarm_is_red_and_digits_are_large() -> None:
 @pytest.mark.parametrize(
     "more",
     [
-        {"force_N": math.nan},
-        {"axial": math.nan, "sigma_axial": math.nan},
-        {"force_N": -1e7, "state": "\u2603" * 40},
+        {"figures": figures(force=math.nan, axial=1e-3)},
+        {"figures": figures(axial=(math.nan, math.nan), force=-1e7), "state": "\u2603" * 40},
+        {"figures": {}},
     ],
 )
 def test_any_figures_are_painted(more: dict[str, Any]) -> None:
@@ -54,11 +67,11 @@ def test_any_figures_are_painted(more: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("force", "head", "shown"),
     [(9999.9, "FORCE N", "9999.9"), (-10000.0, "FORCE kN", "-10.000"), (12345.6, "FORCE kN", "12.346"),
-     (math.nan, "FORCE N", "-")],
+     (math.nan, "FORCE N  unknown", "-")],
 )  # fmt: skip
 def test_forces_are_in_kilonewtons_from_ten_on(force: float, head: str, shown: str) -> None:
     state, strain, found, stress = _cells(
-        Snapshot(0.0, "REC, armed", axial=-1.2345e-2, sigma_axial=4e-6, force_N=force, stress_Pa=30.86e6)
+        Snapshot(0.0, "REC, armed", figures=figures(axial=(-1.2345e-2, 4e-6), force=force, stress=30.86e6))
     )
     assert found[:2] == (head, shown)
     assert state[:2] == ("STATE", "REC") and strain[:2] == ("STRAIN +- 4 um/m", "-12 345")

@@ -31,7 +31,7 @@ from live.ui.rerun.playback import ShowRequest, selected_rows, view_setup
 from live.ui.rerun.view import View, remote_access, url, viewer_failure
 from live.ui.rerun.wire import Kind, Message
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
-from tests.live.made_up import START, make_field, make_frame, make_grid
+from tests.live.made_up import START, figures, make_field, make_frame, make_grid
 
 SETUP = ViewSetup("a test", 128, 96, 12, make_grid(), START, picture_hz=5.0)
 TARGET = ViewTarget(None, "v.rrd", "id")
@@ -53,7 +53,7 @@ def all_of(outbox: Outbox, now: float = 0.0) -> list[Message]:
 def test_small_things_go_first_and_each_once() -> None:
     outbox, pending = boxed()
     pending.picture, pending.field = make_frame(0, START), (START, make_field(make_grid(), 0.0))
-    pending.figures, pending.status = Snapshot(START, "REC", force_N=7.0), "**well**"
+    pending.figures, pending.status = Snapshot(START, "REC", figures=figures(force=7.0)), "**well**"
     pending.event(EVENT)
     pending.row(Kind.LOADS, (START, 5.0))
     pending.row(Kind.MEANS, (START, *[0.0] * 6))
@@ -63,7 +63,7 @@ def test_small_things_go_first_and_each_once() -> None:
         "MEANS", "LOADS", "EVENTS", "STATUS", "FIGURES", "FIELD", "PICTURE",
     ]  # fmt: skip
     assert rows_of(found[1]) == [(START, 5.0), (START + 1, 6.0)] and events_of(found[2]) == [EVENT]
-    assert found[3].meta["markdown"] == "**well**" and figures_of(found[4]).force_N == 7.0
+    assert found[3].meta["markdown"] == "**well**" and figures_of(found[4]).figure("force").value == 7.0
     assert all_of(outbox, 100.0) == [] and outbox.sent == {Kind.FIELD: 1, Kind.PICTURE: 1}
 
 

@@ -28,6 +28,7 @@ from live.ui.rerun.messages import (
 )
 from live.ui.rerun.wire import Kind, Message, Reader, encoded
 from tests.live.made_up import START, make_frame, make_grid, make_measurement
+from tests.live.made_up import figures as live_figures
 
 SETUP = ViewSetup("a test", 128, 96, 12, make_grid(), START)
 
@@ -91,14 +92,14 @@ def test_pictures_fields_and_figures_are_drawn() -> None:
     for message in (
         picture_message(frame),
         field_message(m.t, m.field),
-        figures_message(Snapshot(START, "REC", valid=3, zois=4, force_N=7.0)),
+        figures_message(Snapshot(START, "REC", valid=3, zois=4, figures=live_figures(force=7.0))),
     ):
         process._show(scene, message)  # type: ignore[arg-type]
     (_, (picture,)), (_, (t, field)), (_, (figures,)) = scene.told
     assert [name for name, _ in scene.told] == ["picture", "field", "figures"]
     assert isinstance(picture, PictureMessage) and (picture.t, picture.bits) == (START + 1.0, 12)
     assert t == m.t and np.array_equal(field.eyy, m.field.eyy, equal_nan=True)
-    assert (figures.state, figures.valid, figures.zois, figures.force_N) == ("REC", 3, 4, 7.0)
+    assert (figures.state, figures.valid, figures.zois, figures.figure("force").value) == ("REC", 3, 4, 7.0)
 
 
 def test_it_draws_until_the_end_and_says_so() -> None:

@@ -17,6 +17,7 @@ from live.pipeline.snapshot import Snapshot
 from live.results.figures import value_text
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.terminal.status_line import status_line
+from tests.live.made_up import figures
 
 
 class Terminal(io.StringIO):
@@ -84,9 +85,9 @@ def time_step() -> TimeStep:
 def snapshot(**more: Any) -> Snapshot:
     frame_counts = FrameCounts()
     frame_counts.add(grabbed=200, measured=120, skipped=8)
-    known = {"force_N": 1234.5, "stress_Pa": 1234.5 / 40e-6, "latency_p95_s": 0.0421, "disk_s": 7200.0}
-    values: Any = known | more
-    return Snapshot(0.0, "REC", 75.0, 29.9, frames=frame_counts.as_dict(), time_step=time_step(), **values)
+    found = figures(force=1234.5, stress=1234.5 / 40e-6, disk=7200.0, fps=29.9, burst=1.0)
+    values: Any = {"latency_p95_s": 0.0421, "figures": found} | more
+    return Snapshot(0.0, "REC", 75.0, frames=frame_counts.as_dict(), time_step=time_step(), **values)
 
 
 def test_a_wide_status_line_has_everything() -> None:

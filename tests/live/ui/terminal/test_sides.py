@@ -22,7 +22,8 @@ from live.ui.terminal.screen import TerminalScreen
 from live.ui.terminal.sides import SidesScreen
 from live.ui.terminal.status_line import fitted, gauge_texts, sides_line, status_line, strain_text
 from live.ui.terminal.summary import print_summary, trouble_lines
-from tests.live.made_up import START, make_loads, make_measurement
+from tests.live.made_run import finished
+from tests.live.made_up import START, figures, make_loads, make_measurement
 from tests.live.ui.terminal.test_screen import Terminal, time_step
 
 
@@ -48,8 +49,9 @@ class Said(Screen):
 def shot(valid: int = 30, **more: Any) -> Snapshot:
     counts = FrameCounts()
     counts.add(grabbed=80, measured=9, skipped=2, **more.pop("counts", {}))
-    values: dict[str, Any] = {"force_N": 1234.5, "valid": valid, "zois": 34, "time_step": time_step(),
-                              "frames": counts.as_dict(), "axial": 1e-3, "sigma_axial": 1e-6}  # fmt: skip
+    known = {"force": 1234.5, "axial": (1e-3, 1e-6), "burst": 1.0, "fps": 10.0} | more.pop("figures", {})
+    values: dict[str, Any] = {"valid": valid, "zois": 34, "time_step": time_step(), "frames": counts.as_dict(),
+                              "figures": figures(**known)}  # fmt: skip
     return Snapshot(START, "REC", 75.0, **(values | more))
 
 
@@ -65,7 +67,8 @@ def test_mean_and_bending_and_what_each_camera_does() -> None:
 
 
 def test_each_camera_by_itself_where_there_is_no_mean() -> None:
-    sides = {"first": shot(), "second": shot(axial=math.nan), "third": shot(axial=-2e-3, time_step=None)}
+    sides = {"first": shot(), "second": shot(figures={"axial": math.nan}),
+             "third": shot(figures={"axial": (-2e-3, 1e-6)}, time_step=None)}  # fmt: skip
     line = sides_line(sides, {}, 300)
     assert "first +1,000 ± 1.0 µm/m" in line and "third -2,000 ± 1.0 µm/m" in line and "second +" not in line
     assert "third 80 frames" in line and "second 30/34 ZOIs" in line
@@ -123,7 +126,7 @@ def test_strains_in_words() -> None:
 
 def test_the_line_of_a_live_run_by_its_state() -> None:
     line = status_line(
-        shot(axis="x", axis_assumed=True, fps=29.6, counts={"unrecorded": 2}, disk_s=math.inf), 300
+        shot(axis="x", axis_assumed=True, figures={"fps": 29.6}, counts={"unrecorded": 2}), 300
     )
     assert "axis x assumed" in line and "30 fps" in line and "LOST 2" in line and "disk" not in line
     early = status_line(shot(time_step=None, axis_assumed=True, alarms=("a", "b")), 300)
@@ -159,7 +162,8 @@ def test_where_the_files_are(tmp_path: Path) -> None:
     (tmp_path / "a.h5").write_bytes(bytes(12_340_000))
     (tmp_path / "empty.h5").touch()
     screen = Said()
-    print_summary(screen, RunState.new(1.0), SpecimenConfig(), tmp_path, ["a line"], with_report=True)
+    state = RunState.new(1.0)
+    print_summary(screen, state, finished(state), tmp_path, ["a line"], with_report=True)
     assert screen.lines[0] == "" and screen.lines[-2:] == ["a line", f"files: {tmp_path} (a.h5; 12 MB)"]
     assert file_lines(tmp_path) == [f"  {tmp_path / 'a.h5'}  (12.3 MB)"]
 

@@ -16,10 +16,14 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.ui.terminal.summary import brief_lines, print_summary, trouble_lines
-from tests.live.made_run import PULLED, force_of
+from tests.live.made_run import PULLED, finished, force_of
 from tests.live.made_up import make_measurement
 
 SECTION = SpecimenConfig(width_mm=10.0, thickness_mm=2.0, axis="y")
+
+
+def lines_of(run_state: RunState) -> list[str]:
+    return brief_lines(run_state, finished(run_state))
 
 
 class Said(Screen):
@@ -33,7 +37,7 @@ class Said(Screen):
 
 
 def run_of(strains: Sequence[float], specimen: SpecimenConfig = SECTION, *, loads: bool = True) -> RunState:
-    run_state = RunState.new(0.5, specimen=specimen)
+    run_state = RunState.new(0.5, specimen=specimen, with_load=loads)
     for k, strain in enumerate(strains):
         force = force_of(strain) if loads else math.nan
         measurement: Measurement = make_measurement(k, strain, force=force)
@@ -48,7 +52,7 @@ def run_of(strains: Sequence[float], specimen: SpecimenConfig = SECTION, *, load
 def test_what_a_test_gave_in_a_dozen_lines(tmp_path: Path) -> None:
     run_state, screen = run_of(PULLED), Said()
     (tmp_path / "strain.h5").write_bytes(bytes(2_000_000))
-    print_summary(screen, run_state, SECTION, tmp_path, [*trouble_lines(run_state, ())])
+    print_summary(screen, run_state, finished(run_state), tmp_path, [*trouble_lines(run_state, ())])
     text = "\n".join(screen.lines)
     assert len(screen.lines) <= 12
     assert re.search(r"^E = (70\.0|69\.9|70)\d* ± [\d.]+ GPa  nu = 0\.[23]", text, re.MULTILINE), text
@@ -61,7 +65,7 @@ def test_what_a_test_gave_in_a_dozen_lines(tmp_path: Path) -> None:
 
 def test_verbose_has_all(tmp_path: Path) -> None:
     run_state, screen = run_of(PULLED), Said()
-    print_summary(screen, run_state, SECTION, tmp_path, [], verbose=True)
+    print_summary(screen, run_state, finished(run_state), tmp_path, [], verbose=True)
     text = "\n".join(screen.lines)
     assert "last strain of the region: exx" in text and "lag of the load behind the frames" in text
 
@@ -78,14 +82,11 @@ def test_verbose_has_all(tmp_path: Path) -> None:
     ],
 )
 def test_why_there_is_no_modulus(strains: Sequence[float], loads: bool, why: str) -> None:
-    assert any(
-        line.startswith(f"E is not known: {why}")
-        for line in brief_lines(run_of(strains, loads=loads), SECTION)
-    )
+    assert any(line.startswith(f"E is not known: {why}") for line in lines_of(run_of(strains, loads=loads)))
 
 
 def test_nothing_measured_is_the_only_line() -> None:
-    assert brief_lines(RunState.new(0.5), SECTION) == [
+    assert lines_of(RunState.new(0.5)) == [
         "nothing was measured: 0 frames gave no burst after the reference; take shorter bursts"
     ]
 
@@ -100,6 +101,6 @@ def test_a_load_that_is_more_than_five_degrees_off_its_axis_is_told(degrees: flo
         share, m = k / 9, make_measurement(k)
         strains = {"exx": share * exx, "eyy": share * eyy, "exy": share * 2.6e-3 * sin * cos}
         run_state.history.add(replace(m.time_step, **strains, sigma_exx=1e-6, sigma_eyy=1e-6, sigma_exy=1e-6))
-    lines = [line for line in brief_lines(run_state, SpecimenConfig(axis="y")) if "largest strain" in line]
+    lines = [line for line in lines_of(run_state) if "largest strain" in line]
     assert len(lines) == shown
     assert not shown or f"largest strain {-degrees:g} degrees off y (clockwise)" in lines[0]

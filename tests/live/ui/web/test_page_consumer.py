@@ -83,7 +83,7 @@ def ready(consumer: PageConsumer) -> PageConsumer:
 
 def test_the_state_of_a_run(config: Config) -> None:
     broadcaster, run = Broadcaster(), Run(config)
-    received, consumer = Received(broadcaster), ready(PageConsumer(broadcaster, config))
+    received, consumer = Received(broadcaster), ready(PageConsumer(broadcaster, config, lambda: 1.5))
     consumer.attach(run)
     m = measurement()
     i = replace(
@@ -259,6 +259,7 @@ def test_a_recording_shows_figures_of_one_instant(config: Config) -> None:
     run.live = False  # type: ignore[misc]
     consumer = ready(PageConsumer(broadcaster, config))
     consumer.attach(run)  # type: ignore[arg-type]
+    run.run_state.health.recorded = True
     m = measurement()
     m = replace(m, time_step=replace(m.time_step, force=1234.0, latency_s=3.0))
     run.run_state.loads.append(LoadSample(1e3, -9999.0))

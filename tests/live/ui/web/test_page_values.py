@@ -23,7 +23,7 @@ from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.map_view import MapView
 from live.ui.web.page_consumer import PageConsumer
 from live.ui.web.run_result import peaks, run_result
-from tests.live.made_run import E_PA, PULLED, THICKNESS_MM, WIDTH_MM, YIELD, force_of
+from tests.live.made_run import E_PA, PULLED, THICKNESS_MM, WIDTH_MM, YIELD, finished, force_of
 from tests.live.made_up import START, make_frame, make_grid, make_measurement
 
 LINE = {"gauges.long": {"kind": "line", "start": [64, 20], "end": [64, 70]}}
@@ -63,7 +63,7 @@ def watched(
 
 def test_the_state_counts_from_the_start_in_the_units_of_the_page() -> None:
     config = load_config(None, {"specimen.area_mm2": 40.0})
-    consumer, run = watched(config, run=Run(config, disk_s=90 * 60.0, fps=29.5))
+    consumer, run = watched(config, run=Run(config, disk_s=90 * 60.0, fps=29.5, frame_t=START + 7))
     run.run_state.frame_counts.add(grabbed=9, lost=2)
     run.run_state.alarms.set("limit", "limit: \x1b too much")
     consumer.event(Event(0.0, EventKind.MEASURED, "measurement", "a burst"))
@@ -72,7 +72,7 @@ def test_the_state_counts_from_the_start_in_the_units_of_the_page() -> None:
     assert (state["elapsed_s"], state["state"], state["recording"]) == (7.5, "reference", True)
     assert (state["disk_min"], state["fps"]) == (90.0, 29.5)
     assert (state["ledger"]["grabbed"], state["ledger"]["lost"]) == (9, 2)
-    assert len(state["alarms"]) == 1 and "\x1b" not in state["alarms"][0]
+    assert len(state["troubles"]) == 1 and "\x1b" not in state["troubles"][0]
     assert state["events"] == [{"s": 7.5, "level": "info", "kind": "note", "text": "operator: a note"}]
     assert "axial" not in state, "nothing is measured yet"
 
@@ -218,7 +218,7 @@ def test_the_lines_over_the_curve_are_in_si_units() -> None:
         state.loads.append(LoadSample(START + 0.1 * k, force_of(strain)))
         state.history.add(make_measurement(k, strain).time_step)
     state.loads.close()
-    result = run_result(state, specimen, Path("runs/a"), "interrupted")
+    result = run_result(state, finished(state, specimen), Path("runs/a"), "interrupted")
     assert (result["folder"], result["words"]) == (str(Path("runs/a")), "interrupted")
     elastic, offset, proof, highest = result["lines"]
     (x0, y0), (x1, y1) = elastic["points"]

@@ -16,7 +16,7 @@ from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.page_consumer import PageConsumer
 from live.ui.web.run_result import MAX_TROUBLES, run_result, sides_result
 from live.ui.web.sides import FIGURES_S, SidesPanel
-from tests.live.made_run import E_PA, PULLED, THICKNESS_MM, WIDTH_MM, force_of
+from tests.live.made_run import E_PA, PULLED, THICKNESS_MM, WIDTH_MM, finished, force_of
 from tests.live.made_up import START, make_measurement
 
 SPECIMEN = SpecimenConfig(width_mm=WIDTH_MM, thickness_mm=THICKNESS_MM, axis="y")
@@ -114,7 +114,9 @@ def test_the_page_gets_both_sides() -> None:
 def test_the_result_has_the_figures_of_both_and_the_warnings_of_each() -> None:
     states = {"front": side(WRONG), "back": side(-WRONG)}
     states["back"].event_log.emit(EventKind.DEVICE, "camera", "a fault", "error")
-    result = sides_result(states, SPECIMEN, Path("test"), "")
+    result = sides_result(
+        states, {side: finished(state, SPECIMEN) for side, state in states.items()}, Path("test"), ""
+    )
     assert [one["side"] for one in result["figures"] if one["name"] == "E"] == ["both", "front", "back"]
     held = [one["text"] for one in result["figures"] if one["name"] == "interval of E"]
     assert held == ["scatter; no limits of error are stated"]
@@ -128,6 +130,6 @@ def test_the_result_has_the_newest_warnings() -> None:
     for k in range(25):
         state.event_log.emit(EventKind.DEVICE, "a camera", f"warning {k}", "warning")
         state.event_log.emit(EventKind.NOTE, "operator", f"note {k}", "info")
-    found = run_result(state, SPECIMEN, Path("run"), "")["troubles"]
+    found = run_result(state, finished(state, SPECIMEN), Path("run"), "")["troubles"]
     assert len(found) == MAX_TROUBLES == 20
     assert found[0].endswith("warning 5") and found[-1].endswith("warning 24")

@@ -1,0 +1,93 @@
+"""The pages of a TIFF by its directories (TIFF 6.0, section 2; BigTIFF); no pixel is read."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+from acquire.errors import DataError
+
+SUFFIXES = (".tif", ".tiff")
+_WIDTH, _HEIGHT, _COMPRESSION = 256, 257, 259
+_SIZES = {1: "B", 3: "H", 4: "I", 16: "Q"}  # types of whole numbers
+UNREADABLE = {
+    34925: "LZMA", 50000: "ZSTD", 50001: "WebP", 50002: "JPEG XL", 34887: "LERC", 34712: "JPEG 2000",
+    33003: "JPEG 2000", 33005: "JPEG 2000",
+}  # fmt: skip
+"""Compressions that OpenCV cannot read."""
+
+
+class Page(NamedTuple):
+    """A page: its size in px, and the number of its compression."""
+
+    width: int
+    height: int
+    compression: int
+
+
+def full_pages(path: Path) -> list[int]:
+    """Numbers of the pages of a file, without those that are smaller than its largest (thumbnails); [0] for no TIFF.
+
+    Raises
+    ------
+    DataError
+        The file cannot be opened, or its directories are broken.
+    """
+    pages = tiff_pages(path)
+    most = max((page.width * page.height for page in pages), default=0)
+    return [k for k, page in enumerate(pages) if page.width * page.height == most] or [0]
+
+
+def tiff_pages(path: Path) -> list[Page]:
+    """The pages of a TIFF; empty for anything else; raises as ``full_pages``."""
+    if path.suffix.lower() not in SUFFIXES:
+        return []
+    try:
+        with path.open("rb") as file:
+            return list(_pages(file, path))
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
+    except struct.error as error:
+        raise DataError(
+            f"{path}: a TIFF that is cut off; copy it again or take it out of the list"
+        ) from error
+
+
+def _pages(file: BinaryIO, path: Path) -> Iterator[Page]:
+    head = file.read(16)
+    order = {b"II": "<", b"MM": ">"}.get(head[:2])
+    if order is None or len(head) < 8:
+        return  # whatever it is, the decoder decides
+    big = struct.unpack_from(order + "H", head, 2)[0] == 43
+    offset = (
+        struct.unpack_from(order + "Q", head, 8)[0] if big else struct.unpack_from(order + "I", head, 4)[0]
+    )
+    seen: set[int] = set()
+    while offset:
+        if offset in seen:
+            raise DataError(f"{path}: the directories of this TIFF run in a circle; save it anew")
+        seen.add(offset)
+        page, offset = _directory(file, order, offset, big)
+        yield page
+
+
+def _directory(file: BinaryIO, order: str, offset: int, big: bool) -> tuple[Page, int]:
+    """A page, and where the next directory is; 0 after the last."""
+    count_format, entry, offset_format = ("Q", "HHQ8s", "Q") if big else ("H", "HHI4s", "I")
+    count = _unpack(file, order + count_format, offset)[0]
+    found = {_WIDTH: 0, _HEIGHT: 0, _COMPRESSION: 1}
+    for _ in range(count):
+        tag, kind, _, value = _unpack(file, order + entry)
+        if tag in found and kind in _SIZES:
+            found[tag] = struct.unpack_from(order + _SIZES[kind], value)[0]
+    return Page(*found.values()), _unpack(file, order + offset_format)[0]
+
+
+def _unpack(file: BinaryIO, layout: str, offset: int | None = None) -> tuple[Any, ...]:
+    if offset is not None:
+        if offset > 2**62:
+            raise struct.error("an offset beyond any file")
+        file.seek(offset)
+    return struct.unpack(layout, file.read(struct.calcsize(layout)))

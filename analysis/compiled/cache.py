@@ -1,0 +1,57 @@
+"""Numba's files of compiled loops, each with a checksum behind it: one that is cut or damaged is compiled anew.
+
+A power cut leaves files that are empty, cut, or of zeros. Numba would raise an error on them, or run what they hold.
+It reads the files of this module too, since it ignores what follows. ``acquire.compiled_loops`` does the same.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import IndexDataCacheFile
+
+_DIGEST = 32  # bytes of SHA-256
+
+
+class _Pieces(list[bytes]):
+    """A file in memory."""
+
+    write = list.append
+
+
+class CheckedFile(IndexDataCacheFile):  # type: ignore[misc]
+    """Index and data of one function; what is not whole is as if it were not there."""
+
+    def _load_index(self) -> dict[Any, str]:
+        index = super()._load_index() if is_whole(self._index_path) else {}
+        return {key: name for key, name in index.items() if is_whole(self._data_path(name))}
+
+    @contextmanager
+    def _open_for_write(self, filepath: str) -> Iterator[_Pieces]:
+        pieces = _Pieces()
+        yield pieces
+        data = b"".join(pieces)
+        with super()._open_for_write(filepath) as file:
+            file.write(data + hashlib.sha256(data).digest())
+
+
+def is_whole(path: str) -> bool:
+    """Whether the file is there, with the checksum that it was written with."""
+    try:
+        status = os.stat(path)  # noqa: PTH116 - a string, as numba has it
+        return _matches(path, status.st_mtime_ns, status.st_size)
+    except OSError:
+        return False
+
+
+@cache
+def _matches(path: str, time: int, size: int) -> bool:
+    """Read once a process and version of the file."""
+    data = Path(path).read_bytes()
+    return hashlib.sha256(data[:-_DIGEST]).digest() == data[-_DIGEST:]

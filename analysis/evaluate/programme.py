@@ -1,0 +1,161 @@
+"""What was done to a specimen: pulled until it breaks, pressed, cycled, or held at a strain or a stress.
+
+Strengths and extensions are figures of a tensile test (ISO 6892-1:2019): of a stress that still rises. The elastic
+line of another test is read from its first rise.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from analysis.evaluate.curve import Curve, Floats, broken_at, noise, smoothed
+
+Kind = Literal["tensile", "compression", "cyclic", "relaxation", "creep"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+_NAMES = {
+    "tensile": "a tensile test",
+    "compression": "a test in compression",
+    "cyclic": "a cyclic test",
+    "relaxation": "a hold of strain (relaxation)",
+    "creep": "a hold of stress (creep)",
+}
+
+_NEGATIVE = ": the force is negative; where the specimen is pulled its sign is wrong (--load-sign -1)"
+_FEWEST = 8  # points that a course is judged by
+_SURE = 6.0  # standard deviations of the noise
+_REVERSAL = 0.2  # of the range of the stress: a smaller fall and rise is none
+_PRESSED = 0.2  # of the highest stress: compression that is no part of a tensile test
+_TENSION = 0.05  # of the largest compression: less tension is none
+_GROWTH = 0.1  # of the depths of all unloadings: the strain of a cyclic test grows by less
+_LOADED = 0.05  # of the highest stress: the loading has begun
+_HELD_TIME, _HELD = (
+    0.5,
+    0.03,
+)  # share of the time from there on, and of the range, within which a value is held
+_STILL_LOADED, _RELAXED = 0.2, 0.01  # of the highest stress: what a hold keeps, and loses
+_SLOW = 0.8  # of the strain rate of the loading: a creep is slower
+
+
+@dataclass(frozen=True, slots=True)
+class Programme:
+    """The kind of a test and its first rise.
+
+    Attributes
+    ----------
+    kind : str
+        One of ``KINDS``.
+    words : str
+        The kind and how it is known, for a person.
+    end : int or None
+        Row of the curve after which it rises no longer; None: to the break.
+    """
+
+    kind: Kind
+    words: str
+    end: int | None = None
+
+    @classmethod
+    def of(cls, curve: Curve, given: str = "auto") -> Programme:
+        """As ``given``, or found from the course of ``curve``."""
+        found, how, end = _found(curve)
+        if given == "auto":
+            return cls(found, _NAMES[found] + how, None if found == "tensile" else end)
+        kind = next(one for one in KINDS if one == given)
+        return cls(kind, f"{_NAMES[kind]}, as given", end if kind == found != "tensile" else None)
+
+    @property
+    def why(self) -> str:
+        """Why figures of a tensile test do not apply; empty where they do."""
+        return (
+            ""
+            if self.kind == "tensile"
+            else f"this is {self.words}; [specimen] test = 'tensile' if it is none"
+        )
+
+    def first_rise(self, curve: Curve) -> Curve:
+        """``curve`` up to the end of its first rise: without stresses after it."""
+        if self.end is None:
+            return curve
+        return replace(curve, stress=np.where(np.arange(len(curve.t)) <= self.end, curve.stress, math.nan))
+
+
+def _found(curve: Curve) -> tuple[Kind, str, int | None]:
+    """The kind, how it is seen, and the row at which the first rise ends."""
+    force = curve.stress[np.isfinite(curve.stress)]
+    sigma = noise(force)
+    if len(force) < _FEWEST or np.ptp(force) <= _SURE * 2 * sigma:
+        return "tensile", "", None
+    if force.max() <= max(_SURE * sigma, -_TENSION * force.min()):
+        return "compression", _NEGATIVE, None
+    stop = broken_at(curve.stress, curve.strain)
+    both = np.isfinite(curve.strain) & np.isfinite(curve.stress)
+    known = np.flatnonzero(both[: len(both) if stop is None else stop + 1])
+    if len(known) < _FEWEST:
+        return "tensile", "", None
+    t, strain, stress = (values[known] for values in (curve.t, curve.strain, curve.stress))
+    turns = reversals(stress, max(_REVERSAL * float(np.ptp(stress)), _SURE * sigma))
+    peaks = [k for k in turns if stress[k] > 0 and stress[k] >= stress[turns].mean()]
+    if peaks and _is_cyclic(strain, stress, turns, peaks[0]):
+        return "cyclic", f", whose stress turns round {len(turns)} times", int(known[peaks[0]])
+    held = _hold(t, strain, stress)
+    if held is None:
+        return "tensile", "", None
+    kind, since = held
+    return kind, f" from {t[since]:.4g} s on", int(known[since])
+
+
+def reversals(values: Floats, least: float) -> list[int]:
+    """Where ``values`` turn round, each time to go back by at least ``least``: highest and lowest in turns."""
+    found: list[int] = []
+    high = low = 0
+    rising: bool | None = None
+    for k, value in enumerate(values):
+        high, low = (k if value >= values[high] else high), (k if value <= values[low] else low)
+        if rising is not False and values[high] - value >= least:
+            found += [high] if rising else []
+            rising, low = False, k
+        elif rising is not True and value - values[low] >= least:
+            found += [low] if rising is False else []
+            rising, high = True, k
+    return found
+
+
+def _is_cyclic(strain: Floats, stress: Floats, turns: list[int], first: int) -> bool:
+    """Whether the stress goes to compression, or the strain comes back to where it was, load for load.
+
+    Unloadings of a tensile test are short beside the strain that comes after the first of them.
+    """
+    if stress[first:].min() < -_PRESSED * stress.max():
+        return True
+    depths = [strain[a] - strain[b] for a, b in itertools.pairwise(turns) if stress[a] > stress[b]]
+    depths += [strain[turns[-1]] - strain[-1]] if stress[turns[-1]] > stress[-1] else []
+    growth = float(strain[first:].max() - strain[first])
+    return len(depths) > 1 and growth < _GROWTH * sum(depths)
+
+
+def _hold(t: Floats, strain: Floats, stress: Floats) -> tuple[Kind, int] | None:
+    """What is held to the end and since when; None where the end is no hold, or a short one."""
+    top = float(stress.max())
+    start = int(np.argmax(stress >= _LOADED * top))
+    for kind, values, other in (("relaxation", strain, stress), ("creep", stress, strain)):
+        last = float(np.median(values[-5:]))
+        tolerance = max(_HELD * float(np.ptp(values)), _SURE * noise(values))
+        off = np.flatnonzero(np.abs(values - last) > tolerance)
+        since = min(int(off[-1]) + 1, len(t) - 1) if len(off) else start
+        if t[-1] - t[since] < _HELD_TIME * (t[-1] - t[start]) or stress[-1] < _STILL_LOADED * top:
+            continue
+        level = smoothed(other, 2)
+        gone, before = float(level[-1] - level[since]), float(level[since] - level[start])
+        if kind == "relaxation" and level[since:].max() - level[-1] > max(
+            _RELAXED * top, _SURE * noise(stress)
+        ):
+            return "relaxation", since
+        slow = gone * (t[since] - t[start]) < _SLOW * before * (t[-1] - t[since])
+        if kind == "creep" and slow:
+            return "creep", since
+    return None

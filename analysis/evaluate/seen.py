@@ -1,0 +1,133 @@
+"""What of the force was seen: readings that their neighbours confirm, and gaps that may hide the highest force."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.evaluate.curve import Curve, Floats, broken_at, noise, running_median
+
+_USUAL, _STEEP = 75, 3.0  # percentile of the rises, and times those
+_SURE = 8.0  # standard deviations of the noise
+_PULLED = 2.5  # times the steepest rise over the strain
+_BESIDE = 0.99  # of the highest stress: a gap before it is beside it
+_RUN, _LONGEST, _SHARE = 3, 0.025, 0.1  # readings in a row, or share of all; and of all together
+_PART = 0.01  # of the strain: over so much the steepest rise is read
+_FEWEST = 12  # readings that know what is usual
+_GAP, _FASTEST = 2.5, 95  # usual intervals; percentile of the rises
+
+
+def confirmed(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
+    """The curve without stresses that rise in no time and come back, and words that name those.
+
+    A stress is reached through its neighbours: it rises from one reading to the next by no more than a few times what
+    is usual, and by what the strain that comes with it makes of it. A break falls and does not come back; a jump that
+    stays is no single reading.
+    """
+    known = np.flatnonzero(np.isfinite(curve.stress))
+    stress, strain = curve.stress[known], curve.strain[known]
+    alone = _alone(stress, strain)
+    if not alone.any():
+        return curve, ()
+    rows = known[alone]
+    highest = int(rows[np.argmax(curve.stress[rows])])
+    words = (
+        f"forces left out because no neighbour confirms them: {len(rows)}, the highest, at"
+        f" {curve.t[highest] - curve.t[0]:.4g} s, {curve.stress[highest] / np.max(stress[~alone]):.3g} times"
+        " the highest of the others"
+    )
+    return replace(curve, stress=np.where(np.isin(np.arange(len(curve.t)), rows), math.nan, curve.stress)), (
+        words,
+    )
+
+
+def _alone(stress: Floats, strain: Floats) -> NDArray[np.bool_]:
+    """Which stresses lie far above those before them, and are followed by one that does not, (N,)."""
+    n, alone = len(stress), np.zeros(len(stress), np.bool_)
+    rises, pulls = np.diff(stress), np.diff(strain)
+    if n < _FEWEST or not (rises > 0).any():
+        return alone
+    longest = max(_RUN, round(_LONGEST * n))
+    level = running_median(stress, longest)
+    usual = max(float(np.percentile(rises[rises > 0], _USUAL)), float(np.diff(level).max()))
+    pulled = _PULLED * _stiffness(strain, level) * np.nan_to_num(np.maximum(pulls, 0.0))
+    most = np.maximum(_STEEP * usual, pulled) + _SURE * noise(stress)
+    k = 0
+    while k < n - 1:
+        if rises[k] <= most[k]:
+            k += 1
+            continue
+        back = np.flatnonzero(stress[k + 1 : k + 2 + longest] <= stress[k] + most[k])
+        if len(back) or k + 2 == n:
+            alone[k + 1 : k + 1 + (int(back[0]) if len(back) else 1)] = True
+        k += 1 + (int(back[0]) if len(back) else 0)
+    return alone if alone.sum() <= _SHARE * n else np.zeros(n, np.bool_)
+
+
+def _stiffness(strain: Floats, level: Floats) -> float:
+    """The steepest rise of the stress over the strain, Pa; 0 where strain is not known."""
+    known = np.isfinite(strain)
+    highest = np.maximum.accumulate(strain[known])
+    if len(highest) < _FEWEST:
+        return 0.0
+    span = max(_PART * float(np.ptp(highest)), 20 * noise(strain))
+    on = np.searchsorted(highest, highest + span)
+    inside = on < len(highest)
+    rise = level[known][np.minimum(on, len(highest) - 1)] - level[known]
+    run = highest[np.minimum(on, len(highest) - 1)] - highest
+    return float(np.max(rise[inside] / run[inside], initial=0.0)) if span > 0 else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Unseen:
+    """A gap in the force that may hide the highest stress.
+
+    Attributes
+    ----------
+    before, after : int
+        Rows of the curve with the last force before it and the first after it; ``after`` is -1 at the end.
+    words : str
+    """
+
+    before: int
+    after: int
+    words: str
+
+
+def unseen(curve: Curve, measured: Curve) -> Unseen | None:
+    """The first gap up to the break in which the stress may have passed the highest that is known, or None.
+
+    One after the highest stress counts where it is longer than the usual interval; one beside it, or of forces that
+    ``measured`` has and ``curve`` has not, where the stress could pass the highest at the fastest rise of the test.
+    """
+    stop = broken_at(curve.stress, curve.strain)
+    known = np.flatnonzero(np.isfinite(curve.stress[: len(curve.t) if stop is None else stop + 1]))
+    if len(known) < 3:
+        return None
+    t, stress = curve.t[known], curve.stress[known]
+    next_to = np.diff(known) == 1
+    usual = float(np.median(np.diff(curve.t)))
+    rises = (np.diff(stress) / np.maximum(np.diff(t), 1e-9))[next_to]
+    fastest = float(np.percentile(rises, _FASTEST)) if len(rises) else math.inf
+    ends = np.append(stress[1:], -math.inf if stop is None else 0.0)
+    spans = np.append(np.diff(t), 0.0 if stop is not None else curve.t[-1] - t[-1])
+    reached = np.where(np.isfinite(ends), (stress + ends + fastest * spans) / 2, stress + fastest * spans)
+    top = int(np.argmax(stress))
+    missing = np.append(~next_to, spans[-1] > _GAP * usual)
+    left_out = np.cumsum(np.isfinite(measured.stress) & ~np.isfinite(curve.stress))[known]
+    late = (
+        (np.arange(len(known)) >= top)
+        & (spans > _GAP * usual)
+        & (np.diff(left_out, append=left_out[-1]) == 0)
+    )
+    beside = (reached > stress[top]) & (np.maximum(stress, ends) > _BESIDE * stress[top])
+    hidden = np.flatnonzero(missing & (late | beside))
+    if not len(hidden):
+        return None
+    k = int(hidden[0])
+    after = int(known[k + 1]) if k + 1 < len(known) else -1
+    until = f"to {curve.t[after] - curve.t[0]:.4g} s" if after >= 0 else "on"
+    return Unseen(int(known[k]), after, f"no force is known from {t[k] - curve.t[0]:.4g} s {until}")

@@ -1,0 +1,334 @@
+"""The forces in the text file of a testing machine, spreadsheet or logger: rows to numbers, in bounded memory.
+
+The form of the numbers is found from the whole file: a mark is the decimal one where a cell has no other reading.
+Nothing is guessed: what has two readings is refused with the option that settles it (docs/load-cells.md).
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import BinaryIO, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import DataError
+from acquire.printable import counted
+from live.config.sections import LoadConfig
+from live.replay.export_headings import name_and_unit, newtons_of, seconds_per
+from live.replay.export_numbers import (
+    CLOCK,
+    EMPTY,
+    NUMBERISH,
+    decimal_mark,
+    is_value,
+    numbers_in,
+    time_of_day,
+    two_readings,
+    vote,
+)
+from live.replay.export_table import (
+    Table,
+    blocks,
+    cell_of,
+    find_table,
+    is_heading,
+    is_remark,
+)
+from live.replay.export_text import Rows
+
+MAX_ROWS, MAX_NAMES = 20_000_000, 1_000_000
+_MARKS = {"point": ".", "comma": ","}
+_HALF_DAY_S, _DAY_S = 43_200.0, 86_400.0
+_UNIX_S, _UNIX_MS = 1e8, 1e11  # from 1973 on
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Export:
+    """What a file holds, and how it was read.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the pictures; empty where there are times.
+    times : (N,) float64 or None, s
+        Rising; None where there are names, or one row a picture.
+    forces : (N,) float64, N
+        NaN where the cell is empty.
+    clock : "" | "clock" | "unix"
+        Zero of the times: one of their own, a midnight, or 1970 in UTC.
+    taken : str
+        Column, unit, rows, range and form, for a person.
+    remarks : tuple of str
+        What was assumed and what was left out.
+    """
+
+    names: tuple[str, ...]
+    times: Array | None
+    forces: Array
+    clock: Literal["", "clock", "unix"]
+    taken: str
+    remarks: tuple[str, ...]
+
+
+def read_export(file: BinaryIO, where: str, given: LoadConfig) -> Export:
+    """The forces in ``file``, which can be read again from its beginning; ``where`` is its name for messages.
+
+    Parameters
+    ----------
+    given : LoadConfig
+        ``unit``, ``column``, ``decimal`` and ``sign`` settle what the file leaves open.
+
+    Raises
+    ------
+    DataError
+        No text, no table, what has two readings, a cell that is no number, times that do not rise, too many rows.
+    """
+    table = find_table(file, where, given)
+    mark = _MARKS.get(given.decimal or "") or decimal_mark(
+        (rows for _, rows in blocks(file, table, where)), table.key if table.by_name else None, where
+    )
+    reader = _Reader(table, mark, where, given)
+    for line, rows in blocks(file, table, where):
+        reader.take(line, rows)
+    return reader.export()
+
+
+# -- rows to numbers ----------------------------------------------------------------------------
+
+
+class _Reader:
+    """Takes the rows of a table, block by block."""
+
+    def __init__(self, table: Table, mark: str, where: str, given: LoadConfig) -> None:
+        self._table, self._mark, self._where, self._given = table, mark, where, given
+        self._decimal = "comma" if mark == "," else "point"
+        self._names: list[str] = []
+        self._times, self._forces = array("d"), array("d")
+        self._kinds: dict[int | None, dict[str, str]] = {table.force: {}, table.key: {}}
+        self._remarks: list[str] = []
+        self._is_clock, self._dates, self._last_clock, self._days = False, set[str](), 0.0, 0
+        self._n_texts, self._n_unread, self._other = 0, 0, ""
+        force, _, time = (part.strip() for part in (given.unit or "").partition(","))
+        self._unit = force or name_and_unit(table.heads[table.force])[1]
+        self._time_unit = time or (name_and_unit(table.heads[table.key])[1] if table.key is not None else "")
+        self._newtons, self._seconds = self._factors()
+
+    def _factors(self) -> tuple[float, float]:
+        """Newtons and seconds of one unit; raises DataError where they are not known."""
+        if not self._unit and not self._table.is_ours:
+            called = self._table.heads[self._table.force]
+            raise DataError(
+                f"{self._where}: the column {called!r} has no unit; give --load-unit N, kN, kgf or lbf"
+            )
+        if not self._unit:
+            self._unit = "N"
+            self._remarks.append(
+                "the force has no unit: taken as newtons; if it is another, give --load-unit kN"
+            )
+        newtons, seconds = newtons_of(self._unit), seconds_per(self._time_unit or "s")
+        if newtons is None:
+            raise DataError(
+                f"{self._where}: forces in {self._unit!r} are not known; give N, kN, kgf or lbf: --load-unit kN"
+            )
+        if seconds is None and not self._table.by_name:
+            raise DataError(
+                f"{self._where}: times in {self._time_unit!r} are not known; give s, ms, us, min or h behind the"
+                " unit of the force: --load-unit N,ms"
+            )
+        return newtons, seconds or 1.0
+
+    def take(self, line: int, rows: Rows) -> None:
+        """Take the rows that begin at ``line``."""
+        lines: Sequence[int] = range(line, line + len(rows))
+        rows = self._of_width(lines, rows)
+        if (plain := self._all_plain(rows)) is not None:
+            keys, forces = plain
+        else:
+            found = [(n, *pair) for n, row in zip(lines, rows, strict=True) if (pair := self._values(n, row))]
+            lines, keys, forces = zip(*found, strict=True) if found else ((), (), ())
+        for column, kinds in self._kinds.items():
+            self._note_kinds(kinds, {cell_of(row, column) for row in rows} if "clear" not in kinds else set())
+        if self._table.by_name:
+            self._names += map(str, keys)
+        elif self._table.key is not None and len(keys):
+            self._add_times(lines, np.array(keys, np.float64))
+        self._forces.extend(forces)
+        if len(self._forces) > MAX_ROWS or len(self._names) > MAX_NAMES:
+            raise DataError(
+                f"{self._where}: has more than {MAX_ROWS:,} rows, or {MAX_NAMES:,} names; export fewer a second"
+            )
+
+    def _of_width(self, lines: Sequence[int], rows: Rows) -> Rows:
+        """The same rows; what a comma that is the decimal mark too has cut is refused, or mended if that is given."""
+        n, force = len(self._table.heads), self._table.force
+        if max(map(len, rows)) <= n:
+            return rows
+        commas = self._table.separator == ","
+        if commas and self._given.decimal == "comma":
+            rows = [
+                [f"{a},{b}" for a, b in zip(row[::2], row[1::2], strict=True)] if len(row) == 2 * n else row
+                for row in rows
+            ]
+        for number, row in zip(lines, rows, strict=True):
+            if any(cell.strip() for cell in row[n:]) and NUMBERISH.fullmatch(cell_of(row, force)):
+                why = "is the comma the decimal mark too? give --load-decimal comma, or" if commas else ""
+                words = f"line {number} has {len(row)} cells for {n} columns"
+                raise DataError(f"{self._where}: {words}; {why} export it with other separators")
+        return rows
+
+    def _all_plain(self, rows: Rows) -> tuple[Sequence[float], Sequence[float]] | None:
+        """Times and forces where every row has both; None otherwise, for ``_values`` to tell row by row."""
+        key, force = self._table.key, self._table.force
+        if self._table.by_name or self._other or not self._forces:
+            return None
+        try:
+            forces = self._numbers([row[force].strip() for row in rows])
+            if forces is None or key is None:
+                return None if forces is None else ([], forces)
+            cells = [row[key].strip() for row in rows]
+        except IndexError:
+            return None
+        times = [self._time(cell) for cell in cells] if self._is_clock else self._numbers(cells)
+        return None if times is None or None in times else (times, forces)  # type: ignore[return-value]
+
+    def _numbers(self, cells: Sequence[str]) -> Sequence[float] | None:
+        return numbers_in(cells, self._mark)
+
+    def _number(self, cell: str) -> float | None:
+        numbers = self._numbers([cell])
+        return numbers[0] if numbers else None
+
+    def _values(self, line: int, row: Sequence[str]) -> tuple[float | str, float] | None:
+        """Time or name, and force, of one row; None for a row of text; raises DataError for a row that is neither."""
+        if is_remark(row):
+            return None
+        t = self._table
+        value, key = cell_of(row, t.force), cell_of(row, t.key)
+        force = math.nan if value.lower() in EMPTY else self._number(value)
+        at = (key or None) if t.by_name else self._time(key) if t.key is not None else 0.0 if value else None
+        if not self._other and force is not None and at is not None:
+            return at, force
+        texts = tuple(" ".join(cell.split()) for cell in row)
+        if any(texts[: len(known)] == known for known in t.texts):
+            self._other = ""
+        elif not self._other and not t.by_name and is_heading(texts):
+            self._other = f"line {line}: another table begins ({', '.join(filter(None, texts))[:60]!r})"
+        elif self._other:
+            self._n_unread += 1
+        elif at is not None or is_value(key) or (not key and force is not None and value):
+            bad = value if force is None else key
+            shown = self._table.separator.join(row)[:60]
+            raise DataError(
+                f"{self._where}: line {line}: {bad[:40]!r} in {shown!r} is not a number with a decimal {self._decimal};"
+                " mend it, or give --load-decimal point or comma"
+            )
+        else:
+            self._n_texts += 1
+        return None
+
+    def _time(self, cell: str) -> float | None:
+        """A number, or seconds since midnight."""
+        if not self._forces and not self._is_clock:
+            self._is_clock = CLOCK.fullmatch(cell) is not None
+        if not self._is_clock:
+            return self._number(cell)
+        date, seconds = time_of_day(cell)
+        if date:
+            self._dates.add(date)
+        return seconds
+
+    def _add_times(self, lines: Sequence[int], times: Array) -> None:
+        """Add times, s or in the unit of the file; raises DataError with the line where they do not rise."""
+        if self._is_clock:
+            if not self._times:
+                self._last_clock = float(times[0])
+            nights = np.cumsum(np.diff(times, prepend=self._last_clock) < -_HALF_DAY_S) + self._days
+            self._last_clock, self._days = float(times[-1]), int(nights[-1])
+            times = times + _DAY_S * nights
+        else:
+            while not self._times and not self._time_unit and times[0] * self._seconds > _UNIX_MS:
+                self._seconds *= 1e-3  # Unix times in ms, us or ns
+            times = times * self._seconds
+        before = self._times[-1] if self._times else -math.inf
+        for k in np.flatnonzero(np.diff(times, prepend=before) <= 0)[:1]:
+            earlier, later = float(times[k - 1] if k else before), float(times[k])
+            words = f"the times run backwards ({later:.10g} s after {earlier:.10g} s); give each part its own file"
+            if later == earlier:
+                words = f"the time {later:.10g} s stands twice; export the times with more decimals"
+            raise DataError(f"{self._where}: line {lines[k]}: {words}")
+        self._times.extend(times)
+
+    def _note_kinds(self, kinds: dict[str, str], cells: set[str]) -> None:
+        """Note whether the cells of a column prove their decimal mark, or could have groups of thousands."""
+        for cell in cells:
+            if self._mark not in cell:
+                if "plain" not in kinds and "." not in cell and "," not in cell and self._number(cell):
+                    kinds["plain"] = cell
+            elif NUMBERISH.fullmatch(cell) and (proven := vote(cell)) in ("?", self._mark):
+                kinds["three" if proven == "?" else "clear"] = cell
+                if proven != "?":
+                    return
+
+    # -- the whole ------------------------------------------------------------------------------
+
+    def export(self) -> Export:
+        """All that was taken; raises DataError where there is nothing, or numbers have two readings."""
+        forces = np.array(self._forces) * (self._newtons * self._given.sign)
+        if not np.isfinite(forces).any():
+            raise DataError(f"{self._where}: holds no forces")
+        for kinds in self._kinds.values():
+            if self._given.decimal is None and kinds.keys() >= {"three", "plain"} and "clear" not in kinds:
+                raise two_readings(self._where, kinds["three"])
+        if self._dates and len(self._dates) != self._days + 1:
+            raise DataError(
+                f"{self._where}: the dates do not fit the times of the day; give times in seconds: time_s"
+            )
+        times = np.array(self._times) if self._times else None
+        clock = self._zero(times)
+        return Export(
+            tuple(self._names), times, forces, clock, self._taken(forces, clock), tuple(self._remarks)
+        )
+
+    def _zero(self, times: Array | None) -> Literal["", "clock", "unix"]:
+        """What the times count from, with remarks on what was assumed and left out."""
+        add = self._remarks.append
+        if self._n_texts:
+            add(f"{counted(self._n_texts, 'line')} of text left out")
+        if self._n_unread or self._other:
+            add(f"{self._other}: its {counted(self._n_unread, 'row')} are not read")
+        if times is None:
+            return ""
+        if self._is_clock:
+            return "clock" if self._dates or times[0] >= 3600.0 else ""
+        if times[0] > _UNIX_S:
+            return "unix"
+        if not self._time_unit and not self._table.is_ours:
+            add("the times have no unit: taken as seconds; if it is another, give --load-unit N,ms")
+        return ""
+
+    def _taken(self, forces: Array, clock: str) -> str:
+        t = self._table
+        low, high = _shown(np.nanmin(forces)), _shown(np.nanmax(forces))
+        kind = (
+            "times of the day"
+            if clock == "clock"
+            else "h:min:s"
+            if self._is_clock
+            else self._time_unit or "s"
+        )
+        kind = f" ({'Unix times' if clock == 'unix' else kind})" if not t.by_name else ""
+        against = f" against {t.name(t.key)}{kind}" if t.key is not None else ""
+        return (
+            f"column {t.name(t.force)}, {self._unit}, {len(forces):,} rows, {low} to {high} N{against}; {t.form},"
+            f" decimal {self._decimal}"
+        )
+
+
+def _shown(force: float) -> str:
+    return f"{force:,.0f}" if abs(force) >= 1000 else f"{force:.4g}"

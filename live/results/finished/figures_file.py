@@ -1,0 +1,142 @@
+"""``figures.json``: the figures, counts and checks of a test for other programs; docs/strain-format.md describes it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from acquire.errors import DataError, PhasedicError
+from acquire.events import EventKind
+from analysis.evaluate import CONFIDENCE, Figure
+from analysis.evaluate.elastic import FILM
+from live.config.loading import Config
+from live.pipeline.run_state import RunState
+from live.results.export.atomic_file import new_file
+from live.results.figures import tensile_table
+from live.results.finished.findings import DataCheck, findings
+from live.results.finished.finished_test import FinishedTest
+from live.results.run_folder import RunFolder
+
+FILE, FORMAT, VERSION = "figures.json", "phasedic-figures", 1
+COUNTS = ("grabbed", "recorded", "measured", "skipped", "lost", "without_force")
+_SI = {"MPa": "Pa", "GPa": "Pa", "kN": "N", "%": "1", "": "1"}
+_NO_SECTION = "the section is not known: give --section W,T"
+
+
+@dataclass(frozen=True, slots=True)
+class FiguresFile:
+    """The content of the file.
+
+    Attributes
+    ----------
+    figures : sequence of mapping
+        name, value, low, high, confidence, unit, reason, qualifier; SI units, None where unknown.
+    counts : mapping of str to int or None
+        ``COUNTS``.
+    checks : sequence of DataCheck
+    exit_code : int
+    """
+
+    figures: Sequence[Mapping[str, Any]]
+    counts: Mapping[str, int | None]
+    checks: Sequence[DataCheck]
+    exit_code: int
+
+    @classmethod
+    def of(cls, test: FinishedTest, counts: Mapping[str, int], exit_code: int) -> FiguresFile:
+        """The file of a finished test; of the counts of frames those in ``COUNTS`` are taken."""
+        chosen = {name: counts.get(name) for name in COUNTS}
+        return cls(list(_figures(test)), chosen, findings(test), exit_code)
+
+    @property
+    def text(self) -> str:
+        """As JSON."""
+        checks = [{"name": one.name, "outcome": one.outcome, "text": one.text} for one in self.checks]
+        content = {
+            "format": FORMAT,
+            "version": VERSION,
+            "figures": self.figures,
+            "counts": self.counts,
+            "checks": checks,
+            "exit_code": self.exit_code,
+        }
+        return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def write(self, folder: Path) -> None:
+        """Write a new file into ``folder``; raises DataError or ConfigError where that cannot be done."""
+        with new_file(folder / FILE) as part:
+            part.write_text(self.text, encoding="utf-8")
+
+
+def finished(
+    folder: Path, config: Config, run_state: RunState, exit_code: int, reference_N: float
+) -> FinishedTest:
+    """Evaluate a run or replay that has just ended, and write its ``figures.json``; where that fails it is an event.
+
+    ``reference_N`` is the force at the reference, N; NaN where it is not known.
+    """
+    test = FinishedTest.of_run(run_state, config.specimen, config.gauges, reference_N)
+    try:
+        FiguresFile.of(test, run_state.frame_counts.as_dict(), exit_code).write(folder)
+    except PhasedicError as error:
+        run_state.event_log.emit(EventKind.RECORDER, FILE, str(error), "warning")
+    return test
+
+
+def finished_in(run: RunFolder) -> FinishedTest:
+    """The finished test of a folder; where no reading is recorded, with the lag that the replay found with its file."""
+    test = FinishedTest.of_folder(run)
+    return test if run.load_samples else replace(test, lag=stored_lag(run.path) or test.lag)
+
+
+def stored_lag(folder: Path) -> Figure | None:
+    """The lag that the run or replay found, s, from its ``figures.json``; None where there is no such file."""
+    path = folder / FILE
+    if not path.exists():
+        return None
+    try:
+        found = {one["name"]: one for one in json.loads(path.read_text(encoding="utf-8"))["figures"]}["lag"]
+        value, low, high = (
+            math.nan if found[key] is None else float(found[key]) for key in ("value", "low", "high")
+        )
+        return Figure(value, low, high, str(found["reason"] or ""))
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DataError(
+            f"{path}: cannot be read ({error}); make the results again with phasedic replay"
+        ) from None
+
+
+def _figures(test: FinishedTest) -> Iterator[dict[str, Any]]:
+    stresses = test.specimen.area_m2 is not None
+    for key, row in tensile_table(test.figures, stresses=stresses).items():
+        yield _row(row.name, getattr(test.figures, key), _SI.get(row.unit, row.unit))
+    if not stresses:
+        for row in tensile_table(test.figures, stresses=True).values():
+            if _SI.get(row.unit) == "Pa":
+                yield _row(row.name, Figure.none(_NO_SECTION), "Pa")
+    yield _row("lag", test.lag, "s")
+    for name, value in test.at_end.items():
+        figure = Figure.about(value.value, value.sigma) if not value.reason else Figure.none(value.reason)
+        film = test.specimen.film_error_percent
+        yield _row(f"{name} at the end", figure.limited(film / 100, FILM) if film else figure, "1")
+
+
+def _row(name: str, figure: Figure, unit: str) -> dict[str, Any]:
+    return {
+        "name": name,
+        "value": _finite(figure.value),
+        "low": _finite(figure.low),
+        "high": _finite(figure.high),
+        "confidence": CONFIDENCE if figure.known else None,
+        "unit": unit,
+        "reason": None if figure.known else figure.why or "not known",
+        "qualifier": figure.qualifier or None,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,221 @@
+"""What the data of a test say against their figures: mistakes of a set-up that can be seen afterwards.
+
+Each finding is one sentence that says what was found, in figures, and what to type. The order is that of how much a
+mistake changes the figures; summary and report show the first ``SHOWN``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.evaluate import CONFIDENCE, Figure
+from analysis.evaluate.curve import noise
+from analysis.evaluate.figure import quantile
+from live.results.figures import LAG_MATTERS_S, figure_text
+from live.results.finished.finished_test import FinishedTest
+
+SHOWN = 3
+"""Findings at the top of summary and report."""
+Outcome = Literal["good", "doubt", "not checked"]
+
+_CLEAR, _CLEAR_STRAIN = (
+    10.0,
+    1e-4,
+)  # of a strain or stress that has changed: in its noise; and a strain at least
+_FOLLOWS = 0.5  # correlation of stress and strain from which on one follows the other
+_MODULUS_GPa = (0.1, 1000.0)  # of solids
+_MODULUS_OFF = 0.2
+_SIGMAS = 3.0
+_UNCOVERED_S, _UNCOVERED = 2.0, 5.0  # that forces and pictures may differ by at an end: seconds, bursts
+_OFF_AXIS = math.radians(10)
+_PRELOAD = 0.002  # of the highest force, below which a force at the reference is the zero of a load cell
+
+
+@dataclass(frozen=True, slots=True)
+class DataCheck:
+    """The outcome of one check of the data.
+
+    Attributes
+    ----------
+    name : str
+    outcome : "good", "doubt" or "not checked"
+    text : str
+        What is odd, and what to type; of "not checked" why; empty where the check is good.
+    """
+
+    name: str
+    outcome: Outcome
+    text: str = ""
+
+
+def findings(test: FinishedTest) -> list[DataCheck]:
+    """All checks of a finished test, in the order in which they are shown."""
+    return [_finding(name, check, test) for name, check in _CHECKS.items()]
+
+
+def doubts(found: Sequence[DataCheck]) -> list[str]:
+    """The sentences to show first: at most ``SHOWN``."""
+    return [one.text for one in found if one.outcome == "doubt"][:SHOWN]
+
+
+def _finding(name: str, check: Callable[[FinishedTest], str | None], test: FinishedTest) -> DataCheck:
+    if name not in _WITHOUT_FORCE and not test.has_force:
+        return DataCheck(name, "not checked", "no force is known")
+    text = check(test)
+    if text is None:
+        return DataCheck(name, "not checked", "the test does not show it")
+    return DataCheck(name, "doubt" if text else "good", text)
+
+
+def _sign_of_force(test: FinishedTest) -> str | None:
+    """Stress and strain must have one sign; a test that is pressed is named."""
+    strain, stress = _both_known(test)
+    if not (_changes(strain, _CLEAR_STRAIN) and _changes(stress, 0.0)):
+        return None
+    follows = float(np.corrcoef(strain, stress)[0, 1])
+    longest = strain[np.argmax(np.abs(strain))]
+    if follows < -_FOLLOWS:
+        way = "longer" if longest > 0 else "shorter"
+        sign = "negative" if np.median(stress[np.abs(stress) > np.abs(stress).max() / 2]) < 0 else "positive"
+        return (
+            f"the force is {sign} where the specimen gets {way} along {test.axis.axis}: give --load-sign -1, or"
+            " --axis where that is not the axis of the load"
+        )
+    if follows > _FOLLOWS and longest < 0 and stress[np.argmax(np.abs(stress))] < 0:
+        return (
+            "the test is in compression: force and strain are negative, and the strengths of tension do not apply; if"
+            " it was tension, give --load-sign -1"
+        )
+    return ""
+
+
+def _modulus(test: FinishedTest) -> str | None:
+    """E in the range of solids, and near what was expected."""
+    e, expected = test.figures.E.value * 1e-9, test.specimen.modulus_GPa
+    if not test.figures.E.known or test.specimen.area_m2 is None:
+        return None
+    ask = "is the section in mm2 and the force in N (--section, --load-unit)?"
+    if expected is not None:
+        off = abs(e / expected - 1) > _MODULUS_OFF
+        return f"E = {e:.3g} GPa where specimen.modulus_GPa is {expected:g}: {ask}" if off else ""
+    low, high = _MODULUS_GPa
+    return (
+        "" if low <= e <= high else f"E = {e:.3g} GPa is not that of a solid, {low:g} to {high:g} GPa: {ask}"
+    )
+
+
+def _coverage(test: FinishedTest) -> str | None:
+    """Forces over the whole time of the pictures, and not beyond."""
+    samples, t = test.samples.known(), test.curve.t
+    if not len(samples.t) or len(t) < 2:
+        return None
+    limit = max(_UNCOVERED_S, _UNCOVERED * float(np.median(np.diff(t))))
+    known = f"{np.count_nonzero(np.isfinite(test.curve.stress))} of {len(t)} bursts have a force"
+    if (late := float(samples.t[0] - t[0])) > limit:
+        return f"the forces begin {late:.1f} s after the pictures ({known}): give forces for all pictures"
+    if (early := float(t[-1] - samples.t[-1])) > limit:
+        return f"the forces end {early:.1f} s before the pictures ({known}): give forces for all pictures"
+    beyond = float(samples.t[-1] - t[-1])
+    seen = np.abs(samples.values[samples.t <= t[-1]])
+    if beyond > limit and len(seen) and np.abs(samples.values).max() > 1.01 * seen.max():
+        most = samples.values[np.argmax(np.abs(samples.values))]
+        return f"the pictures end {beyond:.1f} s before the forces, which go on to {most:.4g} N; no picture shows that"
+    return ""
+
+
+def _lag(test: FinishedTest) -> str | None:
+    """Force and strain at one time."""
+    lag = test.lag
+    if not lag.known:
+        return None
+    if abs(lag.value) < max(LAG_MATTERS_S, _SIGMAS * _sigma(lag)):
+        return ""
+    way = "behind" if lag.value > 0 else "ahead of"
+    total = lag.value + test.corrected_s
+    text = figure_text(
+        Figure(abs(lag.value), abs(lag.value) - _half(lag), abs(lag.value) + _half(lag)), 1e-3, "ms"
+    )
+    return f"the force comes {text} ({CONFIDENCE:.0%}) {way} the pictures: --lag {total:.3f} corrects it"
+
+
+def _alignment(test: FinishedTest) -> str | None:
+    """The strain of E along the principal strain: that of the gauge ``axial``, else along the axis of the load."""
+    angle = test.axis.angle
+    if not angle.known:
+        return None
+    start, end = test.gauge.get("start"), test.gauge.get("end")
+    if start and end:
+        along = math.atan2(end[1] - start[1], end[0] - start[0]) - (
+            math.pi / 2 if test.axis.axis == "y" else 0.0
+        )
+        off = math.remainder(along - angle.value, math.pi)
+        what, mend = "the gauge axial", "place it along the load"
+    else:
+        off, what, mend = (
+            angle.value,
+            f"the axis {test.axis.axis}",
+            "turn the camera, or draw a gauge axial along the load",
+        )
+    if abs(off) <= _OFF_AXIS + _SIGMAS * _sigma(angle):
+        return ""
+    return (
+        f"{what} is {abs(math.degrees(off)):.0f} degrees off the largest strain, and so are E and nu: {mend}"
+    )
+
+
+def _out_of_plane(test: FinishedTest) -> str | None:
+    """Poisson's ratio between 0 and 0.5: beyond, motion towards the camera adds the same to both strains."""
+    nu = test.figures.nu
+    if not nu.known:
+        return None
+    margin = _SIGMAS * _sigma(nu)
+    if -margin <= nu.value <= 0.5 + margin:
+        return ""
+    text = figure_text(nu)
+    return f"nu = {text} is beyond 0 to 0.5: the specimen moves towards the camera or bends; see docs/optics.md, plates"
+
+
+def _reference_load(test: FinishedTest) -> str | None:
+    """No force at the reference: strains count from there."""
+    force, samples = test.reference_N, test.samples.known()
+    if not math.isfinite(force) or not len(samples.t):
+        return None
+    sigma = noise(samples.values) if len(samples.t) > 3 else 0.0
+    if abs(force) <= max(_SIGMAS * sigma, _PRELOAD * float(np.abs(samples.values).max())):
+        return ""
+    return f"the reference was taken under load: strains count from {force:.4g} N; take it before the load, or tare"
+
+
+_CHECKS: dict[str, Callable[[FinishedTest], str | None]] = {
+    "sign of the force": _sign_of_force,
+    "modulus": _modulus,
+    "forces and pictures": _coverage,
+    "lag": _lag,
+    "alignment": _alignment,
+    "out of plane": _out_of_plane,
+    "reference under load": _reference_load,
+}
+_WITHOUT_FORCE = ("alignment",)
+
+
+def _both_known(test: FinishedTest) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    known = np.isfinite(test.curve.strain) & np.isfinite(test.curve.stress)
+    return test.curve.strain[known], test.curve.stress[known]
+
+
+def _changes(values: NDArray[np.float64], least: float) -> bool:
+    return len(values) > 3 and float(np.ptp(values)) > max(_CLEAR * noise(values), least)
+
+
+def _half(figure: Figure) -> float:
+    return max(figure.high - figure.value, figure.value - figure.low)
+
+
+def _sigma(figure: Figure) -> float:
+    return _half(figure) / quantile()

@@ -1,0 +1,156 @@
+"""A finished test with its figures: what summary, page, report and figures.json say of it comes from here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.events import Event, EventKind
+from analysis.evaluate import (
+    Curve,
+    Figure,
+    GaugeValue,
+    LoadAxis,
+    TensileFigures,
+    Track,
+    evaluate_test,
+    find_lag,
+)
+from live.config.sections import SpecimenConfig
+from live.pipeline.measurement import AXIAL, TimeStep
+from live.pipeline.run_state import RunState
+from live.results.figures import lag_of, tensile_options
+from live.results.run_folder import RunFolder
+
+NO_VALUE = "no ZOI has a value in the last burst"
+_NO_READINGS = "no readings of a load cell are there"
+REGION = ("exx", "eyy", "exy")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FinishedTest:
+    """A finished test.
+
+    Attributes
+    ----------
+    curve : Curve
+        Stress in Pa, or force in N where the section is not known.
+    figures : TensileFigures
+        In the same unit.
+    specimen : SpecimenConfig
+    axis : LoadAxis
+    gauge : mapping of str to value
+        The gauge ``axial`` as configured; empty where there is none.
+    samples : Track, s and N
+        Readings of the load cell or of the file; the forces of the bursts where no reading is recorded.
+    lag : Figure, s
+        Of the load behind the frames, as found from the test; ``corrected_s`` is taken off already.
+    corrected_s : float, s
+    reference_N : float, N
+        Force at the reference; NaN where it is not known.
+    at_end : mapping of str to GaugeValue
+        Strains of the region (``REGION``) and of the gauges (``gauge NAME``) in the last burst.
+    """
+
+    curve: Curve
+    figures: TensileFigures
+    specimen: SpecimenConfig
+    axis: LoadAxis
+    samples: Track
+    lag: Figure
+    corrected_s: float = 0.0
+    reference_N: float = math.nan
+    gauge: Mapping[str, Any] = field(default_factory=dict)
+    at_end: Mapping[str, GaugeValue] = field(default_factory=dict)
+
+    @classmethod
+    def of_run(
+        cls,
+        run_state: RunState,
+        specimen: SpecimenConfig,
+        gauges: Mapping[str, Mapping[str, Any]],
+        reference_N: float,
+    ) -> FinishedTest:
+        """A run or replay that has just ended; ``gauges`` as configured, ``reference_N`` the force at the reference."""
+        history, loads = run_state.history, run_state.loads
+        samples = Track(*loads.arrays())
+        curve = history.curve(history.forces(loads) / (specimen.area_m2 or 1.0), specimen.axis)
+        return cls(
+            curve,
+            evaluate_test(curve, tensile_options(specimen)),
+            specimen,
+            history.axis(specimen.axis),
+            samples,
+            lag_of(history, loads, specimen),
+            loads.lag_s,
+            reference_N,
+            gauges.get(AXIAL, {}),
+            strains_at_end(history.time_steps[-1]) if len(history.time_steps) else {},
+        )
+
+    @classmethod
+    def of_folder(cls, run: RunFolder) -> FinishedTest:
+        """A finished run, from its files."""
+        t, corrected = run.strain.time_s, run.section("load").get("lag_s")
+        recorded = run.load_samples
+        samples = Track(
+            np.array([sample.t - run.start_monotonic for sample in recorded], np.float64),
+            np.array([sample.force for sample in recorded], np.float64),
+        )
+        at_bursts = Track(np.asarray(t, np.float64), run.force)
+        return cls(
+            run.curve,
+            evaluate_test(run.curve, tensile_options(run.specimen)),
+            run.specimen,
+            run.load_axis,
+            samples if recorded else at_bursts,
+            find_lag(Track(at_bursts.t, run.axial_strain), samples)
+            if recorded
+            else Figure.none(_NO_READINGS),
+            float(corrected) if isinstance(corrected, int | float) else 0.0,
+            reference_force(run.events),
+            run.gauges[AXIAL].described if AXIAL in run.gauges else {},
+            _stored_at_end(run),
+        )
+
+    @property
+    def force(self) -> NDArray[np.float64]:
+        """Force at each instant, (T,) N."""
+        return self.curve.stress * (self.specimen.area_m2 or 1.0)
+
+    @property
+    def has_force(self) -> bool:
+        """Whether any force is known at a measured instant."""
+        return bool(np.isfinite(self.curve.stress).any())
+
+
+def strains_at_end(last: TimeStep) -> dict[str, GaugeValue]:
+    """The strains of region and gauges in the burst ``last``, with sigma, or why there is none."""
+    found = {}
+    for name in REGION:
+        value, sigma = getattr(last, name), getattr(last, f"sigma_{name}")
+        found[name] = GaugeValue(value, sigma, "" if math.isfinite(value) else NO_VALUE)
+    return found | {f"gauge {name}": value for name, value in last.gauges.items()}
+
+
+def reference_force(events: list[Event]) -> float:
+    """The force at the first reference, N; NaN where no event has it."""
+    forces = [event.data.get("force_N") for event in events if event.kind is EventKind.REFERENCE]
+    return float(forces[0]) if forces and forces[0] is not None else math.nan
+
+
+def _stored_at_end(run: RunFolder) -> dict[str, GaugeValue]:
+    values, found = run.strain.values, {}
+    for name in REGION:
+        value, sigma = float(values[name][-1]), float(values[f"sigma_{name}"][-1])
+        found[name] = GaugeValue(value, sigma, "" if math.isfinite(value) else NO_VALUE)
+    for name, gauge in run.gauges.items():
+        value, sigma = float(gauge.value[-1]), float(gauge.sigma[-1])
+        reason = "" if math.isfinite(value) else "the gauge has no value in the last burst"
+        found[f"gauge {name}"] = GaugeValue(value, sigma, reason)
+    return found

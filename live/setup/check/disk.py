@@ -1,0 +1,58 @@
+"""How long the disk lasts for the recording of a test, from the pictures of a check."""
+
+from __future__ import annotations
+
+import math
+
+from acquire.burst import sum_kind
+from acquire.hdf5 import free_bytes
+from acquire.record_mode import RecordMode
+from live.config.loading import Config
+from live.config.sections import DEFAULT_BURST
+from live.config.sides import second_camera
+from live.setup.check.sample import FrameStack
+from live.setup.check.verdict import CheckLine
+
+SHORTEST_S = 600.0
+"""Of a test whose length is not given."""
+
+
+def write_rate(stack: FrameStack, config: Config) -> float:
+    """What the recording of these pictures writes, bytes/s: at the rate at which they came, in the recorder's form.
+
+    The part of a second camera is taken to be the same. 0 where nothing is recorded, or the pictures are not live.
+    """
+    camera, m = stack.camera, config.measure
+    if not (config.record.enabled and camera.live):
+        return 0.0
+    span_s = float(stack.times[-1] - stack.times[0])
+    fps = (len(stack) - 1) / span_s if span_s > 0 else camera.fps or 0.0
+    mode, burst = RecordMode.parse(config.record.mode), m.burst or DEFAULT_BURST
+    size = stack.frames.itemsize / mode.every
+    if mode.kind == "bursts":
+        size = (
+            sum_kind(camera.bits, burst).itemsize + 1 / 8
+        ) / burst  # the sum, and a bit for clipped pixels
+    return camera.width * camera.height * size * fps * (1 if second_camera(config) is None else 2)
+
+
+def disk_lines(rate: float, config: Config) -> list[CheckLine]:
+    """The line of the disk for a recording of ``rate`` (``write_rate``); none where nothing is recorded."""
+    if not rate:
+        return []
+    wanted_s, folder = config.output.seconds or SHORTEST_S, config.output.dir or "runs"
+    try:
+        free = free_bytes(folder)
+    except OSError as error:
+        words = "connect the disk, or choose another with --out"
+        return [CheckLine("disk", f"{folder}: cannot be asked ({error.strerror})", False, words)]
+    minutes = math.floor(10 * free / rate / 60) / 10  # not more than there is
+    return [
+        CheckLine(
+            "disk",
+            f"room for {minutes:.4g} min at this rate ({rate / 1e6:.3g} MB/s, {free / 1e9:.3g} GB free)",
+            free / rate >= wanted_s,
+            f"too little for a test of {wanted_s / 60:.3g} min: free some space, choose another disk with --out,"
+            " or record less (--record bursts)",
+        )
+    ]

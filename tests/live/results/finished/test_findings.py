@@ -1,0 +1,220 @@
+"""Mistakes of a set-up that the data of a test show: made tests with one mistake each, and tests without one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquire.load_sample import LoadSample
+from live.config.sections import SpecimenConfig
+from live.pipeline.run_state import RunState
+from live.results.finished.findings import SHOWN, doubts, findings
+from live.results.finished.finished_test import FinishedTest
+from tests.live.made_run import finished
+from tests.live.made_up import make_measurement
+from tests.live.ui.web.sentences import Translator
+
+E_PA, NU, YIELD = 70e9, 0.3, 0.003
+FLAT = SpecimenConfig(width_mm=10.0, thickness_mm=2.0, axis="y")
+STRAINS = np.r_[np.zeros(20), np.linspace(0, 0.003, 80), np.linspace(0.0031, 0.02, 40)]
+FPS = 10.0
+
+
+def stress_of(strain: np.ndarray) -> np.ndarray:
+    return E_PA * np.clip(strain, -YIELD, YIELD) + 1e9 * np.where(
+        np.abs(strain) > YIELD, strain - np.sign(strain) * YIELD, 0
+    )
+
+
+def test_of(
+    strains: np.ndarray = STRAINS,
+    force: np.ndarray | None = None,
+    *,
+    specimen: SpecimenConfig = FLAT,
+    nu: float = NU,
+    turned: float = 0.0,
+    times: Sequence[float] | None = None,
+    reference_N: float = 0.0,
+) -> FinishedTest:
+    """A test with these strains along a load that is turned by rad from y, and these forces, N, at ``times``, s."""
+    rng = np.random.default_rng(4)
+    state = RunState.new(0.5, specimen=specimen)
+    if force is None:
+        force = stress_of(strains) * 20e-6
+    c, s = math.cos(turned), math.sin(turned)
+    for k, strain in enumerate(strains):
+        m, across = make_measurement(k), -nu * strain
+        one = {
+            "exx": strain * s * s + across * c * c,
+            "eyy": strain * c * c + across * s * s,
+            "exy": (strain - across) * s * c,
+        }
+        noisy = {name: value + rng.normal(0, 2e-6) for name, value in one.items()}
+        sigma = {f"sigma_{name}": 2e-6 for name in one}
+        lengths = {"extension_y": noisy["eyy"], "extension_x": noisy["exx"]}
+        step = replace(m.time_step, t=k / FPS, **noisy, **sigma, **lengths, misfit=1.0)
+        state.history.add(step)
+    scatter = 1e-4 * float(np.nanmax(np.abs(force))) if np.isfinite(force).any() else 0.0
+    for k, value in enumerate(force):
+        t = k / FPS if times is None else times[k]
+        state.loads.append(LoadSample(t, float(value + rng.normal(0, scatter))))
+    state.loads.close()
+    return finished(state, specimen, reference_N)
+
+
+test_of.__test__ = False  # type: ignore[attr-defined]
+
+
+def outcomes(test: FinishedTest) -> dict[str, str]:
+    return {one.name: one.outcome for one in findings(test)}
+
+
+def first_doubt(test: FinishedTest) -> str:
+    return doubts(findings(test))[0]
+
+
+def test_a_test_without_a_mistake_has_no_doubt() -> None:
+    found = findings(test_of())
+    assert doubts(found) == []
+    assert [one.name for one in found] == [
+        "sign of the force",
+        "modulus",
+        "forces and pictures",
+        "lag",
+        "alignment",
+        "out of plane",
+        "reference under load",
+    ]
+    assert {one.outcome for one in found if one.name != "lag"} == {"good"}
+
+
+def test_a_force_of_the_wrong_sign_comes_first() -> None:
+    text = first_doubt(test_of(force=-stress_of(STRAINS) * 20e-6))
+    assert (
+        text.startswith("the force is negative where the specimen gets longer") and "--load-sign -1" in text
+    )
+    text = first_doubt(test_of(-STRAINS, force=stress_of(STRAINS) * 20e-6))
+    assert text.startswith("the force is positive where the specimen gets shorter")
+
+
+def test_a_test_in_compression_is_named() -> None:
+    assert "in compression" in first_doubt(test_of(-STRAINS))
+
+
+def test_a_cyclic_test_is_neither() -> None:
+    strains = 0.002 * np.sin(np.linspace(0, 6 * math.pi, 200))
+    assert outcomes(test_of(strains))["sign of the force"] == "good"
+
+
+@pytest.mark.parametrize(
+    ("factor", "expected", "words"),
+    [
+        (1e-3, None, "E = 0.07 GPa is not that of a solid"),
+        (1e3, None, "GPa is not that of a solid"),
+        (0.7, 70.0, "where specimen.modulus_GPa is 70"),
+        (1.25, 70.0, "where specimen.modulus_GPa is 70"),
+        (0.85, 70.0, ""),
+        (1.0, 70.0, ""),
+    ],
+)
+def test_a_modulus_of_no_solid_or_not_that_expected(
+    factor: float, expected: float | None, words: str
+) -> None:
+    specimen = replace(FLAT, modulus_GPa=expected)
+    found = doubts(findings(test_of(force=factor * stress_of(STRAINS) * 20e-6, specimen=specimen)))
+    assert bool(found) == bool(words) and (not words or (words in found[0] and "N" in found[0]))
+
+
+def test_a_force_without_a_section_has_no_modulus() -> None:
+    assert outcomes(test_of(specimen=SpecimenConfig(axis="y")))["modulus"] == "not checked"
+
+
+def test_forces_that_do_not_cover_the_pictures() -> None:
+    whole = stress_of(STRAINS) * 20e-6
+    text = first_doubt(test_of(force=whole[:100]))
+    assert text.startswith("the forces end 4.0 s before the pictures (") and "of 140 bursts" in text
+    text = first_doubt(test_of(force=whole[50:], times=[(50 + k) / FPS for k in range(90)]))
+    assert text.startswith("the forces begin 5.0 s after the pictures (")
+    longer = np.r_[whole, np.linspace(whole[-1], 2 * whole[-1], 50)]
+    text = first_doubt(test_of(force=longer))
+    assert text == "the pictures end 5.0 s before the forces, which go on to 9080 N; no picture shows that"
+    assert doubts(findings(test_of(force=np.r_[whole, whole[-1] * np.ones(10)]))) == []
+
+
+def test_a_force_that_comes_late() -> None:
+    """At ten a second, 0.3 s late: three samples."""
+    whole = stress_of(STRAINS) * 20e-6
+    found = findings(test_of(force=np.r_[np.zeros(3), whole]))
+    lag = next(one for one in found if one.name == "lag")
+    assert lag.outcome == "doubt" and "behind the pictures: --lag 0.3" in lag.text
+
+
+@pytest.mark.parametrize(("degrees", "odd"), [(4.0, False), (14.0, True), (-14.0, True)])
+def test_an_axis_off_the_largest_strain(degrees: float, odd: bool) -> None:
+    found = outcomes(test_of(turned=math.radians(degrees)))
+    assert (found["alignment"] == "doubt") == odd
+
+
+@pytest.mark.parametrize(("end", "odd"), [((100.0, 200.0), False), ((160.0, 200.0), True)])
+def test_a_gauge_off_the_largest_strain(end: tuple[float, float], odd: bool) -> None:
+    test = replace(test_of(), gauge={"kind": "line", "start": (100.0, 20.0), "end": end})
+    text = next(one.text for one in findings(test) if one.name == "alignment")
+    assert bool(text) == odd and (not odd or "the gauge axial is 18 degrees off" in text)
+
+
+@pytest.mark.parametrize(("nu", "odd"), [(0.3, False), (0.49, False), (0.7, True), (-0.2, True)])
+def test_a_poisson_ratio_that_shows_motion_off_the_plane(nu: float, odd: bool) -> None:
+    found = {one.name: one for one in findings(test_of(nu=nu))}["out of plane"]
+    assert (found.outcome == "doubt") == odd
+    assert not odd or float(found.text.removeprefix("nu = ").split()[0]) == pytest.approx(nu, abs=0.01)
+
+
+@pytest.mark.parametrize(("force", "odd"), [(107.0, True), (-107.0, True), (0.4, False), (2.0, False)])
+def test_a_reference_under_load(force: float, odd: bool) -> None:
+    found = {one.name: one for one in findings(test_of(reference_N=force))}["reference under load"]
+    assert (found.outcome == "doubt") == odd
+    assert not odd or f"strains count from {force:g} N" in found.text
+
+
+def test_the_reference_is_not_judged_where_its_force_is_not_known() -> None:
+    assert outcomes(test_of(reference_N=math.nan))["reference under load"] == "not checked"
+
+
+def test_at_most_three_are_shown_in_their_order() -> None:
+    wrong = test_of(force=1e-3 * stress_of(STRAINS[:100]) * 20e-6, turned=0.3, nu=0.8, reference_N=1.0)
+    found = findings(wrong)
+    assert sum(one.outcome == "doubt" for one in found) > SHOWN == len(doubts(found))
+    assert [text.split()[0] for text in doubts(found)] == ["E", "the", "the"]
+    assert "forces end" in doubts(found)[1] and "the axis y" in doubts(found)[2]
+
+
+def test_without_a_force_only_what_needs_none_is_checked() -> None:
+    found = findings(test_of(force=np.full(len(STRAINS), math.nan)))
+    checked = [one.name for one in found if one.outcome != "not checked"]
+    assert checked == ["alignment"]
+    assert {one.text for one in found if one.name != "alignment"} == {"no force is known"}
+
+
+def test_every_doubt_is_translated_on_the_page() -> None:
+    translator, whole = Translator(), stress_of(STRAINS) * 20e-6
+    tests = (
+        test_of(force=-whole),
+        test_of(-STRAINS),
+        test_of(force=1e-3 * whole),
+        test_of(specimen=replace(FLAT, modulus_GPa=200.0)),
+        test_of(force=whole[:100]),
+        test_of(force=whole[50:], times=[(50 + k) / FPS for k in range(90)]),
+        test_of(force=np.r_[whole, np.linspace(whole[-1], 2 * whole[-1], 50)]),
+        test_of(force=np.r_[np.zeros(3), whole]),
+        test_of(turned=0.3),
+        replace(test_of(), gauge={"start": (100.0, 20.0), "end": (160.0, 200.0)}),
+        test_of(nu=0.8),
+        test_of(reference_N=107.0),
+    )
+    texts = [one.text for test in tests for one in findings(test) if one.outcome == "doubt"]
+    assert len({text.split(":")[0] for text in texts}) >= len(tests)
+    assert [text for text in texts if not translator.knows(text)] == []
