@@ -24,7 +24,7 @@ from analysis.evaluate.gauges.extensometers import (
 from analysis.evaluate.gauges.gauge import Gauge, GaugeValue, Parameter
 from analysis.evaluate.gauges.geometry import inside_polygon
 from analysis.evaluate.gauges.kinds import GAUGE_KINDS, AreaGauge, CircleGauge, StripGauge, ZoiGauge
-from analysis.evaluate.gauges.readings import distance, facing
+from analysis.evaluate.gauges.readings import COME_APART, distance, facing
 from analysis.evaluate.lag import Track, find_lag
 from analysis.evaluate.programme import KINDS, Kind
 from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
@@ -33,6 +33,7 @@ from analysis.evaluate.tensile_figures import Span, StrainZero, TensileFigures, 
 
 __all__ = [
     "AT_LEAST",
+    "COME_APART",
     "CONFIDENCE",
     "GAUGE_KINDS",
     "KINDS",

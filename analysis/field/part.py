@@ -98,4 +98,4 @@ def part_of(field: StrainField, block: Block, grid: ZoiGrid | None = None) -> St
 
 
 _VALUES = {"parameters", "covariance", "covariance_reference", "residual", "blur"}
-_ARRAYS = (*_VALUES, "iterations", "gain")
+_ARRAYS = (*_VALUES, "iterations", "gain", "parts")

@@ -116,6 +116,8 @@ class StrainField:
     blur : (2, R, C) float32, px^2, optional
         Growth of the variance of the blur since the last reference, mean of x and y, negative where the picture
         is sharper; and its standard uncertainty.
+    parts : (R, C) uint8, optional
+        Where the field has come apart: numbers of its parts from 1, 0 of ZOIs in none; None: it has not.
     """
 
     grid: ZoiGrid
@@ -134,10 +136,11 @@ class StrainField:
     common: CommonError | None = None
     picture: PictureError | None = None
     blur: NDArray[np.float32] | None = None
+    parts: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
         for name in ("parameters", "covariance", "covariance_reference", "residual", "status",
-                     "iterations", "gain", "blur"):  # fmt: skip
+                     "iterations", "gain", "blur", "parts"):  # fmt: skip
             array = getattr(self, name)
             if array is not None:
                 array.flags.writeable = False
@@ -227,6 +230,13 @@ class StrainField:
     def n_valid(self) -> int:
         """Number of ZOIs with a valid value."""
         return int(np.count_nonzero(self.ok))
+
+    def n_parts(self, where: NDArray[np.bool_] | None = None) -> int:
+        """Parts that have come apart among the ZOIs ``where`` (R, C), by default all; 1 where none have."""
+        if self.parts is None:
+            return 1
+        parts = self.parts if where is None else self.parts[where]
+        return max(len(np.unique(parts[parts > 0])), 1)
 
     def value(self, name: str) -> Floats:
         """A value by its name (see ``VALUES``), (R, C); read-only where it is one of the parameters.

@@ -1,9 +1,13 @@
-"""Displacements at which a picture may look like itself: the side peaks of its autocorrelation, in tiles."""
+"""Displacements at which a picture may look like itself: the side peaks of its autocorrelation.
+
+Near ones are sought in tiles, so that a part that repeats is seen, farther ones by the whole region in the picture.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -13,6 +17,7 @@ from numpy.typing import NDArray
 from analysis.field import Roi
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 Image = NDArray[np.float32]
 
 TILE = 160
@@ -26,6 +31,69 @@ MAX_PEAKS = 4
 """The nearest ones of a tile; longer ones are sums of them."""
 NEAR = 0.6
 """Sides of a tile from its centre within which a ZOI may repeat with it."""
+FAR_PIXELS = 4_000_000
+"""Pixels from which on a picture is halved before farther displacements are sought."""
+SLOWEST_PX = 64.0
+"""Longest wave that counts there: light and background are slower."""
+FAR_PEAK = 0.25
+"""Least share of the region's own pattern that is there; print, paper and fractions of a pixel take some."""
+MIN_OVERLAP, MAX_FAR = 0.1, 6
+"""Share of the region that must lie in the picture there, and how many displacements are looked at."""
+TOO_MUCH = 2.2
+"""Share that is found only beside the opposite edge, where the picture is continued with itself; 2: on both sides."""
+SAME_PX = 3.0
+"""How far from a sum of known displacements another one is new."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Repetition:
+    """Where the ZOIs of a picture look like themselves.
+
+    Attributes
+    ----------
+    places : (K, 2) float64, px
+        Displacements (x, y), one of each pair of opposite ones.
+    has : (A, K) bool
+        Which of them each ZOI has.
+    """
+
+    places: Floats
+    has: Bools
+
+    @classmethod
+    def none(cls, zois: int) -> Repetition:
+        """Of a pattern that does not repeat."""
+        return cls(np.zeros((0, 2)), np.zeros((zois, 0), bool))
+
+    @property
+    def period(self) -> Floats:
+        """The smallest displacement of each ZOI, (A,), px; infinite: none."""
+        lengths = np.where(self.has, np.hypot(*self.places.T), np.inf)
+        return np.asarray(lengths.min(axis=1, initial=np.inf))
+
+    def off(self, away: Floats, which: NDArray[np.intp] | slice = slice(None)) -> Floats:
+        """How far ZOIs are from a place, in periods: at 0.5 the next place is as near.
+
+        Parameters
+        ----------
+        away : (B, 2), px
+            Their distance (x, y) from it.
+        which : optional
+            The B ZOIs; one that does not repeat counts as if it did so in every way.
+        """
+        has = self.has[which]
+        counted = has | ~has.any(axis=1, keepdims=True)
+        shares = abs(away @ self.places.T) / np.sum(self.places**2, axis=1)
+        return np.asarray(np.where(counted, shares, 0.0).max(axis=1, initial=0.0))
+
+    def nearest(self, away: Floats, which: NDArray[np.intp]) -> Floats:
+        """The shortest displacement (B, 2) at which ZOIs look the same as at ``away`` (B, 2), px."""
+        out, has = away.copy(), self.has[which]
+        for _ in range(2 * len(self.places)):
+            for place, here in zip(self.places, has.T, strict=True):
+                times = np.where(here, np.rint(out @ place / (place @ place)), 0.0)
+                out -= times[:, None] * place
+        return out
 
 
 def side_peaks(
@@ -38,6 +106,7 @@ def side_peaks(
     image : (H, W) float32, GL
         Without noise (``Pattern.level``).
     region : Roi
+        Its tiles are looked at, and where it looks like another part of the picture.
     x, y : (A,), px
 
     Yields
@@ -58,6 +127,58 @@ def side_peaks(
                 known = next((p for p in near if math.dist(p, peak) < 2), peak)
                 near[known] = near.get(known, False) | around
     yield from near.items()
+    seen = Repetition(np.array(list(near), float).reshape(-1, 2), np.ones((1, len(near)), bool))
+    for peak in _far_peaks(image, region, int(REACH * side)):
+        if np.hypot(*seen.nearest(np.array([peak], float), np.zeros(1, np.intp))[0]) > SAME_PX:
+            yield peak, np.ones(len(x), bool)
+            places = np.append(seen.places, [peak], axis=0)
+            seen = Repetition(places, np.ones((1, len(places)), bool))
+
+
+def _far_peaks(image: Image, region: Roi, reach: int) -> list[tuple[int, int]]:
+    """Displacements beyond ``reach`` px at which a region looks like the picture, the nearest first."""
+    from scipy.fft import irfft2, rfft2
+    from scipy.ndimage import maximum_filter
+
+    times = 1
+    while image.size > FAR_PIXELS * times**2:
+        times *= 2
+    height, width = (n // times for n in image.shape)
+    small = image[: height * times, : width * times].reshape(height, times, width, times).mean(axis=(1, 3))
+    small = _without_slow(small, SLOWEST_PX / times)
+    top, left = region.y // times, region.x // times
+    rows, columns = max(region.height // times, 1), max(region.width // times, 1)
+    part = np.zeros_like(small)
+    part[top : top + rows, left : left + columns] = small[top : top + rows, left : left + columns]
+    found = irfft2(rfft2(small) * np.conj(rfft2(part)), small.shape) / max(float(np.vdot(part, part)), 1e-12)
+    y, x = np.nonzero((found > FAR_PEAK * MIN_OVERLAP) & (found >= maximum_filter(found, 5, mode="wrap")))
+    scores: dict[tuple[int, int], float] = {}
+    for down in (y, y - height):
+        for across in (x, x - width):
+            shared = _shared(down, top, rows, height) * _shared(across, left, columns, width)
+            far = (np.maximum(abs(down), abs(across)) * times > reach) & (shared > MIN_OVERLAP)
+            share = found[y, x] / np.maximum(shared, MIN_OVERLAP)
+            for k in np.flatnonzero(far & (share > FAR_PEAK) & (share < TOO_MUCH)):
+                place = int(down[k]) * times, int(across[k]) * times
+                place = max(place, (-place[0], -place[1]))  # one of two opposite ones
+                scores[place[::-1]] = float(found[y[k], x[k]])
+    best = sorted(scores, key=lambda p: -scores[p])[:MAX_FAR]
+    return sorted(best, key=lambda p: math.hypot(*p))
+
+
+def _without_slow(image: Image, slowest: float) -> Image:
+    """A picture less all waves longer than ``slowest`` px."""
+    from scipy.fft import fftfreq, irfft2, rfft2, rfftfreq
+
+    height, width = image.shape
+    fast = np.hypot(fftfreq(height)[:, None], rfftfreq(width)[None]) * slowest > 1
+    return np.asarray(irfft2(rfft2(image) * fast, image.shape), np.float32)
+
+
+def _shared(moved: NDArray[np.intp], first: int, length: int, whole: int) -> Floats:
+    """Share of ``length`` px from ``first`` on that stays in ``whole`` px when it is ``moved``."""
+    ends = np.minimum(first + length + moved, whole) - np.maximum(first + moved, 0)
+    return np.asarray(np.maximum(ends, 0) / length)
 
 
 def _firsts(first: int, length: int, side: int) -> NDArray[np.intp]:

@@ -17,11 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.compiled.forked import FORK_GUARD
 from analysis.field import Motion, StrainField, ZoiGrid
+from analysis.follow.parts import coherent
 from analysis.follow.renewal import taken
 from analysis.kernel.images import Noise, as_image, as_model, as_recorded, clipped_pixels
 from analysis.kernel.lines import mend
 from analysis.kernel.reference import ReferencePicture
-from analysis.kernel.repeating import periods
+from analysis.kernel.repeating import repetition
 from analysis.kernel.result import PredictedMotion, field_of
 from analysis.kernel.retry import retry_lost
 from analysis.kernel.settings import Estimator, KernelSettings
@@ -82,7 +83,7 @@ class PhaseKernel:
         FORK_GUARD.check()
         image = as_image(reference, "the reference")
         made = ReferencePicture.first(image, grid, settings or KernelSettings(), noise, clipped, least_noise)
-        self.reference = replace(made, period=periods(made))
+        self.reference = replace(made, repetition=repetition(made))
         self._rooms = [room_for(image.shape)]
         check_machine(self.settings, grid.size)
 
@@ -189,13 +190,13 @@ class PhaseKernel:
                 solution = Solution(reference, image, model, reference.searched(image, room), room)
                 mend(solution)
                 retry_lost(solution, None, saturated)
-                return field_of(solution)
+                return coherent(field_of(solution))
             before, carried = self._before(start), self._carried_motion(start)
             predicted = before + carried.ahead
             solution = Solution(reference, image, model, reference.local(predicted), room)
             mend(solution)
             retry_lost(solution, reference.local(before), saturated)
-            return field_of(solution, PredictedMotion(predicted, carried))
+            return coherent(field_of(solution, PredictedMotion(predicted, carried)))
 
     @contextmanager
     def _room(self) -> Iterator[NDArray[np.float32]]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from analysis.field import Roi, Status, StrainField, ZoiGrid, profile
 from analysis.fit.kernel_args import StopArgs
 from analysis.follow.renewal import Placement, place
+from analysis.follow.repetition import Repetition
 from analysis.kernel.images import Noise, NoiseModel, as_model, check_fit, clipped_pixels, rounding_variance
 from analysis.kernel.prepared import PatternError, PreparedReference, prepare_reference
 from analysis.kernel.quadrature import Sensors, make_sensors
@@ -79,8 +80,8 @@ class ReferencePicture:
         ``white_noise.white_cubic``.
     cleaned : bool
         Whether it had wild pixels, which were replaced; later pictures are then cleaned, too.
-    period : (A,) float64, px
-        Smallest displacement at which a ZOI looks like itself (``repeating.periods``); infinite: none.
+    repetition : Repetition
+        Where the ZOIs look like themselves (``repeating.repetition``).
     kept : dict
         By ZOIs, spectra of what they recorded (``coloured``).
     made_later : dict
@@ -105,7 +106,7 @@ class ReferencePicture:
     rounding: float
     white: Floats
     cleaned: bool
-    period: Floats
+    repetition: Repetition
     kept: dict[bytes, NDArray[np.complex64]] = field(default_factory=dict, repr=False)
     made_later: dict[str, Floats] = field(default_factory=dict, repr=False)
 
@@ -152,7 +153,7 @@ class ReferencePicture:
         gone = placement.status != Status.OK
         prepared = replace(prepared, status=np.where(gone, placement.status, prepared.status))
         made = _laid_out(whole, self.grid, settings, model, prepared, cleaned is not None, placement)
-        return replace(made, period=self.period)
+        return replace(made, repetition=self.repetition)
 
     @property
     def response(self) -> Floats:
@@ -160,6 +161,11 @@ class ReferencePicture:
         if "response" not in self.made_later:
             self.made_later["response"] = responses(self.prepared, self.grid.size, self.settings.order)
         return self.made_later["response"]
+
+    @property
+    def period(self) -> Floats:
+        """The smallest displacement at which each ZOI looks like itself, (A,), px; infinite: none."""
+        return self.repetition.period
 
     @property
     def modes(self) -> int:
@@ -295,7 +301,7 @@ def _laid_out(
         rounding=rounding_variance(image),
         white=white_cubic(prepared, grid.size, settings.order, share_variance),
         cleaned=cleaned,
-        period=np.full(len(index), np.inf),
+        repetition=Repetition.none(len(index)),
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.compiled.forked import FORK_GUARD
-from analysis.field import Motion, Roi, ZoiGrid, profile
+from analysis.field import Motion, Roi, StrainField, ZoiGrid, profile
 from analysis.kernel.images import as_image
 from analysis.picture.splines import Box
 
@@ -25,7 +25,7 @@ log = logging.getLogger("analysis")
 
 COMPILE_SECONDS = 80
 """About how long one process takes for everything; for the announcement."""
-FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 57, 5, 7
+FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 64, 5, 7
 """That are compiled in all, more for each kind of pictures, and for the estimator by phases."""
 ITERATION, REST, PHASE, ALL = "iteration", "rest", "phase", "all"
 COMPILE_PARTS = (ITERATION, REST)
@@ -44,10 +44,11 @@ def not_compiled(kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) ->
 
 def _loops(phase: bool) -> list[Any]:
     from analysis.fit import assembly, iteration, pooling, sensitivity, sums, verdict
-    from analysis.follow import block_match, hill_climb, prediction
+    from analysis.follow import block_match, coherence, hill_climb, prediction
 
     loops = [
         sensitivity.prepare, iteration.track, block_match.match, hill_climb.climb, prediction.advance, verdict.judge,
+        coherence.stand_out, coherence.label,
         assembly.expect, assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.medians,
         assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
     ]  # fmt: skip
@@ -198,6 +199,7 @@ def _rest() -> None:
     from analysis.fit.kernel_args import OutArgs, PooledError, ReferenceArgs, VerdictArgs
     from analysis.fit.pooling import explained, medians
     from analysis.fit.verdict import judge
+    from analysis.follow.parts import coherent
     from analysis.follow.prediction import motion_after
     from analysis.kernel.reference import ReferencePicture
     from analysis.kernel.settings import KernelSettings
@@ -230,3 +232,4 @@ def _rest() -> None:
     scale(unit, np.ones(21, np.float32), single, single, unit, unit)
     index, values = np.empty(0, np.intp), np.empty((0, 6))
     motion_after(Motion.none(index, 6), values, values, none, 1.0)
+    coherent(StrainField.from_values(grid, {"u": np.where(grid.x > 50, 9.0, 0.0)}, 0.1))

@@ -52,6 +52,31 @@ class RepetitionGuard:
             self._text = ""
 
 
+class PartsGuard:
+    """Warns where the region has come apart, and says when it is whole again.
+
+    Parameters
+    ----------
+    on_event : callable taking an Event
+    """
+
+    def __init__(self, on_event: EventSink) -> None:
+        self._on_event, self._apart = on_event, False
+
+    def check(self, field: StrainField, step: TimeStep) -> None:
+        """Check one time step; one without a valid ZOI changes nothing."""
+        if not step.n_valid or bool(step.apart) == self._apart:
+            return
+        self._apart = bool(step.apart)
+        text = "the region is whole again"
+        if self._apart:
+            text = (
+                f"{step.apart}: it has no strain from here on; gauges within a part have, and the extension"
+            )
+        level: Level = "warning" if self._apart else "info"
+        self._on_event(Event(step.t, EventKind.MEASUREMENT, "region", text, level, {"parts": step.n_parts}))
+
+
 class StrainGuard:
     """Checks each field of small strains, and warns once where another measure is more exact.
 
@@ -288,6 +313,7 @@ def standard_guards(kernel: PhaseKernel, strain: Measure, on_event: EventSink) -
     """Those of every measurement, whatever is known of specimen and camera."""
     return [
         RepetitionGuard(kernel, on_event),
+        PartsGuard(on_event),
         StrainGuard(strain, on_event),
         PictureGuard(on_event),
         BlurGuard(on_event),

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 MAX_KEPT = 2000
 """Time steps that ``AxisFinder`` keeps, evenly thinned."""
 _GROWTH = 1.1  # of the time steps from one search for the axis to the next
-_COUNTS = ("n_valid", "n_zoi")
+_COUNTS = ("n_valid", "n_zoi", "n_parts")
 SHORT = (
     "sigma_exx", "sigma_eyy", "sigma_exy", "sigma_extension_x", "sigma_extension_y", "zoi_sigma", "u", "v", "noise_GL",
     "measure_s", "latency_s", "misfit", "blur", "sigma_blur", "sigma_lens_exx", "sigma_lens_eyy",

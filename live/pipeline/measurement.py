@@ -14,7 +14,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from acquire.frame import Burst
-from analysis.evaluate import AreaStrain, Gauge, GaugeValue, extension_of
+from analysis.evaluate import COME_APART, AreaStrain, Gauge, GaugeValue, extension_of
 from analysis.field import StrainField, area_share, mean_blur
 from analysis.optics import ApparentMotion, LensReading
 
@@ -70,6 +70,8 @@ class TimeStep:
         What of ``sigma_exx`` and ``sigma_eyy`` the uncertainty of a corrected lens makes; NaN without.
     area_share : float
         Of the region that its strains stand for, where a block of ZOIs was lost (``analysis.field.area_share``).
+    n_parts : int
+        Parts that the region has come apart into (``StrainField.parts``); beyond 1 its strains are NaN.
     """
 
     t: float
@@ -105,6 +107,12 @@ class TimeStep:
     sigma_lens_exx: float = math.nan
     sigma_lens_eyy: float = math.nan
     area_share: float = 1.0
+    n_parts: int = 1
+
+    @property
+    def apart(self) -> str:
+        """Why the region has no strain although its ZOIs have; "" where it has one."""
+        return COME_APART if self.n_parts > 1 else ""
 
     @property
     def least_share(self) -> float:
@@ -146,15 +154,19 @@ def extension_along(gauges: Container[str], axis: str) -> str:
 
 
 def region_strains(field: StrainField) -> dict[str, Any]:
-    """The strains of a ``TimeStep`` by their names; NaN where no ZOI has a value."""
-    area = AreaStrain.of(field)
-    names = ("exx", "eyy", "exy")
-    if area is None:
-        return dict.fromkeys((*names, *(f"sigma_{name}" for name in names)), math.nan)
-    uneven = area.unevenness()
-    found = {"uneven_exx": uneven.exx, "uneven_eyy": uneven.eyy, "misfit": uneven.misfit}
-    for name in names:
-        found |= {name: area.value(name), f"sigma_{name}": area.sigma(name)}
+    """The strains of a ``TimeStep`` by their names; NaN where no ZOI has a value, or the region has come apart.
+
+    The extension between strips stays: parts of a specimen have one, too.
+    """
+    area, names = AreaStrain.of(field), ("exx", "eyy", "exy")
+    found: dict[str, Any] = dict.fromkeys((*names, *(f"sigma_{name}" for name in names)), math.nan)
+    if area is not None:
+        uneven = area.unevenness()
+        found |= {"uneven_exx": uneven.exx, "uneven_eyy": uneven.eyy, "misfit": uneven.misfit}
+        for name in names:
+            found |= {name: area.value(name), f"sigma_{name}": area.sigma(name)}
+    if not field.n_valid:
+        return found
     for axis in AXES:
         extension = extension_of(field, axis)
         found |= {f"extension_{axis}": extension.value, f"sigma_extension_{axis}": extension.sigma}
@@ -182,6 +194,7 @@ def time_step_of(burst: Burst, field: StrainField, force: float, measure_s: floa
         blur=blur.px,
         sigma_blur=blur.sigma,
         area_share=area_share(field),
+        n_parts=field.n_parts(),
     )
 
 

@@ -85,6 +85,7 @@ def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     largest = strains[np.argmax(np.abs(strains))]
     part = share_text(last.least_share)
     means = f"exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
+    means = f"none, {last.apart}" if last.apart else means
     means = means if last.n_valid else f"no value, 0 of {last.n_zoi} ZOIs valid"
     lines = [
         *doubt_lines(test),

@@ -10,6 +10,7 @@ from analysis.field import area_share, in_blocks
 from analysis.follow.features import feature_motions, motion_at
 from analysis.follow.repetition import side_peaks
 from analysis.kernel import retry
+from live.pipeline.reference import repetition_text
 from tests.accuracy import finding
 from tests.accuracy.finding import NOISE_GL, PATTERNS, PERIOD, SHAPE, SPECKLE, Found
 from tests.accuracy.truth import affine, pixels
@@ -114,6 +115,48 @@ def test_side_peaks_are_those_of_the_lattice() -> None:
     found = dict(side_peaks(level, WHOLE, *places))
     assert set(found) == {(9, 0), (0, 9), (9, 9), (-9, 9)}
     assert all(near.all() for near in found.values())
+
+
+def tiled(side: int, u: float = 0.0, v: float = 0.0, across: bool = True) -> np.ndarray:
+    """One piece of ``side`` px again and again along y, and ``across`` along x too, moved by (u, v) without an edge."""
+    shape = side, side if across else 900
+    fy, fx = np.fft.fftfreq(shape[0])[:, None], np.fft.rfftfreq(shape[1])[None]
+    blurred = np.exp(-2 * (np.pi * 2.5) ** 2 * (fy**2 + fx**2) - 2j * np.pi * (fx * u + fy * v))
+    piece = np.fft.irfft2(np.fft.rfft2(np.random.default_rng(side).normal(0, 1, shape)) * blurred, shape)
+    rows, columns = (-(-whole // part) for whole, part in zip(SHAPE, shape, strict=True))
+    level = 0.5 + 0.18 * np.tile(piece / piece.std(), (rows, columns))[: SHAPE[0], : SHAPE[1]]
+    return finding.picture(level, int(side + 10 * u))
+
+
+@pytest.mark.parametrize("side", [20, 37, 65, 130, 200, 260])
+@pytest.mark.parametrize(("motion", "in_periods"), [
+    ((0.3, 0.2), False), ((2.1, -1.4), False), ((0.3, -0.47), True), ((0.45, 0.45), True),
+])  # fmt: skip
+def test_a_printed_tile_has_moved_to_the_nearest_place(
+    side: int, motion: tuple[float, float], in_periods: bool
+) -> None:
+    u, v = (m * (side if in_periods else 1) for m in motion)
+    zois = finding.grid(32, 32)
+    kernel = PhaseKernel(tiled(side), zois, noise=NOISE_GL)
+    assert np.nanmedian(kernel.period) == pytest.approx(side, abs=0.05)
+    field = kernel.measure(tiled(side, u, v), noise=NOISE_GL)
+    here = finding.centres(zois)
+    found = finding.compared(field, (here[0] + u, here[1] + v), (u + 0 * here[0], v + 0 * here[0]))
+    assert found.wrong == 0 and found.right >= 0.95
+
+
+def test_a_pattern_that_repeats_one_way_alone_may_move_the_other_way() -> None:
+    kernel = PhaseKernel(tiled(130, across=False), finding.grid(32, 32), noise=NOISE_GL)
+    field = kernel.measure(tiled(130, 90.0, 50.0, across=False), noise=NOISE_GL)
+    assert field.ok.mean() > 0.5
+    assert np.nanmax(np.hypot(field.u - 90, field.v - 50)) < 0.2
+
+
+def test_half_a_period_of_a_tile_is_ambiguous_and_what_it_may_move_by_is_said() -> None:
+    kernel = PhaseKernel(tiled(130), finding.grid(32, 32), noise=NOISE_GL)
+    field = kernel.measure(tiled(130, 65.0), noise=NOISE_GL)
+    assert not field.ok.any() and (field.status == Status.AMBIGUOUS).mean() > 0.5
+    assert "repeats every 130.0 px" in repetition_text(kernel.period)
 
 
 # -- what is missing -----------------------------------------------------------------------------------------------

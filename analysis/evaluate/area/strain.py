@@ -47,10 +47,13 @@ class AreaStrain:
 
     @classmethod
     def of(cls, field: StrainField, where: ArrayLike | None = None) -> AreaStrain | None:
-        """Of the active ZOIs of ``field``, or of those in ``where`` (R, C); None where none has a value."""
+        """Of the active ZOIs of ``field``, or of those in ``where`` (R, C).
+
+        None where none has a value, or where they have come apart (``StrainField.parts``).
+        """
         area = field.grid.active if where is None else field.grid.active & np.asarray(where, bool)
         valid = area & field.ok
-        if not valid.any():
+        if not valid.any() or field.n_parts(valid) > 1:
             return None
         fit = affine_fit(field, area, valid)
         fitted = fit.fitted(_affine(field)[:, fit.at], valid.ravel()[fit.at])

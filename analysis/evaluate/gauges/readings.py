@@ -18,6 +18,8 @@ from analysis.field import PAIR_INDEX, VALUES, Status, StrainField, ZoiGrid, var
 
 Statistic = Literal["affine", "mean", "largest", "smallest"]
 
+COME_APART = "the region has come apart"
+"""Why an area has no strain."""
 MIN_SHARE = 0.5
 """A gauge has a value as long as this share of the ZOIs of an area, or of each of its ends, has one."""
 _U, _V = 0, 3  # among the affine parameters
@@ -27,7 +29,10 @@ def read_area(chosen: Mask, field: StrainField, value: str, statistic: Statistic
     """A value of the affine field of some ZOIs, or their mean, largest or smallest value; of u and v the mean."""
     if missing := _missing(chosen, field):
         return GaugeValue(math.nan, math.nan, missing)
-    found = AreaStrain.of(field, chosen) if statistic == "affine" and value in GRADIENTS else None
+    affine = statistic == "affine" and value in GRADIENTS
+    if affine and field.n_parts(chosen) > 1:
+        return GaugeValue(math.nan, math.nan, COME_APART)
+    found = AreaStrain.of(field, chosen) if affine else None
     if found is not None:
         return GaugeValue(found.value(value), found.sigma(value))
     if statistic in ("affine", "mean"):

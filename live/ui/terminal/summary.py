@@ -77,7 +77,8 @@ def _at_end(history: History, axis: str) -> list[str]:
     if n - 1 in known[-1:]:
         return [f"strain along {axis} at the end: {texts[0]}"]
     last = history.time_steps[-1]
-    none = f"strain along {axis} at the end: no value, {last.n_valid} of {last.n_zoi} valid"
+    why = last.apart or f"{last.n_valid} of {last.n_zoi} valid"
+    none = f"strain along {axis} at the end: no value, {why}"
     return [none, *(f"the last burst with a value is {known[-1] + 1} of {n}: {text}" for text in texts)]
 
 

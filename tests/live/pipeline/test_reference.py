@@ -27,7 +27,7 @@ def period(*repeating: float, able: int = 100) -> np.ndarray:
 def test_a_pattern_repeats_from_a_fiftieth_of_the_zois_on() -> None:
     assert repetition_text(period(8.0, 8.0)) == ""
     assert repetition_text(period(8.0, 9.0, 10.0)) == (
-        "the pattern repeats every 9.0 px in 3 of 100 ZOIs; it may move by 3.2 px between two pictures, and to the"
+        "the pattern repeats every 9.0 px in 3 of 100 ZOIs; it may move by 3.8 px between two pictures, and to the"
         " first one"
     )
 

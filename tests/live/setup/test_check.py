@@ -383,7 +383,7 @@ def test_a_pattern_that_repeats_is_named_with_its_period() -> None:
     grid = 120 + 40 * (np.sin(k * x) + np.sin(k * y))
     frames = np.rint(grid + rng.normal(0, 1, (16, *grid.shape))).astype(np.uint8)
     text = line_text(shots_of(frames, 8), "repetition")
-    assert text.startswith("LOOK") and "repeats every 9.0 px" in text and "move by 3.6 px" in text
+    assert text.startswith("LOOK") and "repeats every 9.0 px" in text and "move by 4.3 px" in text
 
 
 @pytest.mark.slow
