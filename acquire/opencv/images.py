@@ -9,7 +9,6 @@ the bits.
 
 from __future__ import annotations
 
-import glob
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -22,14 +21,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import Address, Options, expanded
+from acquire.addresses import Address, Options
 from acquire.camera import CameraBase
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import EventSink, device_event, ignore_event
+from acquire.files.folder import listed
 from acquire.files.jpeg import quantisation
 from acquire.files.order import AUTO, BY, in_order, masks
 from acquire.files.picture import (
-    FOREIGN,
     LOSSY,
     Source,
     check_regular,
@@ -42,9 +41,7 @@ from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, to_gray
 from acquire.opencv.image_metadata import read_stamps, taken_times
 
-SUFFIXES = (".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm")
 MAX_REPORTED = 20  # pictures that are left out, one by one
-_SYSTEM = ("thumbs.db", "ehthumbs.db", "desktop.ini")
 _SAMPLE = 3  # pictures whose format is compared
 
 
@@ -74,34 +71,6 @@ def find_images(target: str, by: str = AUTO, first: str | None = None) -> list[P
     chosen = next((name for name, path in zip(names, used, strict=True) if first in (name, path.name)), None)
     order = in_order(names, lambda: taken_times(used), by, chosen if first else None)
     return [used[k] for k in order] + sorted(last)
-
-
-def listed(target: str) -> list[Path]:
-    """The images of ``find_images`` in no order; raises DataError where there is none."""
-    path = expanded(target)
-    if path.is_dir():
-        there = [item for item in path.iterdir() if _is_seen(item)]
-        found = [item for item in there if item.suffix.lower() in SUFFIXES]
-    elif path.exists():
-        there = found = [path]
-    else:
-        names = glob.glob(str(path), recursive=True)  # noqa: PTH207 (absolute patterns too)
-        there = found = [item for item in map(Path, names) if not item.is_dir() and _is_seen(item)]
-    for item in found or there:
-        if what := FOREIGN.get(item.suffix.lower()):
-            raise DataError(f"{item}: {what}")
-    if found:
-        return found
-    if not path.is_dir():
-        raise DataError(f"files:{target}: no image there; looked in {path.parent.absolute()}")
-    others = ", ".join(sorted(item.name for item in there)[:3])
-    only = f"only {others}{' ...' * (len(there) > 3)}" if there else "it is empty"
-    raise DataError(f"{path}: no picture in this folder ({only}); wanted: {', '.join(SUFFIXES)}")
-
-
-def _is_seen(path: Path) -> bool:
-    """Whether it is no file of a file manager or hidden."""
-    return not path.name.startswith(".") and path.name.lower() not in _SYSTEM
 
 
 def read_image(path: str | Path, gray: str | None = None, page: int = 0) -> NDArray[Any]:
