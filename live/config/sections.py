@@ -13,6 +13,7 @@ from live.config.values import (
     FLAG,
     GIVEN,
     LISTEN_ADDRESS,
+    LOAD_ADDRESS,
     NAMES,
     POINT,
     RECORD_MODE,
@@ -67,7 +68,7 @@ class CameraConfig:
 class LoadConfig:
     """[load]"""
 
-    address: str = key(TEXT, "none:", "address of the load cell: /dev/ttyUSB0?protocol=ascii, sim:, none:",
+    address: str = key(LOAD_ADDRESS, "none:", "address of the load cell: /dev/ttyUSB0?protocol=ascii, sim:, none:",
         Option("load", "ADDRESS"))
     max_gap_s: float = key(number(0.001, 3600), 0.5, "longest time between samples that is no gap, s")
     lag_s: float = key(number(-10, 10), 0.0,

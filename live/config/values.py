@@ -129,6 +129,10 @@ def _text(value: Any) -> str:
     return value
 
 
+def _load_address(value: Any) -> str:
+    return "none:" if _text(value).strip().lower() == "none" else _text(value)
+
+
 def _listen_address(value: Any) -> str:
     try:
         ListenAddress.parse(_text(value))
@@ -263,6 +267,8 @@ SIZE = Check(_size)
 TEXT = Check(_text)
 NAMES = Check(_names, lambda word: word.split(","))
 """Names; on the command line separated by commas."""
+LOAD_ADDRESS = Check(_load_address)
+"""Of a load cell: none is none: too."""
 LISTEN_ADDRESS = Check(_listen_address)
 """PORT or HOST:PORT of a server."""
 FLAG = Check(_flag)

@@ -318,3 +318,11 @@ def test_an_alarm_has_one_limit(tmp_path: Path) -> None:
         else:
             with pytest.raises(ConfigError, match="give one of above and below"):
                 load_config(path, {})
+
+
+@pytest.mark.parametrize(
+    ("given_as", "address"), [("none", "none:"), ("None", "none:"), ("none:", "none:"), ("sim:", "sim:")]
+)
+def test_no_load_cell_is_said_with_and_without_a_colon(tmp_path: Path, given_as: str, address: str) -> None:
+    assert load_config(None, {"load.address": given_as}).load.address == address
+    assert load_config(written(tmp_path, f'[load]\naddress = "{given_as}"'), {}).load.address == address
