@@ -198,7 +198,8 @@ class Supervisor:
         """Draw all and close the file within ``seconds``; else kill the process and warn."""
         self._close_s = seconds
         self._closing.set()
-        self._thread.join(seconds + STUCK_S)
+        if self._thread.ident is not None:
+            self._thread.join(seconds + STUCK_S)
 
     def _run(self) -> None:
         lower_priority(OUTPUT)

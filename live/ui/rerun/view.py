@@ -82,11 +82,12 @@ class View:
         self._setup, self._pending = setup, Pending()
         self._outbox = Outbox(setup, self._pending, playback)
         target = ViewTarget(port, None if rrd is None else str(rrd.absolute()), str(uuid.uuid4()))
-        if os.environ.get("RERUN", "").lower() in _OFF:
-            notify("RERUN=off is set: the view stays empty, and view.rrd too; unset the variable", "warning")
         self._supervisor = Supervisor(self._outbox, target, notify, lambda: on_serving(self))
         self._picture_t = self._load_t = -math.inf
-        self._supervisor.start()
+        if os.environ.get("RERUN", "").lower() in _OFF:
+            notify("RERUN=off is set: the view stays empty, and view.rrd too; unset the variable", "warning")
+        else:
+            self._supervisor.start()
 
     # -- what is shown ------------------------------------------------------------------------
 

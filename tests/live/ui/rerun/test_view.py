@@ -240,6 +240,19 @@ def test_one_that_cannot_start_is_given_up(
     assert len(watched.messages) == 1
 
 
+@pytest.mark.parametrize("word", ["off", "OFF", "0", "no"])
+def test_with_rerun_off_one_sentence_says_so_and_nothing_is_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, word: str
+) -> None:
+    monkeypatch.setenv("RERUN", word)
+    said: list[str] = []
+    off = View(make_setup(), port=0, rrd=tmp_path / "view.rrd", notify=lambda text, level: said.append(text))
+    show(off)
+    off.close(1.0)
+    assert said == ["RERUN=off is set: the view stays empty, and view.rrd too; unset the variable"]
+    assert off.pid is None and off.port is None and not off.failed and not list(tmp_path.iterdir())
+
+
 def test_what_waits_is_bounded_and_counted() -> None:
     pending = Pending()
     for k in range(MAX_ROWS + 100):
