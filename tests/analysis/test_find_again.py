@@ -159,13 +159,6 @@ def test_half_a_period_of_a_tile_is_ambiguous_and_what_it_may_move_by_is_said() 
     assert "repeats every 130.0 px" in repetition_text(kernel.period)
 
 
-def test_a_place_that_only_seems_to_be_one_hides_no_other() -> None:
-    """In 2.5 tiles the fifth half meets the first where the picture is continued with itself."""
-    side, level = 192, np.tile(SPECKLE.at(*pixels((400, 192))), (1, 3))[:, :480].astype(np.float32)
-    found = dict(side_peaks(level, WHOLE, np.array([40.0]), np.array([40.0])))
-    assert (side, 0) in found
-
-
 # -- what is missing -----------------------------------------------------------------------------------------------
 
 GRID = ZoiGrid.cover(Roi(0, 0, 160, 160), size=16, step=16)
