@@ -30,7 +30,7 @@ _FEWEST = 8  # points that a course is judged by
 _SURE = 6.0  # standard deviations of the noise
 _REVERSAL = 0.2  # of the range of the stress: a smaller fall and rise is none
 _PRESSED = 0.2  # of the highest stress: compression that is no part of a tensile test
-_TENSION = 0.05  # of the largest compression: less tension is none
+_TENSION = 0.2  # of the largest compression: less tension is a zero of the force that is off
 _GROWTH = 0.1  # of the depths of all unloadings: the strain of a cyclic test grows by less
 _LOADED = 0.05  # of the highest stress: the loading has begun
 _HELD_TIME, _HELD = (
@@ -87,7 +87,7 @@ class KindOfTest:
 def _found(curve: Curve) -> tuple[Kind, str, int | None]:
     """The kind, how it is seen, and the row at which the first rise ends."""
     force = curve.stress[np.isfinite(curve.stress)]
-    sigma = noise(force)
+    sigma = _noise(curve)
     if len(force) < _FEWEST or np.ptp(force) <= _SURE * 2 * sigma:
         return "tensile", "", None
     if force.max() <= max(_SURE * sigma, -_TENSION * force.min()):
@@ -107,6 +107,17 @@ def _found(curve: Curve) -> tuple[Kind, str, int | None]:
         return "tensile", "", None
     kind, since = held
     return kind, f" from {t[since]:.4g} s on", int(known[since])
+
+
+def _noise(curve: Curve) -> float:
+    """Of the stress, Pa: what follows the strain is none, of a few samples a cycle either."""
+    both = np.isfinite(curve.strain) & np.isfinite(curve.stress)
+    strain, stress = curve.strain[both], curve.stress[both]
+    sigma = noise(curve.stress)
+    if len(stress) < _FEWEST or not (np.ptp(strain) > 0 and np.ptp(stress) > 0):
+        return sigma
+    alone = math.sqrt(max(1 - float(np.corrcoef(strain, stress)[0, 1]) ** 2, 0.0))
+    return min(sigma, alone * float(stress.std()))
 
 
 def reversals(values: Floats, least: float) -> list[int]:
@@ -139,15 +150,17 @@ def _is_cyclic(strain: Floats, stress: Floats, turns: list[int], first: int) -> 
 
 
 def _hold(t: Floats, strain: Floats, stress: Floats) -> tuple[Kind, int] | None:
-    """What is held to the end and since when; None where the end is no hold, or a short one."""
+    """What is held until the unloading or the end, and since when; None where it is no hold, or a short one."""
     top = float(stress.max())
     start = int(np.argmax(stress >= _LOADED * top))
-    for kind, values, other in (("relaxation", strain, stress), ("creep", stress, strain)):
-        last = float(np.median(values[-5:]))
-        tolerance = max(_HELD * float(np.ptp(values)), _SURE * noise(values))
-        off = np.flatnonzero(np.abs(values - last) > tolerance)
-        since = min(int(off[-1]) + 1, len(t) - 1) if len(off) else start
-        if t[-1] - t[since] < _HELD_TIME * (t[-1] - t[start]) or stress[-1] < _STILL_LOADED * top:
+    for kind, whole, others in (("relaxation", strain, stress), ("creep", stress, strain)):
+        tolerance = max(_HELD * float(np.ptp(whole)), _SURE * noise(whole))
+        end = _until(strain, stress, whole, tolerance, start)
+        values, other = whole[:end], others[:end]
+        off = np.flatnonzero(np.abs(values - float(np.median(values[-5:]))) > tolerance)
+        since = min(int(off[-1]) + 1, end - 1) if len(off) else start
+        held = float(t[end - 1] - t[since])
+        if held < _HELD_TIME * (t[end - 1] - t[start]) or stress[end - 1] < _STILL_LOADED * top:
             continue
         level = smoothed(other, 2)
         gone, before = float(level[-1] - level[since]), float(level[since] - level[start])
@@ -155,7 +168,17 @@ def _hold(t: Floats, strain: Floats, stress: Floats) -> tuple[Kind, int] | None:
             _RELAXED * top, _SURE * noise(stress)
         ):
             return "relaxation", since
-        slow = gone * (t[since] - t[start]) < _SLOW * before * (t[-1] - t[since])
+        slow = gone * (t[since] - t[start]) < _SLOW * before * held
         if kind == "creep" and slow:
             return "creep", since
     return None
+
+
+def _until(strain: Floats, stress: Floats, held: Floats, tolerance: float, start: int) -> int:
+    """The number of samples without an unloading that follows a hold: what was ``held`` most of the time is left."""
+    loaded = np.flatnonzero(stress >= _STILL_LOADED * stress.max())
+    usual = float(np.median(held[start : loaded[-1] + 1]))
+    near = np.flatnonzero(np.abs(held - usual) <= tolerance)
+    end = int(near[-1]) + 1 if len(near) else len(held)
+    lower = all(values[end:].max(initial=-math.inf) < values[:end].max() for values in (strain, stress))
+    return end if lower and end > start + 5 else len(held)

@@ -94,6 +94,8 @@ def tensile_strength(curve: Curve) -> Figure:
     if loading.stress[loading.top] <= 0:
         return Figure.none("no tensile stress is known")
     found = highest_stress(loading, loading.top)
+    if found.low <= 0:
+        return Figure.none("no tensile stress beyond its noise is known")
     rises = not loading.broke and loading.level[-1] >= loading.level.max() - 3 * loading.noise_stress
     return replace(found, why="so far: the test ended while the stress still rose") if rises else found
 

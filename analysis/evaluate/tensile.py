@@ -117,6 +117,8 @@ def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:
             f"strain and a tensile stress are known together at {loading.n} points, {MIN_POINTS} are needed"
         )
         return replace(_nothing(words, options), Rm=strength)
+    if not strength.known:
+        return _nothing(strength.why, options)
     elastic = _elastic(loading, options)
     if isinstance(elastic, str):
         return replace(_without_line(loading, options, elastic), Rm=strength)

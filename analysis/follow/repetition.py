@@ -159,7 +159,8 @@ def _far_peaks(image: Image, region: Roi, reach: int) -> list[tuple[int, int]]:
             for k in np.flatnonzero(far & (share > FAR_PEAK) & (share < TOO_MUCH)):
                 place = int(down[k]) * times, int(across[k]) * times
                 place = max(place, (-place[0], -place[1]))  # one of two opposite ones
-                scores[place[::-1]] = float(found[y[k], x[k]])
+                # A picture of whole periods is like itself everywhere where it is continued with itself.
+                scores[place[::-1]] = float(found[y[k], x[k]] * shared[k])
     best = sorted(scores, key=lambda p: -scores[p])[:MAX_FAR]
     return sorted(best, key=lambda p: math.hypot(*p))
 

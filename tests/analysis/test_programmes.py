@@ -215,3 +215,20 @@ def test_neither_a_bent_curve_nor_a_loop_is_a_lag() -> None:
             assert not found.known or abs(found.value) < 2 * (found.high - found.value) < 0.1
         damped = Track(t, 1e-3 * np.sin(2 * np.pi * t - 0.05) + rng.normal(0, 1e-6, len(t)))
         assert "in a cyclic test" in find_lag(damped, Track(t, 1000 * cycle)).why
+
+
+def test_a_hold_is_one_when_it_is_unloaded_and_cycles_when_they_are_fast() -> None:
+    strain, stress = relaxed(0.001, 0.05, 400)
+    down = np.linspace(1, 0, 40)
+    released = np.concatenate([strain, strain[-1] * down]), np.concatenate([stress, stress[-1] * down])
+    cycle = 0.001 * np.sin(2 * np.pi * np.arange(400) / 5)
+    pressed = -pulled(0.03, 150), -stress_of(pulled(0.03, 150), hardens) + 20e6
+    for course, kind in (
+        (released, "relaxation"),
+        ((cycle, E_PA * cycle), "cyclic"),
+        (pressed, "compression"),
+    ):
+        found = evaluate_test(measured(*course, 1))
+        assert found.kind == kind and not found.Rm.known and not found.At.known
+    nothing = evaluate_test(measured(np.zeros(300), np.zeros(300), 1))
+    assert "beyond its noise" in nothing.Rm.why and not nothing.At.known and not nothing.Agt.known
