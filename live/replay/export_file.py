@@ -270,7 +270,8 @@ class _Reader:
                 nights[k] = False
         days = np.cumsum(nights) + self._days
         self._last_clock, self._days = float(times[-1]), int(days[-1])
-        return times + _DAY_S * days
+        times += _DAY_S * days
+        return times
 
     def _to_dates(self, times: Array) -> Array:
         """The same times, with the days that the dates are apart."""
