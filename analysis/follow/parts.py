@@ -24,6 +24,8 @@ MANY, CERTAIN, REACHES = 0.02, 1.5, (1, 2, 4)
 """Share of ZOIs that stand out from which on what is left is looked at, and widens the uncertainties above so much."""
 ROUNDS = 4
 """What is wrong hides others from its neighbours until it is left out."""
+OPENED = 0.25
+"""Of the side of a ZOI: a jump of less is a crack, which is part of the extension of its region, and uneven strain."""
 MIN_PAIRS = 3
 """ZOIs that face each other across a gap from which on a jump is one."""
 _VARIANCES = [PAIR_INDEX[i, i] for i in range(6)]
@@ -118,7 +120,7 @@ def _parts(field: StrainField, labels: NDArray[np.int32]) -> NDArray[np.uint8] |
 
 def _jumps(field: StrainField, parts: NDArray[np.uint8], two: tuple[int, int], way: int) -> bool:
     """Whether two parts move against each other by more than strain may make, along x (``way`` 1) or y (2)."""
-    from analysis.follow.coherence import ALLOWED_PX, ALLOWED_SIGMAS
+    from analysis.follow.coherence import ALLOWED_SIGMAS
 
     across, p = np.moveaxis(parts, -way, -1), np.moveaxis(_affine(field), -way, -1)
     sigma = np.moveaxis(np.sqrt(field.covariance[_VARIANCES]), -way, -1)
@@ -132,7 +134,11 @@ def _jumps(field: StrainField, parts: NDArray[np.uint8], two: tuple[int, int], w
     strained = length * (abs(p[near]) + abs(p[far]))
     doubt = ALLOWED_SIGMAS * np.hypot(sigma[near], sigma[far])
     beyond = [
-        abs(moved[u] - length * mean[k]) - strained[k] - doubt[u] - length / 2 * doubt[k] - ALLOWED_PX
+        abs(moved[u] - length * mean[k])
+        - strained[k]
+        - doubt[u]
+        - length / 2 * doubt[k]
+        - OPENED * field.grid.size
         for u, k in ((0, way), (3, 3 + way))
     ]
     return bool(np.median(beyond, axis=1).max() > 0)

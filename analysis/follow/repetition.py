@@ -131,8 +131,6 @@ def side_peaks(
     for peak in _far_peaks(image, region, int(REACH * side)):
         if np.hypot(*seen.nearest(np.array([peak], float), np.zeros(1, np.intp))[0]) > SAME_PX:
             yield peak, np.ones(len(x), bool)
-            places = np.append(seen.places, [peak], axis=0)
-            seen = Repetition(places, np.ones((1, len(places)), bool))
 
 
 def _far_peaks(image: Image, region: Roi, reach: int) -> list[tuple[int, int]]:

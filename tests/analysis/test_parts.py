@@ -102,9 +102,11 @@ def test_halves_that_jump_have_come_apart_and_have_no_common_strain() -> None:
     assert half is not None and abs(half.value("eyy")) < 5 * half.sigma("eyy")
 
 
-@pytest.mark.parametrize("jump", [0.3, 1.0, -2.0])
-def test_a_jump_is_measured_against_its_noise(jump: float) -> None:
-    assert coherent(broken(jump)).n_parts() == 2
+@pytest.mark.parametrize(
+    ("share", "parts"), [(0.26, 2), (-0.3, 2), (2.0, 2), (0.24, 1), (-0.2, 1), (0.01, 1)]
+)
+def test_a_jump_of_a_quarter_of_a_zoi_parts_and_a_crack_does_not(share: float, parts: int) -> None:
+    assert coherent(broken(share * GRID.size)).n_parts() == parts
 
 
 @pytest.mark.parametrize("field", [

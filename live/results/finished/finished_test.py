@@ -134,7 +134,7 @@ def strains_at_end(last: TimeStep) -> dict[str, GaugeValue]:
     found = {}
     for name in REGION:
         value, sigma = getattr(last, name), getattr(last, f"sigma_{name}")
-        found[name] = GaugeValue(value, sigma, "" if math.isfinite(value) else NO_VALUE)
+        found[name] = GaugeValue(value, sigma, "" if math.isfinite(value) else last.apart or NO_VALUE)
     return found | {f"gauge {name}": value for name, value in last.gauges.items()}
 
 
