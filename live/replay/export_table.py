@@ -271,6 +271,7 @@ class _Search:
             f"line {t.first + 1}: another table ({', '.join(t.heads)[:60]!r}): its"
             f" {counted(self.length(t), 'row')} are not read"
             for t in found[:begin]
+            if t.first < table.first  # not the same rows under a line above their heading
         )
         return replace(table, remarks=tuple(left))
 
