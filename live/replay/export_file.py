@@ -156,7 +156,9 @@ class _Reader:
             found = [(n, *pair) for n, row in zip(lines, rows, strict=True) if (pair := self._values(n, row))]
             lines, keys, forces = zip(*found, strict=True) if found else ((), (), ())
         for column, kinds in self._kinds.items():
-            self._note_kinds(kinds, {cell_of(row, column) for row in rows} if "clear" not in kinds else set())
+            self._note_kinds(
+                kinds, {cell_of(row, column) for row in rows} if self._mark not in kinds else set()
+            )
         if self._table.by_name:
             self._names += map(str, keys)
         elif self._table.key is not None and len(keys):
@@ -303,13 +305,11 @@ class _Reader:
     def _note_kinds(self, kinds: dict[str, str], cells: set[str]) -> None:
         """Note whether the cells of a column prove their decimal mark, or could have groups of thousands."""
         for cell in cells:
-            if self._mark not in cell:
-                if "plain" not in kinds and "." not in cell and "," not in cell and self._number(cell):
-                    kinds["plain"] = cell
-            elif NUMBERISH.fullmatch(cell) and (proven := vote(cell)) in ("?", self._mark):
-                kinds["three" if proven == "?" else "clear"] = cell
-                if proven != "?":
-                    return
+            if self._mark in cell:
+                if NUMBERISH.fullmatch(cell):
+                    kinds[vote(cell)] = cell
+            elif "plain" not in kinds and not {".", ","} & {*cell} and self._number(cell):
+                kinds["plain"] = cell
 
     # -- the whole ------------------------------------------------------------------------------
 
@@ -319,8 +319,8 @@ class _Reader:
         if not np.isfinite(forces).any():
             raise DataError(f"{self._where}: holds no forces")
         for kinds in self._kinds.values():
-            if self._given.decimal is None and kinds.keys() >= {"three", "plain"} and "clear" not in kinds:
-                raise two_readings(self._where, kinds["three"])
+            if self._given.decimal is None and kinds.keys() >= {"?", "plain"} and self._mark not in kinds:
+                raise two_readings(self._where, kinds["?"])
         times = np.array(self._times) if self._times else None
         times = times if times is None else self._to_dates(times)
         clock = self._zero(times)
@@ -348,14 +348,12 @@ class _Reader:
     def _taken(self, forces: Array, clock: str) -> str:
         t = self._table
         low, high = _shown(np.nanmin(forces)), _shown(np.nanmax(forces))
+        plain = "h:min:s" if self._is_clock else self._time_unit or "s"
         kind = (
-            "times of the day"
-            if clock == "clock"
-            else "h:min:s"
-            if self._is_clock
-            else self._time_unit or "s"
+            ""
+            if t.by_name
+            else f" ({ {'clock': 'times of the day', 'unix': 'Unix times'}.get(clock, plain) })"
         )
-        kind = f" ({'Unix times' if clock == 'unix' else kind})" if not t.by_name else ""
         against = f" against {t.name(t.key)}{kind}" if t.key is not None else ""
         return (
             f"column {t.name(t.force)}, {self._unit}, {len(forces):,} rows, {low} to {high} N{against}; {t.form},"
