@@ -10,7 +10,7 @@ import math
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import BinaryIO, Literal
+from typing import Any, BinaryIO, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +21,10 @@ from live.config.sections import LoadConfig
 from live.replay.export_headings import name_and_unit, newtons_of, seconds_per
 from live.replay.export_numbers import (
     CLOCK,
+    DATE,
     EMPTY,
     NUMBERISH,
+    days_of,
     decimal_mark,
     is_value,
     numbers_in,
@@ -111,8 +113,9 @@ class _Reader:
         self._names: list[str] = []
         self._times, self._forces = array("d"), array("d")
         self._kinds: dict[int | None, dict[str, str]] = {table.force: {}, table.key: {}}
-        self._remarks: list[str] = []
-        self._is_clock, self._dates, self._last_clock, self._days = False, set[str](), 0.0, 0
+        self._remarks = list(table.remarks)
+        self._is_clock, self._last_clock, self._days = False, 0.0, 0
+        self._dates: list[tuple[int, str]] = []  # rows from which a date holds
         self._n_texts, self._n_unread, self._other = 0, 0, ""
         force, _, time = (part.strip() for part in (given.unit or "").partition(","))
         self._unit = force or name_and_unit(table.heads[table.force])[1]
@@ -153,11 +156,15 @@ class _Reader:
             found = [(n, *pair) for n, row in zip(lines, rows, strict=True) if (pair := self._values(n, row))]
             lines, keys, forces = zip(*found, strict=True) if found else ((), (), ())
         for column, kinds in self._kinds.items():
-            self._note_kinds(kinds, {cell_of(row, column) for row in rows} if "clear" not in kinds else set())
+            self._note_kinds(
+                kinds, {cell_of(row, column) for row in rows} if self._mark not in kinds else set()
+            )
         if self._table.by_name:
             self._names += map(str, keys)
         elif self._table.key is not None and len(keys):
-            self._add_times(lines, np.array(keys, np.float64))
+            self._add_times(
+                lines, self._since_midnight(keys) if self._is_clock else np.array(keys, np.float64)
+            )
         self._forces.extend(forces)
         if len(self._forces) > MAX_ROWS or len(self._names) > MAX_NAMES:
             raise DataError(
@@ -182,7 +189,7 @@ class _Reader:
                 raise DataError(f"{self._where}: {words}; {why} export it with other separators")
         return rows
 
-    def _all_plain(self, rows: Rows) -> tuple[Sequence[float], Sequence[float]] | None:
+    def _all_plain(self, rows: Rows) -> tuple[Sequence[Any], Sequence[float]] | None:
         """Times and forces where every row has both; None otherwise, for ``_values`` to tell row by row."""
         key, force = self._table.key, self._table.force
         if self._table.by_name or self._other or not self._forces:
@@ -194,8 +201,12 @@ class _Reader:
             cells = [row[key].strip() for row in rows]
         except IndexError:
             return None
-        times = [self._time(cell) for cell in cells] if self._is_clock else self._numbers(cells)
-        return None if times is None or None in times else (times, forces)  # type: ignore[return-value]
+        times = (
+            [self._time(*pair) for pair in zip(cells, rows, strict=True)]
+            if self._is_clock
+            else self._numbers(cells)
+        )
+        return None if times is None or None in times else (times, forces)
 
     def _numbers(self, cells: Sequence[str]) -> Sequence[float] | None:
         return numbers_in(cells, self._mark)
@@ -204,14 +215,22 @@ class _Reader:
         numbers = self._numbers([cell])
         return numbers[0] if numbers else None
 
-    def _values(self, line: int, row: Sequence[str]) -> tuple[float | str, float] | None:
+    def _values(self, line: int, row: Sequence[str]) -> tuple[Any, float] | None:
         """Time or name, and force, of one row; None for a row of text; raises DataError for a row that is neither."""
         if is_remark(row):
             return None
         t = self._table
         value, key = cell_of(row, t.force), cell_of(row, t.key)
         force = math.nan if value.lower() in EMPTY else self._number(value)
-        at = (key or None) if t.by_name else self._time(key) if t.key is not None else 0.0 if value else None
+        at = (
+            (key or None)
+            if t.by_name
+            else self._time(key, row)
+            if t.key is not None
+            else 0.0
+            if value
+            else None
+        )
         if not self._other and force is not None and at is not None:
             return at, force
         texts = tuple(" ".join(cell.split()) for cell in row)
@@ -232,26 +251,45 @@ class _Reader:
             self._n_texts += 1
         return None
 
-    def _time(self, cell: str) -> float | None:
-        """A number, or seconds since midnight."""
+    def _time(self, cell: str, row: Sequence[str]) -> float | tuple[str, float] | None:
+        """A number, or the date and seconds since midnight."""
         if not self._forces and not self._is_clock:
             self._is_clock = CLOCK.fullmatch(cell) is not None
         if not self._is_clock:
             return self._number(cell)
-        date, seconds = time_of_day(cell)
-        if date:
-            self._dates.add(date)
-        return seconds
+        found, date = time_of_day(cell), cell_of(row, self._table.date)
+        return (date, found[1]) if found and not found[0] and DATE.fullmatch(date) else found
+
+    def _since_midnight(self, found: Sequence[tuple[str, float]]) -> Array:
+        """Seconds from dates and times of the day; a day more where the date is another, or without one falls."""
+        times = np.array([time for _, time in found])
+        nights = np.diff(times, prepend=self._last_clock if self._times else times[0]) < -_HALF_DAY_S
+        for k, (date, _) in enumerate(found):
+            if date and date != (self._dates[-1][1] if self._dates else ""):
+                nights[k] = bool(self._dates)
+                self._dates.append((len(self._times) + k, date))
+            elif self._dates:
+                nights[k] = False
+        days = np.cumsum(nights) + self._days
+        self._last_clock, self._days = float(times[-1]), int(days[-1])
+        times += _DAY_S * days
+        return times
+
+    def _to_dates(self, times: Array) -> Array:
+        """The same times, with the days that the dates are apart."""
+        days = days_of([date for _, date in self._dates])
+        if days is None:
+            raise DataError(
+                f"{self._where}: the dates {self._dates[0][1]!r} to {self._dates[-1][1]!r} do not rise, or can be"
+                " read in two ways; give times in seconds: time_s"
+            )
+        for k, (first, _) in enumerate(self._dates[1:], start=1):
+            times[first:] += _DAY_S * (days[k] - days[k - 1] - 1)
+        return times
 
     def _add_times(self, lines: Sequence[int], times: Array) -> None:
         """Add times, s or in the unit of the file; raises DataError with the line where they do not rise."""
-        if self._is_clock:
-            if not self._times:
-                self._last_clock = float(times[0])
-            nights = np.cumsum(np.diff(times, prepend=self._last_clock) < -_HALF_DAY_S) + self._days
-            self._last_clock, self._days = float(times[-1]), int(nights[-1])
-            times = times + _DAY_S * nights
-        else:
+        if not self._is_clock:
             while not self._times and not self._time_unit and times[0] * self._seconds > _UNIX_MS:
                 self._seconds *= 1e-3  # Unix times in ms, us or ns
             times = times * self._seconds
@@ -267,13 +305,11 @@ class _Reader:
     def _note_kinds(self, kinds: dict[str, str], cells: set[str]) -> None:
         """Note whether the cells of a column prove their decimal mark, or could have groups of thousands."""
         for cell in cells:
-            if self._mark not in cell:
-                if "plain" not in kinds and "." not in cell and "," not in cell and self._number(cell):
-                    kinds["plain"] = cell
-            elif NUMBERISH.fullmatch(cell) and (proven := vote(cell)) in ("?", self._mark):
-                kinds["three" if proven == "?" else "clear"] = cell
-                if proven != "?":
-                    return
+            if self._mark in cell:
+                if NUMBERISH.fullmatch(cell):
+                    kinds[vote(cell)] = cell
+            elif "plain" not in kinds and not {".", ","} & {*cell} and self._number(cell):
+                kinds["plain"] = cell
 
     # -- the whole ------------------------------------------------------------------------------
 
@@ -283,13 +319,10 @@ class _Reader:
         if not np.isfinite(forces).any():
             raise DataError(f"{self._where}: holds no forces")
         for kinds in self._kinds.values():
-            if self._given.decimal is None and kinds.keys() >= {"three", "plain"} and "clear" not in kinds:
-                raise two_readings(self._where, kinds["three"])
-        if self._dates and len(self._dates) != self._days + 1:
-            raise DataError(
-                f"{self._where}: the dates do not fit the times of the day; give times in seconds: time_s"
-            )
+            if self._given.decimal is None and kinds.keys() >= {"?", "plain"} and self._mark not in kinds:
+                raise two_readings(self._where, kinds["?"])
         times = np.array(self._times) if self._times else None
+        times = times if times is None else self._to_dates(times)
         clock = self._zero(times)
         return Export(
             tuple(self._names), times, forces, clock, self._taken(forces, clock), tuple(self._remarks)
@@ -315,14 +348,12 @@ class _Reader:
     def _taken(self, forces: Array, clock: str) -> str:
         t = self._table
         low, high = _shown(np.nanmin(forces)), _shown(np.nanmax(forces))
+        plain = "h:min:s" if self._is_clock else self._time_unit or "s"
         kind = (
-            "times of the day"
-            if clock == "clock"
-            else "h:min:s"
-            if self._is_clock
-            else self._time_unit or "s"
+            ""
+            if t.by_name
+            else f" ({ {'clock': 'times of the day', 'unix': 'Unix times'}.get(clock, plain) })"
         )
-        kind = f" ({'Unix times' if clock == 'unix' else kind})" if not t.by_name else ""
         against = f" against {t.name(t.key)}{kind}" if t.key is not None else ""
         return (
             f"column {t.name(t.force)}, {self._unit}, {len(forces):,} rows, {low} to {high} N{against}; {t.form},"

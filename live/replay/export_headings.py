@@ -17,6 +17,7 @@ _WORDS = {
     "force": "force load f kraft last charge effort 荷重 試験力 力 fuerza carga forza carico",
     "time": "time t seconds zeit temps duree 時間 tiempo tempo x_value",
     "clock": "timestamp date datum datetime uhrzeit heure clock 時刻 日時",
+    "date": "date datum fecha data 日付",
     "name": "file filename picture image name bild bilddatei datei dateiname fichier photo ファイル 画像",
     "row": "index no nr number point sample frame row nummer #",
     "neutral": "axial axiale standard test tensile traction primary elapsed running measured actual applied cell"
@@ -92,7 +93,7 @@ def name_and_unit(cell: str) -> tuple[str, str]:
 def _rank(name: str, kind: str) -> int | None:
     """How surely a name is of ``kind``: 0 by its words, 1 by a letter, 2 where it has other words; None: it is not."""
     folded = _folded(name)
-    if kind in ("name", "row") or folded in _KINDS[kind]:
+    if kind in ("name", "row", "date") or folded in _KINDS[kind]:
         words = re.sub(r"[\s_.]+", "", folded)
         return int(len(folded) == 1 and kind != "row") if {words, folded} & _KINDS[kind] else None
     parts = re.findall(r"[^\W\d_]+", folded)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import re
 from array import array
 from collections.abc import Iterable, Sequence
@@ -25,6 +26,7 @@ CLOCK = re.compile(
     r"\s*(?:([AaPp])\.?[Mm]\.?|Z|UTC|[-+]\d\d:?\d\d)?"
 )
 """Date, hours, minutes, seconds, mark, fraction, A or P of a time of the day or an elapsed one."""
+DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
 EMPTY = ("", "nan", "-", "--", "---", "n/a", "#n/a", "#nv", "null", "1.#qnan", "-1.#ind")
 """Cells without a force, in lower case."""
 
@@ -97,7 +99,33 @@ def numbers_in(cells: Sequence[str], mark: str) -> Sequence[float] | None:
     return numbers if np.isfinite(numbers).all() else None
 
 
-def time_of_day(cell: str) -> tuple[str, float | None]:
+def days_of(dates: Sequence[str]) -> list[int] | None:
+    """Days from the first of the dates, each another than the one before; None where they have no or two readings.
+
+    Of two readings that are both dates and rise, one without a pause is meant.
+    """
+    ordinals = []
+    for order in ("dmy", "mdy", "ymd"):
+        try:
+            ordinals.append([_ordinal(date, order) for date in dates])
+        except ValueError:
+            continue
+    rising = {tuple(day - days[0] for day in days) for days in ordinals if min(np.diff(days), default=1) > 0}
+    daily = {days for days in rising if max(np.diff(days), default=1) == 1}
+    found = daily or rising
+    return list(found.pop()) if len(found) == 1 else None
+
+
+def _ordinal(date: str, order: str) -> int:
+    """The day of a date, from any one; raises ValueError where this is none in that order."""
+    parts = dict(zip(order, re.split("[-./]", date), strict=True))
+    if ("." in date and order == "mdy") or (len(parts["y"]) != 4 and order == "ymd"):
+        raise ValueError(date)
+    year = int(parts["y"]) + 2000 * (len(parts["y"]) == 2)
+    return datetime.date(year, int(parts["m"]), int(parts["d"])).toordinal()
+
+
+def time_of_day(cell: str) -> tuple[str, float] | None:
     """The date, "" without one, and s since midnight; None where it is no time, or one with several readings."""
     if cell[2:3] == cell[5:6] == ":" and cell[8:9] in ".,":  # most are 12:01:02.345
         hour, minute, second = cell[:2], cell[3:5], cell[6:].replace(",", ".")
@@ -105,9 +133,9 @@ def time_of_day(cell: str) -> tuple[str, float | None]:
             return "", 3600.0 * int(hour) + 60.0 * int(minute) + float(second)
     clock = CLOCK.fullmatch(cell)
     if clock is None:
-        return "", None
+        return None
     date, h, m, s, point, fraction, half = clock.groups()
     if (h is None and fraction is None) or (point == ":" and len(fraction) != 3):
-        return "", None  # 12:30 and 12:30:15:04
+        return None  # 12:30 and 12:30:15:04
     hours = int(h or 0) % (12 if half else 1000) + 12 * (half in ("p", "P"))
     return date or "", 3600.0 * hours + 60.0 * int(m) + float(f"{s}.{fraction or 0}")

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import BinaryIO
 
 from acquire.errors import DataError
+from acquire.printable import counted
 from live.config.sections import LoadConfig
 from live.replay.export_headings import (
     find_columns,
@@ -47,6 +48,10 @@ class Table:
     by_name : bool
     texts : tuple of tuple of str
         The heading and the lines between it and the values.
+    date : int or None
+        Column of dates beside one of times.
+    remarks : tuple of str
+        Tables above that are left out.
     """
 
     encoding: str
@@ -57,6 +62,8 @@ class Table:
     key: int | None
     by_name: bool
     texts: tuple[tuple[str, ...], ...]
+    date: int | None = None
+    remarks: tuple[str, ...] = ()
 
     @property
     def is_ours(self) -> bool:
@@ -131,11 +138,12 @@ def find_table(file: BinaryIO, where: str, given: LoadConfig) -> Table:
         for separator, rows in parted.items():
             search = _Search(where, given, encoding, separator, rows, needs_key)
             found = [table for k in range(len(rows)) if (table := search.at(k))]
-            longest = max(
-                reversed(found), key=search.length, default=None
-            )  # of equal ones the nearest heading
+            # of equal ones the nearest heading
+            longest = max(reversed(found), key=search.length, default=None)
             if longest and search.length(longest):
-                return search.check(next(t for t in found if t.heads == longest.heads))  # before a pause
+                return search.check(
+                    [t for t in found if search.length(t) or t.heads == longest.heads], longest
+                )
             empty = empty or bool(found)
     if empty:
         raise DataError(f"{where}: holds no forces below their heading")
@@ -190,6 +198,14 @@ class _Search:
             first,
             *columns,
             tuple(map(tuple, (self.rows[k], *texts))),
+            self._date(heads, columns[1]),
+        )
+
+    def _date(self, heads: list[str], key: int | None) -> int | None:
+        """The column of dates beside times of the day; none where the times are given."""
+        dates = [k for k in find_columns(heads, "date") if k != key]
+        return (
+            dates[0] if key is not None and len(dates) == 1 and "," not in (self.given.column or "") else None
         )
 
     def _with_units(self, heads: list[str], rows: Rows) -> list[str]:
@@ -233,8 +249,16 @@ class _Search:
             return None
         return forces[0], keys[0] if keys else None, bool(name)
 
-    def check(self, table: Table) -> Table:
-        """The same table; raises DataError where other columns could be the force or the time too."""
+    def check(self, found: list[Table], longest: Table) -> Table:
+        """The longest table from before its pause, with what is left out above it.
+
+        Raises
+        ------
+        DataError
+            Other columns could be the force or the time too.
+        """
+        begin = next(k for k, table in enumerate(found) if table.heads == longest.heads)
+        table = found[begin]
         given = given_columns(table.heads, self.given.column) if self.given.column else None
         for kinds, option in ((("force",), "FORCE"), (("name", "time", "clock"), "FORCE,TIME")):
             called = next(filter(None, (find_columns(table.heads, kind) for kind in kinds)), [])
@@ -243,7 +267,13 @@ class _Search:
                 raise DataError(
                     f"{self.where}: {words}: which one? give --load-column {option}, by heading or number"
                 )
-        return table
+        left = (
+            f"line {t.first + 1}: another table ({', '.join(t.heads)[:60]!r}): its"
+            f" {counted(self.length(t), 'row')} are not read"
+            for t in found[:begin]
+            if t.first < table.first  # not the same rows under a line above their heading
+        )
+        return replace(table, remarks=tuple(left))
 
     def length(self, table: Table) -> int:
         """The number of rows of values that follow its heading."""

@@ -6,8 +6,10 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,12 +21,14 @@ from acquire.errors import ConfigError, DataError
 from acquire.files.picture import MAX_BYTES, check_regular
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
+from acquire.printable import counted
 from live.config.sections import LoadConfig
 from live.replay.export_file import Export, read_export
 
 _MOST_SHOWN = 20_000  # samples for the display
 _SHARE = 0.5  # of names without a picture, or pictures without a force, from which the forces are in doubt
 _UNIX_S = 1e8
+_DIGIT = re.compile(r"\d")
 
 Array = NDArray[np.float64]
 
@@ -162,10 +166,12 @@ class ForceTable:
 
     def _by_name(self, pictures: Mapping[str, float]) -> PlacedForces:
         names = [Path(name.replace("\\", "/")).name for name in self.export.names]
-        known = dict(zip(names, self.export.forces.tolist(), strict=True))
+        here = pictures.keys() | {Path(name).stem for name in pictures}
+        footer = _footer(names, here)
+        names = names[: len(names) - len(footer)]
+        known = dict(zip(names, self.export.forces.tolist(), strict=False))
         if len(known) < len(names):
             raise DataError(f"{self.path}: a picture is named twice; give each one force")
-        here = pictures.keys() | {Path(name).stem for name in pictures}
         lost = [name for name in names if name not in here]
         if len(lost) == len(names):
             raise DataError(
@@ -174,14 +180,25 @@ class ForceTable:
             )
         words = f"{len(lost)} of {len(names)} names are that of no picture: {', '.join(map(repr, lost[:3]))}"
         forces = [known.get(name, known.get(Path(name).stem, math.nan)) for name in pictures]
+        below = (f"{counted(len(footer), 'line')} below the names left out: {footer[0]!r}",) if footer else ()
         doubtful = len(lost) >= _SHARE * len(names)
         return PlacedForces(
             np.array(list(pictures.values())),
             np.array(forces),
             True,
-            (*((words,) if lost and not doubtful else ()), *self.export.remarks),
+            (*((words,) if lost and not doubtful else ()), *below, *self.export.remarks),
             (f"{self.path.name}: {words}",) if doubtful else (),
         )
+
+
+def _footer(names: list[str], here: Set[str]) -> list[str]:
+    """The names below the last picture that are no pictures, as Maximum: without an ending, or without a digit."""
+    last = max((k for k, name in enumerate(names) if name in here), default=len(names) - 1)
+    ending = bool(Path(names[last]).suffix)
+    below = itertools.dropwhile(
+        lambda name: Path(name).suffix or (not ending and _DIGIT.search(name)), names[last + 1 :]
+    )
+    return list(below)
 
 
 def read_forces(path: Path, load: LoadConfig | None = None) -> ForceTable:

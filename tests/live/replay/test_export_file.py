@@ -80,9 +80,50 @@ def test_the_rows_before_a_pause_are_kept_whichever_part_is_longer() -> None:
         assert found.forces.tolist() == [k * 10 + 0.25 for k in range(15)]
 
 
-def test_a_table_whose_days_are_not_those_of_its_clock_is_refused() -> None:
-    with pytest.raises(DataError, match="the dates do not fit"):
-        read("Timestamp;Load (N)\n25.11.2026 10:00:00.0;1\n26.11.2026 11:00:00.0;2\n")
+@pytest.mark.usefixtures("block")
+@pytest.mark.parametrize("line", ["{0};{1}", "{0} {1}"], ids=["columns", "one column"])
+@pytest.mark.parametrize(
+    ("dates", "days"),
+    [
+        (("25.11.2026", "26.11.2026"), 1),
+        (("25.11.2026", "27.11.2026"), 2),
+        (("2026-11-30", "2026-12-01"), 1),
+        (("11/29/2026", "12/01/2026"), 2),
+        (("1/2/26", "1/3/26"), 1),
+        (("1/2/26", "2/2/26"), 1),
+        (("28.02.2028", "01.03.2028"), 2),
+    ],
+)
+def test_dates_count_the_days_between_times_of_the_day(line: str, dates: tuple[str, str], days: int) -> None:
+    clocks = [(0, 23, 59, 58), (0, 23, 59, 59), (1, 0, 0, 1), (1, 23, 59, 59.5)]
+    text = ("Date;Time" if ";" in line else "Timestamp") + ";Load [N]\n"
+    for part, h, m, s in clocks:
+        text += line.format(dates[part], f"{h:02d}:{m:02d}:{s:04.1f}") + f";{s}\n"
+    found = read(text)
+    assert found.times is not None
+    seconds = [86_400 * days * part + 3600 * h + 60 * m + s for part, h, m, s in clocks]
+    assert found.times.tolist() == pytest.approx(seconds)
+
+
+@pytest.mark.parametrize(
+    ("dates", "says"),
+    [
+        (("1/2/26", "1/4/26"), "two ways"),
+        (("26.11.2026", "25.11.2026"), "do not rise"),
+        (("99.99.2026", "98.11.2026"), "do not rise"),
+    ],
+)
+def test_dates_with_two_readings_or_none_are_refused(dates: tuple[str, str], says: str) -> None:
+    with pytest.raises(DataError, match=says):
+        read("Date;Time;Load (N)\n" + "".join(f"{date};10:00:00.0;1\n" for date in dates))
+
+
+def test_tables_above_the_longest_are_left_out_with_a_word() -> None:
+    table = "".join(f"{k}.5;{k}.25\n" for k in range(9))
+    found = read("Time (s);Load (N)\n0.5;7\n1.5;8\n\nTime (s);Load 2 (kN)\n" + table)
+    assert len(found.forces) == 9
+    assert "line 2: another table ('Time (s), Load (N)'): its 2 rows are not read" in found.remarks
+    assert not read(EXPORTS["Trapezium"].data).remarks
 
 
 @st.composite

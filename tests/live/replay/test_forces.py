@@ -97,6 +97,17 @@ def test_half_of_the_names_without_a_picture_are_said(tmp_path: Path) -> None:
     assert counted.doubts[0] == "forces.csv: 2 of 4 pictures have a force"
 
 
+@pytest.mark.parametrize("ending", [".png", ""])
+def test_footers_below_the_names_are_no_names_without_a_picture(tmp_path: Path, ending: str) -> None:
+    pictures = {f"a{k}.png": float(k) for k in range(2)}
+    text = "file;force_N\n" + "".join(f"a{k}{ending};{k}.5\n" for k in range(2))
+    found = placed(table(tmp_path, text + "\nMaximum;1.5\nMean;1.0\nMaximum;2.5\n"), pictures)
+    assert found.forces.tolist() == [0.5, 1.5] and not found.doubts
+    assert found.remarks == ("3 lines below the names left out: 'Maximum'",)
+    lost = placed(table(tmp_path, text + f"b7{ending};2.5\n"), pictures)
+    assert lost.remarks == (f"1 of 3 names are that of no picture: 'b7{ending}'",)
+
+
 def test_without_times_and_names_there_is_a_row_for_each_picture(tmp_path: Path) -> None:
     path = table(tmp_path, "Index;Kraft [kN]\n1;0,5\n2;1\n3;1,5\n")
     found = placed(path, {"b.png": 4.0, "a.png": 5.0, "c.png": 6.0})
