@@ -36,7 +36,8 @@ def coherent(field: StrainField) -> StrainField:
     from analysis.compiled.loops import read_only
     from analysis.follow.coherence import ALONE, label, stand_out
 
-    step, rough, valid = float(field.grid.step), False, field.n_valid
+    step, rough, odd = float(field.grid.step), False, np.zeros(field.grid.shape, np.bool_)
+    valid = field.n_valid
     for _ in range(ROUNDS):
         p, variance = read_only(_affine(field)), read_only(field.covariance)
         out = np.zeros(field.grid.shape, np.uint8)
@@ -44,9 +45,14 @@ def coherent(field: StrainField) -> StrainField:
         rough = rough or bool(out.any())
         if not (out == ALONE).any():
             break
-        field = _without(field, out == ALONE)
+        odd |= out == ALONE
+        field = _without(field, odd)
     if field.n_valid < (1 - MANY) * valid:
-        field = replace(field, covariance=field.covariance * np.float32(_incoherence(field)))
+        from scipy.ndimage import binary_dilation
+
+        near = binary_dilation(odd, np.ones((5, 5), np.bool_))
+        widened = np.where(near, np.float32(_incoherence(field, near)), np.float32(1))
+        field = replace(field, covariance=field.covariance * widened)
     # As a rule ZOIs on a crack have no value.
     if rough or field.n_valid < field.grid.n_active:
         labels = np.zeros(field.grid.shape, np.int32)
@@ -62,8 +68,10 @@ def _affine(field: StrainField) -> Floats:
     return np.ascontiguousarray(whole.reshape(6, *shape), np.float64)
 
 
-def _incoherence(field: StrainField) -> float:
+def _incoherence(field: StrainField, near: Bools) -> float:
     """Variance of a mean over that of its noise: what neighbours differ by beyond quadratics, and how far it reaches.
+
+    Of the ZOIs ``near`` (R, C) ones that stand out: what is wrong there says nothing of the rest.
 
     By differences of the second order along x of such along y, between ZOIs 1, 2 and 4 steps apart. Values that are
     wrong alone show it all in the nearest; what shows half of it only ``n`` steps apart is shared by n x n ZOIs.
@@ -78,8 +86,9 @@ def _incoherence(field: StrainField) -> float:
         left = sum(a * b * u[:, line, column] for (a, line), (b, column) in each)
         rho = overlap(field.window, field.grid.size, field.grid.step * apart, 3, 0)
         noise = second @ rho[abs(np.subtract.outer(np.arange(3), np.arange(3)))] @ second
-        inner = sigma[:, apart:-apart, apart:-apart]
-        found.append(float(np.nanmean((left / inner) ** 2)) / noise**2)
+        inner = np.s_[..., apart:-apart, apart:-apart]
+        share = np.where(near[inner], (left / sigma[inner]) ** 2, np.nan)
+        found.append(float(np.nanmean(share)) / noise**2 if np.isfinite(share).any() else np.nan)
     if not found or not np.isfinite(found).all():
         return 1.0
     reach = next(n for n, much in zip(REACHES, found, strict=False) if much >= max(found) / 2)

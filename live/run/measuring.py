@@ -26,7 +26,7 @@ from live.run.prepared_run import PreparedRun
 from live.setup.prepared import PreparedKernel
 
 log = logging.getLogger(__name__)
-TRIES = 3
+TRIES, TRIES_PULLED = 3, 2
 
 
 class ReferenceSelector:
@@ -83,9 +83,10 @@ class ReferenceSelector:
     def _another(self, motion: ReferenceMotion, attempt: int) -> ReferenceBurst | None:
         """The next reference; None where the run ends, or where one that moved must be used.
 
-        A reference that cannot be measured is never used: the next one is tried until one is good.
+        A reference that cannot be measured is never used: the next one is tried until one is good. One that is pulled
+        twice is used: the test has begun, and the next one would be under more load.
         """
-        if attempt >= TRIES and not math.isnan(motion.px):
+        if attempt >= (TRIES_PULLED if motion.pulled else TRIES) and not math.isnan(motion.px):
             return None
         what = f"the picture moved by {motion.amount} px during the reference burst"
         if math.isnan(motion.px):

@@ -76,7 +76,7 @@ def test_the_tolerance_grows_with_the_noise_from_a_floor_on() -> None:
 
 def test_there_is_one_error_for_a_reference_without_a_pattern() -> None:
     assert analysis.PatternError is Raised and issubclass(PatternError, ValueError)
-    with pytest.raises(PatternError, match="focus, exposure and speckle"):
+    with pytest.raises(PatternError, match="focus, exposure, speckle"):
         ReferencePicture.first(np.full(SHAPE, 100, np.float32), GRID, KernelSettings(), None, None)
 
 

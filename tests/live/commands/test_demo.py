@@ -24,6 +24,7 @@ from live.commands.demo import MeansCollector, ZoiTruth, middle_of
 from live.config.loading import load_config
 from live.pipeline.run_state import RunState
 from live.results.figures import evaluate
+from tests.live.made_run import finished
 from tests.live.made_up import START, make_grid, make_measurement
 
 SHORT = ["--seconds", "2", "--fps", "10", "--reference-burst", "2", "--burst", "2", "--step", "64"]
@@ -171,6 +172,7 @@ def test_the_demo_compares_the_elastic_part_with_its_truth() -> None:
 
     collector.measurements = [measured(2.0, 0.0), measured(4.0, 4e-4), measured(4.95, 5.0)]  # the last yields
     config = load_config(None, {"specimen.area_mm2": 40.0})
+    outcome.test = finished(state, config.specimen)
     code = demo.compare(outcome, collector, config, lines.append)
     assert code == 5 and any("exit code 5: E was not measured" in line for line in lines)
     assert any("100.0% of these 6 values" in line for line in lines)
@@ -301,5 +303,6 @@ def test_a_machine_too_slow_to_measure_has_no_defect() -> None:
     )
     outcome.run_state.loads.close()
     lines, config = list[str](), load_config(None, {"specimen.area_mm2": 40.0})
+    outcome.test = finished(outcome.run_state, config.specimen)
     assert demo.compare(outcome, MeansCollector(), config, lines.append) == 5
     assert any("no instant of the elastic part was measured" in line for line in lines)

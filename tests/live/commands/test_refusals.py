@@ -380,7 +380,6 @@ def test_expert_options_are_accepted_all_the_same(capsys: pytest.CaptureFixture[
     ("name", "option"),
     [
         ("check", "--report"),
-        ("check", "--out=a"),
         ("check", "--standard=free"),
         ("check", "--strain=green"),
         ("page", "--report"),

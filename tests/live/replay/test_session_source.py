@@ -67,6 +67,15 @@ EVENTS = (
 )
 
 
+class Recorded(SimpleNamespace):
+    """A session of 64 frames, or of bursts."""
+
+    indices = range(64)
+
+    def __len__(self) -> int:
+        return len(self.indices)
+
+
 def source(
     monkeypatch: pytest.MonkeyPatch,
     *,
@@ -79,7 +88,7 @@ def source(
     monkeypatch.setattr(module, "open_store", lambda session, path: store)
     samples = [LoadSample(START + t, 10.0 * t + 100.0) for t in (0.0, 0.2, 0.4, 0.6, 1.4)]
     tare = Event(START + 0.5, EventKind.TARE, "a cell", "", "info", {"step_N": 100.0})
-    session: Any = SimpleNamespace(
+    session: Any = Recorded(
         load_samples=lambda: iter(samples), events=lambda: iter((*events, tare)), mode=RecordMode.parse(mode),
         start_monotonic=START, start_utc="now", camera=CAMERA,
     )  # fmt: skip

@@ -287,11 +287,11 @@ def test_the_options_of_an_evaluation_are_in_si_units() -> None:
     }  # fmt: skip
     options = tensile_options(replace(FLAT, **given))
     assert (options.zero, options.preload) == ("preload", 2.5e6)
-    assert astuple(options.limits) == pytest.approx((0.005, 0.02, 30e-6))
+    assert astuple(options.limits) == (0.005, 0.02, pytest.approx(30e-6), None)
     options = tensile_options(SpecimenConfig(**given))
     assert options.zero == "raw" and options.limits.section is None
     assert tensile_options(replace(FLAT, zero="toe")).zero == "toe"
-    assert astuple(tensile_options(FLAT).limits) == (None, None, None)
+    assert astuple(tensile_options(FLAT).limits) == (None, None, None, None)
 
 
 def test_the_sharpness_has_the_largest_change_and_the_last() -> None:

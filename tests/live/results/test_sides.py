@@ -81,8 +81,11 @@ def test_the_newest_values_are_those_of_the_newest_instant_of_both(monkeypatch: 
         return {AXIAL: Course(t, 1e-3 * t * state.last, np.zeros(state.last + 1))}
 
     monkeypatch.setattr("live.results.sides.together._recent", recent)
-    healthy = SimpleNamespace(camera_failed=False)
-    front, back = (cast(RunState, SimpleNamespace(last=k, health=healthy)) for k in (6, 4))
+    healthy, live = SimpleNamespace(camera_failed=False), SimpleNamespace(known=True)
+    made = SimpleNamespace(figure=lambda _: live)
+    front, back = (
+        cast(RunState, SimpleNamespace(last=k, health=healthy, snapshot=lambda _: made)) for k in (6, 4)
+    )
     mean, bending, _, at = newest(front, back)[AXIAL]
     assert at == 4.0
     assert mean == pytest.approx(4e-3 * (6 + 4) / 2) and bending == pytest.approx(4e-3 * (6 - 4) / 2)

@@ -69,7 +69,7 @@ def test_a_measurement_has_what_was_configured(monkeypatch: pytest.MonkeyPatch, 
     PreparedKernel(made, kernel, 1.5).measurements([], None, [].append)  # type: ignore[arg-type]
     guards = {type(guard).__name__: guard for guard in given["guards"]}
     assert list(guards) == [
-        "RepetitionGuard", "StrainGuard", "PictureGuard", "BlurGuard", "DilatationGuard", "TiltGuard",
+        "RepetitionGuard", "PartsGuard", "StrainGuard", "PictureGuard", "BlurGuard", "DilatationGuard", "TiltGuard",
     ]  # fmt: skip
     dilatation, tilt = guards["DilatationGuard"], guards["TiltGuard"]
     assert (dilatation._nu, dilatation._stand_off_mm) == (nu, 400.0)

@@ -12,6 +12,7 @@ from live.config.loading import load_config
 from live.pipeline.run_state import RunState
 from live.replay.batch import row as module
 from live.replay.batch.row import COLUMNS, BatchRow, failed, row_of, row_of_chunk
+from tests.live.made_run import finished
 from tests.live.made_up import make_measurement
 
 SETTINGS = {"measure.zoi": 48, "measure.step": 12, "measure.order": 2, "specimen.area_mm2": 40.0}
@@ -25,7 +26,7 @@ def replayed(code: int, *, measured: bool = True) -> Any:
         run_state.history.add(make_measurement(k).time_step)
     return SimpleNamespace(
         run_state=run_state, exit_code=code, lines=["5 frames lost", "and more"], left_out=2,
-        config=load_config(None, SETTINGS), folder=Path("nowhere"),
+        config=load_config(None, SETTINGS), folder=Path("nowhere"), test=finished(run_state),
     )  # fmt: skip
 
 

@@ -258,7 +258,7 @@ def test_two_cameras_are_put_together_at_the_end(
     monkeypatch.setattr(
         "live.commands.report.write_report", lambda folder, screen: screen.print(f"report {folder}")
     )
-    side: Any = SimpleNamespace(run_state=None, outputs=SimpleNamespace(reports=()), folder=tmp_path,
+    side: Any = SimpleNamespace(run_state=None, test=None, outputs=SimpleNamespace(reports=()), folder=tmp_path,
                                 config=SimpleNamespace(specimen=None, output=SimpleNamespace(report=True)))  # fmt: skip
     both: Any = SimpleNamespace(screen=screen, side=lambda name: screen)
     outcome: Any = SimpleNamespace(folder=tmp_path, exit_code=code, sides={"front": side, "back": side})
