@@ -22,6 +22,8 @@ PART = 0.1
 """Share of the valid ZOIs that makes a part."""
 MANY, CERTAIN, REACHES = 0.02, 1.5, (1, 2, 4)
 """Share of ZOIs that stand out from which on what is left is looked at, and widens the uncertainties above so much."""
+NEAR = 11
+"""Side of a square of ZOIs that holds one that stands out, wherever it lies about a ZOI that is among them."""
 ROUNDS = 4
 """What is wrong hides others from its neighbours until it is left out."""
 OPENED = 0.25
@@ -39,7 +41,7 @@ def coherent(field: StrainField) -> StrainField:
     step, rough, odd = float(field.grid.step), False, np.zeros(field.grid.shape, np.bool_)
     valid = field.n_valid
     for _ in range(ROUNDS):
-        p, variance = read_only(_affine(field)), read_only(field.covariance)
+        p, variance = read_only(_affine(field)), read_only(np.ascontiguousarray(field.covariance))
         out = np.zeros(field.grid.shape, np.uint8)
         stand_out(p, variance, step, read_only(field.ok), out)
         rough = rough or bool(out.any())
@@ -48,9 +50,7 @@ def coherent(field: StrainField) -> StrainField:
         odd |= out == ALONE
         field = _without(field, odd)
     if field.n_valid < (1 - MANY) * valid:
-        from scipy.ndimage import binary_dilation
-
-        near = binary_dilation(odd, np.ones((5, 5), np.bool_))
+        near = _among(odd)
         widened = np.where(near, np.float32(_incoherence(field, near)), np.float32(1))
         field = replace(field, covariance=field.covariance * widened)
     # As a rule ZOIs on a crack have no value.
@@ -59,6 +59,14 @@ def coherent(field: StrainField) -> StrainField:
         label(p, variance, step, read_only(field.ok), labels)
         field = replace(field, parts=_parts(field, labels))
     return field
+
+
+def _among(odd: Bools) -> Bools:
+    """The ZOIs (R, C) that lie among those that stand out; a part of the picture without such is not among them."""
+    from scipy.ndimage import binary_dilation, binary_erosion
+
+    around = np.ones((NEAR, NEAR), np.bool_)
+    return np.asarray(binary_erosion(binary_dilation(odd, around), around, border_value=1))
 
 
 def _affine(field: StrainField) -> Floats:
@@ -71,7 +79,7 @@ def _affine(field: StrainField) -> Floats:
 def _incoherence(field: StrainField, near: Bools) -> float:
     """Variance of a mean over that of its noise: what neighbours differ by beyond quadratics, and how far it reaches.
 
-    Of the ZOIs ``near`` (R, C) ones that stand out: what is wrong there says nothing of the rest.
+    Of the ZOIs ``near`` (R, C), among ones that stand out: what is wrong there says nothing of the rest.
 
     By differences of the second order along x of such along y, between ZOIs 1, 2 and 4 steps apart. Values that are
     wrong alone show it all in the nearest; what shows half of it only ``n`` steps apart is shared by n x n ZOIs.

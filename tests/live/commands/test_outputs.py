@@ -94,11 +94,10 @@ def test_the_channels_of_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
     consumers._lines(about(load_config(None, LINE)), state, JointChannels())
     consumers._lines(about(load_config(None, {"strain_out.channels": ["force_N", "eyy"]})), state, None)
     plain, joint, chosen = (given[1] for given in made)
-    of_load = {"force_N", "force_age_s", "force_state", "stress_MPa"}
-    default = [name for name in consumers.DEFAULT_CHANNELS if name not in of_load]
-    assert plain == [*default, "gauge_mid", "sigma_gauge_mid"], "no load cell, no channel of it"
+    default = [name for name in consumers.DEFAULT_CHANNELS if name != "stress_MPa"]
+    assert plain == [*default, "gauge_mid", "sigma_gauge_mid"], "no section, no stress"
     assert joint[: len(plain)] == plain and {"mean_axial", "bending_gauge_mid"} <= set(joint)
-    assert tuple(chosen) == ("eyy",)
+    assert tuple(chosen) == ("force_N", "eyy")
 
 
 def test_alarms_see_the_machine_and_both_sides(monkeypatch: pytest.MonkeyPatch) -> None:
