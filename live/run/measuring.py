@@ -26,7 +26,7 @@ from live.run.prepared_run import PreparedRun
 from live.setup.prepared import PreparedKernel
 
 log = logging.getLogger(__name__)
-TRIES, TRIES_PULLED = 3, 2
+TRIES = 3
 
 
 class ReferenceSelector:
@@ -61,7 +61,9 @@ class ReferenceSelector:
         for attempt in itertools.count(1):
             ready = self._prepared.plan.on(reference.burst, what)
             motion = _motion(ready, reference)
-            if motion.px <= self._prepared.config.measure.reference_shift_px and not motion.pulled:
+            if motion.px <= self._prepared.config.measure.reference_shift_px:
+                if motion.pulled:  # the test has begun: the next one would be under more load
+                    self._moved(motion)
                 break
             again = self._another(motion, attempt)
             if again is None and math.isnan(motion.px):
@@ -69,11 +71,7 @@ class ReferenceSelector:
                 self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "error")
                 return None
             if again is None:
-                text = (
-                    f"the reference moved by {motion.amount} px; keep the specimen still when strains must be"
-                    " absolute"
-                )
-                self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "warning")
+                self._moved(motion)
                 break
             self._run_state.frame_counts.add(reference=-reference.burst.n, left_out=reference.burst.n)
             reference = again
@@ -83,10 +81,9 @@ class ReferenceSelector:
     def _another(self, motion: ReferenceMotion, attempt: int) -> ReferenceBurst | None:
         """The next reference; None where the run ends, or where one that moved must be used.
 
-        A reference that cannot be measured is never used: the next one is tried until one is good. One that is pulled
-        twice is used: the test has begun, and the next one would be under more load.
+        A reference that cannot be measured is never used: the next one is tried until one is good.
         """
-        if attempt >= (TRIES_PULLED if motion.pulled else TRIES) and not math.isnan(motion.px):
+        if attempt >= TRIES and not math.isnan(motion.px):
             return None
         what = f"the picture moved by {motion.amount} px during the reference burst"
         if math.isnan(motion.px):
@@ -99,6 +96,10 @@ class ReferenceSelector:
             text = f"{what}; tried again until the picture is still"
             self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "error")
         return self._burst_queue.retake_reference()
+
+    def _moved(self, motion: ReferenceMotion) -> None:
+        text = f"the reference moved by {motion.amount} px; keep the specimen still when strains must be absolute"
+        self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "warning")
 
     def _report(self, burst: Burst, motion: ReferenceMotion) -> None:
         force, n = self._run_state.loads.mean(burst.t - burst.duration / 2, burst.t + burst.duration / 2)
