@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.compiled.forked import FORK_GUARD
-from analysis.field import Motion, Roi, StrainField, ZoiGrid, profile
+from analysis.field import Motion, Roi, Status, StrainField, ZoiGrid, profile
 from analysis.kernel.images import as_image
 from analysis.picture.splines import Box
 
@@ -232,4 +233,6 @@ def _rest() -> None:
     scale(unit, np.ones(21, np.float32), single, single, unit, unit)
     index, values = np.empty(0, np.intp), np.empty((0, 6))
     motion_after(Motion.none(index, 6), values, values, none, 1.0)
-    coherent(StrainField.from_values(grid, {"u": np.where(grid.x > 50, 9.0, 0.0)}, 0.1))
+    still = StrainField.from_values(grid, {}, 0.1)
+    # Parts are looked for where ZOIs are lost.
+    coherent(replace(still, status=np.where(grid.x > 50, np.uint8(Status.LOST), still.status)))

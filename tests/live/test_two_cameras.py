@@ -202,7 +202,7 @@ def test_the_mean_goes_out_with_its_sigma(tmp_path: Path) -> None:
             assert one[channel] == pytest.approx(found[column][k], rel=1e-6, abs=1e-12)
 
 
-ALARM = "[[alarm]]\nchannel = 'mean_axial'\nabove = 0.02\nend = true\nline = 'HALT'"
+ALARM = "[[alarm]]\nchannel = 'mean_axial'\nabove = 0.02\nend = true\nend_on_unknown = true\nline = 'HALT'"
 
 
 @pytest.mark.slow
