@@ -138,7 +138,7 @@ def read(port: PtyPort, lines: int) -> list[str]:
     got, until = b"", time.monotonic() + LONG_S
     while got.count(b"\n") < lines and time.monotonic() < until:
         got += port.read(0.1)
-    return got.decode().split()
+    return got.decode().splitlines()
 
 
 @pytest.mark.parametrize(

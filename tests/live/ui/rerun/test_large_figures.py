@@ -30,8 +30,8 @@ def test_figures_come_back_from_a_message() -> None:
     sent = replace(NOW, figures=lost, alarms=("strain limit: axial is 0.02",))
     meta = json.loads(json.dumps(figures_message(sent).meta, allow_nan=False))
     back = figures_of(Message(Kind.FIGURES, meta))
-    assert math.isnan(back.figure("stress").value) and back.figure("force") == lost["force"]
-    assert back.figure("axial") == lost["axial"] and back.troubles == sent.troubles
+    assert math.isnan(back.figure("stress").value) and back.troubles == sent.troubles
+    assert all(repr(back.figure(name)) == repr(lost[name]) for name in ("force", "axial")), "nan is not nan"
     assert paint(back).tobytes() == paint(sent).tobytes()
     for damaged in (
         {"state": "REC"},
