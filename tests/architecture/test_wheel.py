@@ -181,7 +181,7 @@ def test_the_demo_runs_where_only_the_wheel_is(fresh: Path, tmp_path: Path) -> N
         str(fresh / "phasedic"),
         "demo",
         "--seconds",
-        "16",
+        "24",
         "--no-view",
         "--no-rrd",
         "--report",
@@ -194,8 +194,8 @@ def test_the_demo_runs_where_only_the_wheel_is(fresh: Path, tmp_path: Path) -> N
         stdin=subprocess.DEVNULL,
     )  # fmt: skip
     said = done.stdout + done.stderr
-    # 1, 5: in so short a test on a busy machine the truth or E may be missed; that is not the subject here.
-    assert done.returncode in (0, 1, 5), said
+    # 1: in so short a test on a busy machine the truth may be missed; that is not the subject here.
+    assert done.returncode in (0, 1), said
     assert "against the simulated truth" in said
     assert "Traceback" not in said
     assert "out/report.html" in said

@@ -58,7 +58,8 @@ def check_every_instant(page: Page) -> int:
     """Each state shows force, stress, strain and latency of the last point that the curve had then; their number."""
     rows = page.page.evaluate(POINTS)["rows"]
     states = [one for one in page.page.evaluate("() => window.states") if one["points"][1] and "axial" in one]
-    for state in (one for one in states if one["figures"]["stress"]["state"] != "ended"):
+    states = [one for one in states if one["figures"]["stress"]["state"] != "ended"]
+    for state in states:
         _, stress, axial, *_ = rows[state["points"][1] - 1]
         assert state["stress_Pa"] == pytest.approx(stress, rel=1e-6)
         assert state["force_N"] == pytest.approx(stress * 40e-6, rel=1e-6)
