@@ -117,7 +117,7 @@ class Grabber:
     plan : GrabPlan
     run_state : RunState
     on_frame : callable
-        Called with every frame; it must not block.
+        Called with every frame, and whether it is one of a reference; it must not block.
     on_burst : callable, or None
         The same with every burst; its mean is made only for this.
 
@@ -139,8 +139,8 @@ class Grabber:
         camera: Camera,
         plan: GrabPlan,
         run_state: RunState,
-        on_frame: Callable[[Frame], None] = lambda frame: None,
-        on_burst: Callable[[Burst], None] | None = None,
+        on_frame: Callable[[Frame, bool], None] = lambda frame, is_reference: None,
+        on_burst: Callable[[Burst, bool], None] | None = None,
     ) -> None:
         self._camera, self._event_log, self._frame_counts = (
             camera,
@@ -182,11 +182,6 @@ class Grabber:
     def take_reference(self) -> None:
         """Make the next frames a reference burst."""
         self._retake.set()
-
-    @property
-    def taking_reference(self) -> bool:
-        """Whether the next frame is one of a reference."""
-        return self._taker is not None or self._retake.is_set()
 
     def join(self) -> None:
         """Wait for the end."""
@@ -238,17 +233,18 @@ class Grabber:
             self._report_loss(frame)
         self._report_damage(frame)
         self._rate(frame)
-        self._on_frame(frame)
-        self._unassigned += 1
         if self._retake.is_set():
             self._retake.clear()
             self._taker = ReferenceTaker(self._plan.reference_burst, self._memory)
+        # Decided here, once: who records the frame and who averages it must not see different answers.
+        self._on_frame(frame, self._taker is not None)
+        self._unassigned += 1
         if self._taker is not None:
             self._feed_reference(self._taker, frame)
         elif (burst := self._accumulator.add(frame)) is not None:
             self._used(burst.n)
             if self._on_burst is not None:
-                self._on_burst(burst.burst(self._memory))
+                self._on_burst(burst.burst(self._memory), False)
             self.bursts.put(burst)
 
     def _report_loss(self, frame: Frame) -> None:
@@ -285,7 +281,7 @@ class Grabber:
             return
         self._used(reference.burst.n)
         if self._on_burst is not None:
-            self._on_burst(reference.burst)
+            self._on_burst(reference.burst, True)
         self._frame_counts.add(reference=reference.burst.n)
         self._taker, self._accumulator = None, SumAccumulator(self._plan.burst, memory=self._memory)
         self.references.put(reference)

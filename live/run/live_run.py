@@ -218,18 +218,18 @@ class LiveRun:
         lossy = lossy or self._run_state.health.without_force_s > OLD_S
         return 5 if lossy or not frame_counts.adds_up or not self._run_state.history.ends_with_values else 0
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: Frame, is_reference: bool) -> None:
         health = self._run_state.health
         health.framed(time.monotonic(), self.grabber.fps)
-        if self.grabber.taking_reference:
+        if is_reference:
             health.since_t = frame.t
         if self._recording is not None:
-            self._recording.frame(frame, is_reference=self.grabber.taking_reference)
+            self._recording.frame(frame, is_reference=is_reference)
         self._outputs.frame(frame)
 
-    def _take_burst(self, burst: Burst) -> None:
+    def _take_burst(self, burst: Burst, is_reference: bool) -> None:
         if self._recording is not None:
-            self._recording.burst(burst, is_reference=self.grabber.taking_reference)
+            self._recording.burst(burst, is_reference=is_reference)
 
     def _idle(self, words: str) -> None:
         """Called between bursts; ends a timed run whose camera gives no frames."""

@@ -168,32 +168,31 @@ def test_a_defect_of_the_grab_thread_is_told_as_one() -> None:
 
 
 def test_frames_after_a_retake_are_a_reference_and_the_begun_burst_is_left_out() -> None:
-    state = RunState.new(0.5)
-    grabber = Grabber(ListCamera([]), GrabPlan(2, 2), state)
+    state, roles = RunState.new(0.5), list[tuple[int, bool]]()
+    grabber = Grabber(
+        ListCamera([]), GrabPlan(2, 2), state, lambda one, role: roles.append((one.index, role))
+    )
     for k in range(5):
         grabber._take(frame(k))
-    assert (state.frame_counts.reference, grabber.taking_reference) == (2, False)
     grabber.take_reference()
-    assert grabber.taking_reference
-    grabber._take(frame(5))
-    assert grabber.taking_reference
-    grabber._take(frame(6))
-    assert not grabber.taking_reference
+    for k in range(5, 8):
+        grabber._take(frame(k))
+    assert roles == [(k, k in (0, 1, 5, 6)) for k in range(8)]
     assert [grabber.references.get().burst.first_index for _ in range(2)] == [0, 5]
     counts = state.frame_counts
-    assert (counts.grabbed, counts.reference, counts.left_out) == (7, 4, 1), "the fifth frame is of no burst"
+    assert (counts.grabbed, counts.reference, counts.left_out) == (8, 4, 1), "the fifth frame is of no burst"
 
 
 def test_a_mean_is_made_of_each_burst_where_bursts_are_recorded() -> None:
-    made: list[tuple[int, int]] = []
+    made: list[tuple[int, int, bool]] = []
     grabber = Grabber(
         ListCamera([]), GrabPlan(2, 3), RunState.new(0.5),
-        on_burst=lambda burst: made.append((burst.first_index, burst.n)),
+        on_burst=lambda burst, role: made.append((burst.first_index, burst.n, role)),
     )  # fmt: skip
     for k in range(8):
         grabber.bursts.get(0)
         grabber._take(frame(k))
-    assert made == [(0, 3), (3, 2), (5, 2)]
+    assert made == [(0, 3, True), (3, 2, False), (5, 2, False)]
 
 
 def test_a_queue_of_bursts_that_waits_for_its_reader_is_that_of_files() -> None:

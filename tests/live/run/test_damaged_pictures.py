@@ -17,7 +17,7 @@ def grabbed(frames: list[Any]) -> tuple[RunState, Grabber, list[Any]]:
     """What comes of frames 0.05 s apart, by a reference of 2 and bursts of 2."""
     state, seen = RunState.new(0.5), []
     camera = ListCamera(frames, live=True)
-    grabber = Grabber(camera, GrabPlan(2, 2), state, seen.append)
+    grabber = Grabber(camera, GrabPlan(2, 2), state, lambda one, role: seen.append(one))
     with camera:
         grabber.start()
         grabber.join()

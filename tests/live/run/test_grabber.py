@@ -49,7 +49,7 @@ def grabbed(camera: ListCamera, *, burst: int = 2, reference: int = 4, seconds: 
     run_state, seen = RunState.new(0.5), []
     frame_counts, event_log = run_state.frame_counts, run_state.event_log
     plan = GrabPlan(burst, reference, math.inf if seconds is None else seconds)
-    grabber = Grabber(camera, plan, run_state, seen.append)
+    grabber = Grabber(camera, plan, run_state, lambda frame, role: seen.append(frame))
     grabber.start()
     bursts: list[SummedBurst] = []
     while not grabber.bursts.finished:
@@ -134,7 +134,7 @@ def test_a_gap_that_is_open_at_the_end_is_counted(
     camera.info = replace(camera.info, fps=10.0)
     run_state = RunState.new(0.5)
 
-    def take(one: Frame) -> None:
+    def take(one: Frame, is_reference: bool) -> None:
         now[0] += 7.0 if one.index == 3 else 0.1
 
     grabber = Grabber(camera, GrabPlan(1, 1), run_state, take)

@@ -104,7 +104,7 @@ def test_commands_that_change_nothing_are_refused_and_others_are_events() -> Non
         (EventKind.NOTE, "slipped"), (EventKind.NEW_REFERENCE, "a new reference is taken from the next frames"),
         (EventKind.ALARM, "silenced: a"),
     ]  # fmt: skip
-    assert bench.run.grabber.taking_reference
+    assert bench.run.grabber._retake.is_set()
 
 
 def test_a_frame_is_of_a_reference_until_that_is_complete() -> None:
