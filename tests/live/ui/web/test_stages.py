@@ -413,6 +413,7 @@ def test_front_and_back_of_a_test_with_two_cameras(browser: Any, tmp_path: Path)
         rows = page.page.locator("#sides li").all_text_contents()
         assert rows[0].startswith("mean: axial")
         assert [row.endswith("lost 0") for row in rows if row.startswith(("front1", "back1"))] == [True, True]
+        page.until(lambda: "Rm" in page.text("sides"), "a strength, which a test of a few bursts has not")
         page.press("q")
         page.confirm()
         page.until(lambda: page.stage() == "after", "the result")
