@@ -1,8 +1,8 @@
 """What a load cell is, and the force over time.
 
 ``contract`` is the contract of load cells and opens an address, ``load_log`` gives the force at a time,
-``zeroed`` counts it from another force, ``shared`` gives one load cell to several tests, ``check`` judges rate, noise
-and gaps, ``calibration`` converts readings to newtons.
+``zeroed`` counts it from another force, ``check`` judges rate, noise and gaps, ``calibration`` converts readings to
+newtons.
 """
 
 from acquire.load_cell import calibration, check
@@ -11,7 +11,6 @@ from acquire.load_cell.calibration import load as load_calibration
 from acquire.load_cell.check import LoadStillness, stillness
 from acquire.load_cell.contract import LOAD_CELLS, LoadCell, open_load_cell
 from acquire.load_cell.load_log import LoadLog
-from acquire.load_cell.shared import SharedLoadCell
 from acquire.load_cell.zeroed import ZeroedLoadCell
 
 __all__ = [
@@ -20,7 +19,6 @@ __all__ = [
     "LoadCell",
     "LoadLog",
     "LoadStillness",
-    "SharedLoadCell",
     "ZeroedLoadCell",
     "calibration",
     "check",

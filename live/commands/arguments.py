@@ -75,10 +75,10 @@ COMMANDS = {
     ),
     "report": Entry("live.commands.report", "report one or several finished runs as a page: HTML, PDF"),
     "characterise": Entry(
-        "live.characterise.command",
-        "measure the accuracy: the paper reproduced, peers, or your own pattern",
+        "live.commands.characterise",
+        "measure the accuracy that your own pattern allows",
     ),
-    "inspect": Entry("live.characterise.inspect", "show one ZOI of a session: its spectrum and phases"),
+    "inspect": Entry("live.commands.inspect", "show one ZOI of a session: its spectrum and phases"),
     "init": Entry(
         "live.commands.init", "find devices and specimen and write a rig.toml: region, ZOIs, gauges"
     ),

@@ -13,8 +13,7 @@ from live.config.loading import Config
 from live.pipeline.screen import Screen
 from live.run.control import ControlPort, Controls
 from live.run.keyboard import listen
-from live.run.live_run import INTERRUPTED
-from live.run.outcome import StopSignal
+from live.run.outcome import INTERRUPTED, StopSignal
 from live.ui.rerun.view import has_display
 
 if TYPE_CHECKING:

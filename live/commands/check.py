@@ -28,8 +28,8 @@ from live.commands.options import (
     require_new,
 )
 from live.commands.signals import interrupts
+from live.config.cameras import camera_configs
 from live.config.loading import Config
-from live.config.sides import second_camera, side_configs
 from live.setup.check.budget import budget_lines
 from live.setup.check.check_list import CheckFigures, examine, table_lines
 from live.setup.check.disk import disk_lines, write_rate
@@ -76,7 +76,7 @@ def command(arguments: argparse.Namespace) -> int:
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (see phasedic devices)")
     target = None if arguments.target is None else arguments.target * 1e-6
-    cameras = {"": config} if second_camera(config) is None else side_configs(config, overrides(arguments))
+    cameras = camera_configs(config, overrides(arguments))
     snapshots = {name: _snapshot_of(name, arguments.snapshot) for name in cameras}
     for path in filter(None, snapshots.values()):
         require_new(path, *PICTURES)
@@ -84,7 +84,7 @@ def command(arguments: argparse.Namespace) -> int:
     if arguments.watch:
         first, one = next(iter(cameras.items()))
         if first:
-            screen.print(f"--watch looks at the {first} only; without it both cameras are checked")
+            screen.print(f"--watch looks at the {first} only; without it all cameras are checked")
         with interrupts() as stop:
             figures = watch(one, target, screen, stop.is_set)
         rate = write_rate(figures.stack, config)

@@ -26,7 +26,7 @@ from analysis.evaluate import AreaStrain
 from analysis.field import Status, StrainField, Sums
 from live.commands.exit_codes import LOSS
 from live.commands.options import add_measure, add_options, configured
-from live.commands.run import print_outcome, run_attended
+from live.commands.run import finish, run_attended
 from live.config.loading import Config
 from live.config.values import AUTO
 from live.pipeline.consumer import Consumer
@@ -82,8 +82,9 @@ def command(arguments: argparse.Namespace) -> int:
     collector, operator = MeansCollector(), Operator(config.output.seconds)
     # The whole picture is specimen: it is only looked at where gauges are to be placed.
     with located(config, screen.print) if config.measure.gauges == AUTO else nullcontext(config) as config:
-        outcome = run_attended(config, screen, [collector, operator], operator.attend)
-    print_outcome(outcome, screen, verbose=arguments.verbose)
+        test = run_attended({"": config}, screen, {"": [collector, operator]}, operator.attend)
+    finish(test, screen, verbose=arguments.verbose)
+    outcome = test.cameras[""]
     if outcome.rig.specimen is None or not collector.measurements:
         return outcome.exit_code
     code = compare(outcome, collector, config, screen.print)

@@ -40,10 +40,11 @@ def add_options(parser: argparse.ArgumentParser, title: str, *names: str) -> Non
             words = f"do not {words}" if option.off else words
             group.add_argument(f"--{name}", dest=key, action="store_const", const=option.on, help=words)
             continue
-        if field.default not in (None, ""):
+        if field.default not in (None, "", ()):
             words += f" (default {field.default})"
         shape = {"metavar": option.metavar} if option.metavar else {"choices": check.words}
-        group.add_argument(f"--{name}", dest=key, type=_reader(check.read), help=words, **shape)
+        again: Any = {"action": "append"} if option.many else {}
+        group.add_argument(f"--{name}", dest=key, type=_reader(check.read), help=words, **shape, **again)
 
 
 def _reader(read: Any) -> Any:

@@ -17,8 +17,8 @@ from live.commands.options import OUTPUT, add_measure, add_options, overrides
 from live.commands.report import write_report
 from live.commands.run import OTHER_PROGRAMS, RECORDING, run_with_page
 from live.commands.signals import signals
-from live.config.loading import Config, load_config
-from live.config.sides import second_camera, side_configs
+from live.config.cameras import camera_configs
+from live.config.loading import load_config
 from live.pipeline.screen import Screen
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.web.page_controller import PageController
@@ -65,7 +65,8 @@ def serve(
     message = ""
     while not interrupted.is_set() and (config := controller.set_up(message)) is not None:
         try:
-            folder, code = _run(controller, config, given, screen)
+            configs = camera_configs(config, given, controller.others)
+            folder, code = run_with_page(controller, configs, screen)
         except PhasedicError as error:
             message = brief(error)
             screen.print(f"the test did not begin: {message}")
@@ -79,15 +80,3 @@ def serve(
         controller.reported(report if report.exists() else None, why)
         if not controller.after():
             return
-
-
-def _run(
-    controller: PageController, config: Config, given: Mapping[str, Any], screen: Screen
-) -> tuple[Path, int]:
-    """One test, with one camera or two; its folder and exit code."""
-    if second_camera(config) is not None:
-        from live.commands.two_cameras import run_sides_with_page
-
-        return run_sides_with_page(controller, side_configs(config, given, controller.second), screen)
-    outcome = run_with_page(controller, config, screen)
-    return outcome.folder, outcome.exit_code

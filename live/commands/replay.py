@@ -23,11 +23,11 @@ from live.commands.options import (
 )
 from live.commands.sides import TABLE, put_together
 from live.commands.signals import signals
-from live.config.sides import BACK, FRONT, SIDES
+from live.config.cameras import BACK, FRONT, SIDES
 from live.pipeline.screen import Screen
 from live.results.folder import check_folder, make_folder
+from live.ui.terminal.cameras_screen import CamerasScreen
 from live.ui.terminal.screen import TerminalScreen
-from live.ui.terminal.sides import SidesScreen
 from live.ui.terminal.summary import print_summary
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic replay``."""
     parser.add_argument(
         "source",
-        help="folder of a run (of one camera or two), session.h5, pictures in a folder, 'files:shots/*.tif' or"
+        help="folder of a run (of one camera or several), session.h5, pictures in a folder, 'files:shots/*.tif' or"
         " 'video:file.mp4'",
     )
     add_as_measured(parser)
@@ -57,7 +57,7 @@ def command(arguments: argparse.Namespace) -> int:
     from live.commands.report import write_report
     from live.replay.replay import replay
     from live.replay.source import ReplayRequest
-    from live.results.sides.folder import recorded_sides_in
+    from live.results.sides.folder import recorded_cameras_in
 
     request = ReplayRequest(
         source=in_picture_order(arguments.source, arguments.picture_order),
@@ -70,8 +70,8 @@ def command(arguments: argparse.Namespace) -> int:
         forces=Path(arguments.forces) if arguments.forces else None,
     )
     screen, stopping = TerminalScreen(), threading.Event()
-    if names := recorded_sides_in(Path(arguments.source)):
-        return _replay_sides(request, names, screen, stopping)
+    if names := recorded_cameras_in(Path(arguments.source)):
+        return _replay_cameras(request, names, screen, stopping)
     with signals(stopping.set, screen.print):
         done = replay(request, screen, stopping, standard_consumers(screen))
     report = done.config.output.report
@@ -99,10 +99,10 @@ def _ended(code: int, screen: Screen) -> int:
     return code
 
 
-def _replay_sides(
-    request: ReplayRequest, names: tuple[str, str], screen: Screen, stopping: threading.Event
+def _replay_cameras(
+    request: ReplayRequest, names: tuple[str, ...], screen: Screen, stopping: threading.Event
 ) -> int:
-    """Replay both cameras of a test, one after the other; front and back are put together."""
+    """Replay the cameras of a test, one after the other; front and back are put together."""
     from live.commands.consumers import standard_consumers
     from live.commands.report import write_report
     from live.replay.replay import replay
@@ -114,14 +114,14 @@ def _replay_sides(
     folder = make_folder(given.get("output.dir"), datetime.datetime.now(datetime.UTC))
     with signals(stopping.set, screen.print):
         for name in names:
-            side = SidesScreen(screen).side(name)
+            own_screen = CamerasScreen(screen).of(name)
             own = replace(
                 request,
                 source=str(Path(request.source) / name / SESSION),
                 overrides={**given, "output.dir": str(folder / name)},
             )
-            done = replay(own, side, stopping, standard_consumers(side))
-            _print(done, side)
+            done = replay(own, own_screen, stopping, standard_consumers(own_screen))
+            _print(done, own_screen)
             codes.append(done.exit_code)
     if names == SIDES:
         put_together(folder / FRONT, folder / BACK, folder / TABLE, screen)

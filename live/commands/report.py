@@ -11,17 +11,17 @@ from pathlib import Path
 from acquire.errors import ConfigError, PhasedicError
 from live.commands.more_gauges import add_gauges
 from live.commands.options import add_gauge_option
-from live.config.sides import SIDES
+from live.config.cameras import BACK, FRONT, SIDES
 from live.pipeline.screen import Screen
 from live.results.export.atomic_file import check_free, new_file
 from live.results.finished.figures_file import FILE, FiguresFile
 from live.results.quantities import Display
+from live.results.report.cameras import report_of_fields, report_of_sides
 from live.results.report.comparison import compare, tests_of, write_table
 from live.results.report.report import Report, ReportRequest, make_report
 from live.results.report.saving import NO_BROWSER, find_browser, save_figures, save_page, save_pdf
-from live.results.report.sides import report_of_fields, report_of_sides
 from live.results.run_folder import RunFolder, open_run
-from live.results.sides.folder import sides_in
+from live.results.sides.folder import cameras_in
 from live.ui.terminal.screen import TerminalScreen
 
 
@@ -56,8 +56,8 @@ def command(arguments: argparse.Namespace) -> int:
     screen = TerminalScreen()
     if arguments.pdf and find_browser() is None:
         raise ConfigError(f"--pdf: {NO_BROWSER}")
-    if arguments.run and not arguments.compare and sides_in(Path(arguments.run)):
-        return _of_sides(Path(arguments.run), arguments, screen)
+    if arguments.run and not arguments.compare and cameras_in(Path(arguments.run)):
+        return _of_cameras(Path(arguments.run), arguments, screen)
     with ExitStack() as opened:
         found = [opened.enter_context(open_run(run)) for run in runs]
         for run in found if arguments.more_gauges else ():
@@ -79,37 +79,37 @@ def command(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _of_sides(folder: Path, arguments: argparse.Namespace, screen: Screen) -> int:
-    """Report both sides of a test with two cameras, and each side where it has no report yet."""
+def _of_cameras(folder: Path, arguments: argparse.Namespace, screen: Screen) -> int:
+    """Report a test with several cameras, and each camera where it has no report yet."""
     if arguments.pdf or arguments.more_gauges or arguments.times or arguments.fields:
         raise ConfigError(
-            f"{folder} has two cameras; --pdf, --gauges, --at and --field are for one, such as"
-            f" {folder / (sides_in(folder) or SIDES)[0]}"
+            f"{folder} has several cameras; --pdf, --gauges, --at and --field are for one, such as"
+            f" {folder / cameras_in(folder)[0]}"
         )
     out = Path(arguments.out) if arguments.out else _first_free(folder / "report.html", arguments)
     check_free(*_targets(out, arguments))
-    _save(_report_of_sides(folder, out, screen), out, arguments, screen)
+    _save(_report_of_cameras(folder, out, screen), out, arguments, screen)
     return 0
 
 
-def _report_of_sides(folder: Path, out: Path, screen: Screen) -> Report:
-    sides = sides_in(folder) or SIDES
-    pages = {side: folder / side / "report.html" for side in sides}
-    for side, page in pages.items():
+def _report_of_cameras(folder: Path, out: Path, screen: Screen) -> Report:
+    pages = {name: folder / name / "report.html" for name in cameras_in(folder)}
+    for name, page in pages.items():
         if not page.exists():
-            write_report(folder / side, screen)
-    with open_run(folder / sides[0]) as one, open_run(folder / sides[1]) as other:
-        names = {side: os.path.relpath(page, out.parent) for side, page in pages.items() if page.exists()}
-        if sides == SIDES:
-            return report_of_sides(one, other, names)
-        return report_of_fields(dict(zip(sides, (one, other), strict=True)), names)
+            write_report(folder / name, screen)
+    with ExitStack() as opened:
+        runs = {name: opened.enter_context(open_run(folder / name)) for name in pages}
+        names = {name: os.path.relpath(page, out.parent) for name, page in pages.items() if page.exists()}
+        if tuple(runs) == SIDES:
+            return report_of_sides(runs[FRONT], runs[BACK], names)
+        return report_of_fields(runs, names)
 
 
 def write_report(folder: Path, screen: Screen) -> str:
     """``report.html`` in the folder of a run; an error is printed, returned, and does not affect the run."""
     try:
-        if sides_in(folder):
-            save_page(_report_of_sides(folder, folder / "report.html", screen), folder / "report.html")
+        if cameras_in(folder):
+            save_page(_report_of_cameras(folder, folder / "report.html", screen), folder / "report.html")
             screen.print(f"  {folder / 'report.html'}")
             return ""
         with open_run(folder) as run:

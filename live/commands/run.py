@@ -5,24 +5,31 @@ from __future__ import annotations
 import argparse
 import contextlib
 import queue
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from acquire.errors import PhasedicError
 from live.commands.attended import attended, open_page
 from live.commands.consumers import standard_consumers
-from live.commands.exit_codes import EXIT_WORDS
+from live.commands.exit_codes import EXIT_WORDS, LOSS
 from live.commands.options import add_measure, add_options, configured, overrides
+from live.commands.sides import TABLE, put_together
+from live.config.cameras import BACK, FRONT, camera_configs
 from live.config.loading import Config
-from live.config.sides import second_camera, side_configs
 from live.pipeline.consumer import Consumer
 from live.pipeline.screen import Screen
 from live.results.folder import check_folder
+from live.results.sides.channels import JointChannels
 from live.run.alarms import check_alarms
-from live.run.live_run import LiveRun, run_live
-from live.run.outcome import Outcome, StopSignal
+from live.run.live_run import CameraOfTest, LiveRun, run_cameras
+from live.run.outcome import Outcome, OutcomeOfTest, StopSignal
 from live.setup.devices import check_load_port
 from live.setup.region import located
 from live.ui.rerun.view import rerun_command, spawn_viewer
+from live.ui.terminal.cameras_screen import CamerasScreen
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.terminal.summary import print_summary, trouble_lines
 
@@ -60,39 +67,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic run``."""
     screen, config = TerminalScreen(), configured(arguments)
-    check_alarms(config, both_sides=config.camera.back is not None)
+    configs = camera_configs(config, overrides(arguments))
+    check_alarms(config, both_sides=FRONT in configs)
     check_folder(config.output.dir)
     check_load_port(config.load.address)
-    if second_camera(config) is not None:
-        from live.commands.two_cameras import run_sides
-
-        return run_sides(side_configs(config, overrides(arguments)), screen, page=arguments.page)
-    with located(config, screen.print) as config:
-        outcome = run_and_show_page(config, screen) if arguments.page else run_attended(config, screen)
     if not arguments.page:
-        print_outcome(outcome, screen, verbose=arguments.verbose)
-    return outcome.exit_code
-
-
-def run_and_show_page(config: Config, screen: Screen) -> Outcome:
-    """Run with the operator's page until the run ends."""
+        outcome = run_attended(configs, screen)
+        return finish(outcome, screen, verbose=arguments.verbose)
     from live.ui.web.page_controller import PageController
 
     with PageController(None) as controller:
         open_page(controller, screen)
-        return run_with_page(controller, config, screen)
+        return run_with_page(controller, configs, screen)[1]
 
 
-def run_with_page(controller: PageController, config: Config, screen: Screen) -> Outcome:
-    """One test, shown on the page until its end."""
-    from live.ui.web.run_result import run_result
+def run_with_page(
+    controller: PageController, configs: Mapping[str, Config], screen: Screen
+) -> tuple[Path, int]:
+    """One test, shown on the page until its end; the folder and the exit code."""
+    from live.ui.web.run_result import result_of
 
     controller.viewer = _open_viewer
-    outcome = run_attended(config, screen, [controller.begin(config)], controller.attach)
-    print_outcome(outcome, screen)
-    words = EXIT_WORDS.get(outcome.exit_code, "")
-    controller.end(run_result(outcome.run_state, outcome.test, outcome.folder, words))
-    return outcome
+    shown = {name: [consumer] for name, consumer in controller.begin(configs).items()}
+    outcome = run_attended(configs, screen, shown, controller.attach)
+    code = finish(outcome, screen)
+    controller.end(result_of(outcome.cameras, outcome.folder, EXIT_WORDS.get(code, "")))
+    return outcome.folder, code
 
 
 def _open_viewer(port: int) -> str:
@@ -106,34 +106,74 @@ def _open_viewer(port: int) -> str:
 
 
 def run_attended(
-    config: Config,
+    configs: Mapping[str, Config],
     screen: Screen,
-    consumers: Sequence[Consumer] = (),
+    consumers: Mapping[str, Sequence[Consumer]] = MappingProxyType({}),
     attend: Callable[[LiveRun], None] = lambda live: None,
-) -> Outcome:
-    """Run with signals, keyboard and remote commands; ``attend`` may add controls of its own."""
-    stop, made = StopSignal(), standard_consumers(screen, consumers)
-    with attended(config, screen, stop) as attach:
+) -> OutcomeOfTest:
+    """Run with signals, keyboard and remote commands.
+
+    Parameters
+    ----------
+    configs : mapping of str to Config
+        Of ``live.config.cameras.camera_configs``.
+    screen : Screen
+    consumers : mapping of str to a sequence of Consumer, optional
+        Beside the standard ones, by camera.
+    attend : callable taking the LiveRun, optional
+        May add controls of its own.
+    """
+    every, stop = CamerasScreen(screen), StopSignal()
+    leading, joint = next(iter(configs)), JointChannels() if FRONT in configs else None
+    with ExitStack() as stack:
+        cameras = {}
+        for name, config in configs.items():
+            own = every.of(name)
+            found = stack.enter_context(located(config, own.print))
+            made = standard_consumers(own, consumers.get(name, ()), joint if name == leading else None)
+            cameras[name] = CameraOfTest(found, own, made)
+        attach = stack.enter_context(attended(configs[leading], screen, stop))
 
         def on_start(live: LiveRun) -> None:
+            every.attach(live.states)
+            if joint is not None:
+                joint.attach(live.states, live=live.live)
             attach(live)
             attend(live)
 
-        return run_live(config, screen, stop=stop, consumers=made, on_start=on_start)
+        return run_cameras(cameras, stop=stop, on_start=on_start)
 
 
-def print_outcome(outcome: Outcome, screen: Screen, *, verbose: bool = False) -> None:
-    """Print the summary, the frame counts, the losses and where the files are."""
+def finish(outcome: OutcomeOfTest, screen: Screen, *, verbose: bool = False) -> int:
+    """Print the summaries, put sides together, and report where that is asked for; the exit code."""
+    every, code = CamerasScreen(screen), outcome.exit_code
+    several, report = len(outcome.cameras) > 1, next(iter(outcome.cameras.values())).config.output.report
+    for name, one in outcome.cameras.items():
+        print_outcome(one, every.of(name), verbose=verbose, with_report=report and not several)
+    if several:
+        screen.print()
+    if FRONT in outcome.cameras:
+        try:
+            put_together(outcome.folder / FRONT, outcome.folder / BACK, outcome.folder / TABLE, screen)
+        except PhasedicError as error:
+            screen.print(f"warning: front and back were not put together: {error}")
+            code = code or LOSS
+    if report:
+        from live.commands.report import write_report
+
+        write_report(outcome.folder, screen)
+    if code in EXIT_WORDS:
+        screen.print(f"exit code {code}: {EXIT_WORDS[code]}")
+    return code
+
+
+def print_outcome(
+    outcome: Outcome, screen: Screen, *, verbose: bool = False, with_report: bool = False
+) -> None:
+    """Print the summary of one camera, the frame counts, the losses and where the files are."""
     run_state, folder = outcome.run_state, outcome.folder
     lines = [*trouble_lines(run_state, outcome.outputs.reports, verbose=verbose)]
     rrd = folder / "view.rrd"
     if verbose and rrd.exists():
         lines.append(f"open the recorded view with: {rerun_command()} {rrd}")
-    report = outcome.config.output.report
-    print_summary(screen, run_state, outcome.test, folder, lines, verbose=verbose, with_report=report)
-    if report:
-        from live.commands.report import write_report
-
-        write_report(folder, screen)
-    if outcome.exit_code in EXIT_WORDS:
-        screen.print(f"exit code {outcome.exit_code}: {EXIT_WORDS[outcome.exit_code]}")
+    print_summary(screen, run_state, outcome.test, folder, lines, verbose=verbose, with_report=with_report)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from live.config.sides import BACK, FRONT
+from live.config.cameras import BACK, FRONT
 from live.pipeline.screen import Screen
 from live.ui.terminal.screen import TerminalScreen
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from live.config.values import (
+    ADDRESSES,
     AUTO,
     BOX,
     COVARIANCE,
@@ -48,9 +49,9 @@ class CameraConfig:
         "camera behind the specimen: its rig file, whose sections camera, measure, scale, gauges and plate are those of"
         " the back; or its address, with the settings of the front",
         Option("back", "FILE.toml|ADDRESS"))
-    beside: str | None = key(TEXT, None,
-        "camera of another field of the specimen, as back: measured together, without a mean",
-        Option("beside", "FILE.toml|ADDRESS"))
+    beside: tuple[str, ...] = key(ADDRESSES, (),
+        "camera of another field of the specimen, as back: measured together, without a mean; up to seven",
+        Option("beside", "FILE.toml|ADDRESS", many=True))
     crop: tuple[int, int, int, int] | None = key(BOX, None,
         "x, y, width, height of the part of the picture to use, px; its corner is the origin of all coordinates",
         Option("crop", "X,Y,W,H", expert=True))

@@ -53,6 +53,8 @@ class Option:
         A switch that turns the key off, or on.
     expert : bool
         Only ``--help-all`` shows it.
+    many : bool
+        May be given several times.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Option:
     off: bool = False
     on: bool = False
     expert: bool = False
+    many: bool = False
 
 
 def key(check: Check, default: Any, help_text: str, option: Option | None = None) -> Any:
@@ -258,6 +261,16 @@ def _names(value: Any) -> tuple[str, ...]:
     return tuple(_text(name) for name in value)
 
 
+def _addresses(value: Any) -> tuple[str, ...]:
+    given = [value] if isinstance(value, str) else value
+    if not isinstance(given, list | tuple) or len(given) > MAX_BESIDE:
+        raise NotAllowed(f"an address or a rig file in quotes, or up to {MAX_BESIDE} of them in brackets")
+    return tuple(_text(one) for one in given)
+
+
+MAX_BESIDE = 7
+ADDRESSES = Check(_addresses)
+"""Of further cameras: one, or several in brackets."""
 LENS_PARAMETERS = 8
 COVARIANCE = Check(_covariance)
 """Of the parameters of a lens."""

@@ -21,13 +21,12 @@ from acquire.addresses import parse_address
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind, EventSink
-from acquire.frame import Burst
+from acquire.frame import Burst, Frame
 from acquire.opencv.images import picture_times
 from acquire.printable import counted
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
 from live.pipeline.consumer import Compose, RunInfo
-from live.pipeline.consumer_thread import Outputs
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
 from live.pipeline.run_state import FrameCounts, RunState
@@ -46,6 +45,9 @@ from live.results.writer import write_results
 from live.setup.devices import open_rig
 from live.setup.pictures import with_film, with_mask
 from live.setup.region import is_auto_region
+from live.stream.adapted import Outputs
+from live.stream.state_keeper import StateKeeper
+from live.stream.stream import Stream
 
 _MOST_TOLD = 5  # pictures that were left out, in the summary
 
@@ -207,18 +209,22 @@ def _run(
         deferred=request.final_folder is not None,
     )
     made = with_force_watch(consumers(about, run_state), run_state)
-    outputs = Outputs(made, run_state.loads, event_log, run_state.history)
+    stream = Stream()
+    stream.add(StateKeeper(run_state, ""))
+    outputs = Outputs(made, run_state.loads, event_log, stream)
+    event_log.add_listener(stream.publish)
     began, work = time.perf_counter(), prefetch(bursts)
     failures = BurstFailures(run_state, folder)
     try:
-        _pass_on_recorded(source, outputs)
+        _publish_recorded(source, stream)
         for m in measured(
             _counted(work, run_state.frame_counts), source.loads, run_state.event_log, failures
         ):
             run_state.frame_counts.add(measured=m.burst.n)
-            if outputs.wants_frames:
-                outputs.frame(picture_of(m.burst))
-            screen.progress(outputs.add(m), m.number + 1, source.expected, time.perf_counter() - began)
+            if stream.wants(Frame):
+                stream.publish(picture_of(m.burst))
+            stream.publish(m)
+            screen.progress(m.time_step, m.number + 1, source.expected, time.perf_counter() - began)
             del m  # frees its pictures before the next burst is measured
             if stopping.is_set():
                 break
@@ -315,10 +321,10 @@ def _after(first: list[Work], rest: Iterator[Work]) -> Iterator[Work]:
     yield from rest
 
 
-def _pass_on_recorded(source: ReplaySource, outputs: Outputs) -> None:
-    """Pass the recorded events and load samples to the outputs."""
+def _publish_recorded(source: ReplaySource, stream: Stream) -> None:
+    """Publish the recorded events and load samples."""
     for event in source.events:
         if event.kind is not EventKind.MEASURED:
-            outputs.event(event)
+            stream.publish(event)
     for sample in source.samples:
-        outputs.load(sample)
+        stream.publish(sample)

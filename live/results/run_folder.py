@@ -26,9 +26,9 @@ from acquire.record_mode import Crop
 from acquire.session import Session
 from analysis.evaluate import Curve, LoadAxis, load_axis
 from analysis.field import StrainField
+from live.config.cameras import FIELDS, SIDES
 from live.config.loading import from_dict
 from live.config.sections import SpecimenConfig
-from live.config.sides import FIELDS, SIDES
 from live.pipeline.history import curve_of
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.results.pictures import Image, Pictures, of_images, of_session
@@ -325,6 +325,6 @@ def open_run(path: str | os.PathLike[str]) -> RunFolder:
     if not file.exists():
         sides = [path / side for side in (*SIDES, *FIELDS) if (path / side / STRAIN).exists()]
         if sides:
-            raise DataError(f"{path}: a test with two cameras; give the folder of one, {sides[0]}")
+            raise DataError(f"{path}: a test with several cameras; give the folder of one, {sides[0]}")
         raise DataError(f"{path}: no {STRAIN} there; give the folder that phasedic run or replay wrote")
     return RunFolder(file.parent, Strain.open(file))

@@ -1,280 +1,188 @@
-"""A live run: devices, threads and outputs joined.
+"""A live test: devices, cameras and outputs joined by one stream.
 
-Threads: grab (``Grabber``), load (``LoadThread``), record (``Recorder``), measure (``MeasureThread``) and
-one for each consumer that may block. The measuring thread takes bursts in order, and the newest where it is
-late (``LatestQueue``).
+Threads: grab, record and measure of each camera (``camera_run``), load (``load_source``), and one for each consumer
+that may block. A test with several cameras is as one with a single camera, each with a name and a folder of its own;
+load cell, clock and commands are those of all.
 """
 
 from __future__ import annotations
 
-import json
+import datetime
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from acquire.errors import PhasedicError
-from acquire.events import EventKind
-from acquire.frame import Burst, Frame
+from acquire.errors import ConfigError
+from acquire.events import EventKind, Level
+from acquire.load_cell import LoadCell
+from live.config.cameras import FRONT
 from live.config.loading import Config
-from live.pipeline.consumer import Compose, RunInfo
-from live.pipeline.consumer_thread import Outputs
-from live.pipeline.latency import LatencyMonitor
+from live.pipeline.consumer import Compose
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
-from live.pipeline.timed.figure import OLD_S
-from live.pipeline.timed.force_watch import with_force_watch
-from live.results.finished.figures_file import finished
-from live.results.finished.finished_test import reference_force
+from live.results.folder import make_folder
 from live.results.writer import write_results
-from live.run.burst_queue import TAKING, BurstQueue
-from live.run.control import ControlRefused
-from live.run.grabber import Grabber, GrabPlan, memory_of_measured
-from live.run.load_thread import LoadThread, tare_controls
-from live.run.measuring import MeasureThread
-from live.run.outcome import Outcome, StopSignal
-from live.run.pre_trigger import PreTriggerBuffer
+from live.run.camera_run import CameraRun
+from live.run.control import ControlRefused, TareControl
+from live.run.load_source import LoadSource
+from live.run.outcome import Outcome, OutcomeOfTest, StopSignal
 from live.run.prepared_run import PreparedRun, new_run_state, set_up
-from live.run.recorder import open_recording
-from live.setup.devices import Rig, check_load_sign, open_rig
-
-_ARMED = "; nothing is recorded until the command start"
-_SILENT_S = 1.0
-_HINT_AFTER = 3  # times the frames of a reference
-INTERRUPTED = "interrupted"
-"""The reason to stop that gives exit code 130."""
-TIME_IS_OVER = "the time is over"
+from live.setup.devices import Rig, open_rigs
+from live.stream.stream import Stream
 
 
 class LiveRun:
     """A test: entering it starts the threads, leaving it closes everything.
 
-    It carries out commands (``live.run.control.Controls``) from any thread.
+    It carries out commands (``live.run.control.Controls``) from any thread; a camera that has ended takes none.
 
     Parameters
     ----------
-    prepared : PreparedRun
-    run_state : RunState
-    outputs : Outputs
-    recording : PreTriggerBuffer or None
-        None: nothing is recorded.
-    screen : Screen
+    cameras : mapping of str to CameraRun
+        By name; the first of them has alarms and strain outputs.
+    load : LoadCell
+        Of all cameras.
+    folder : Path
+        Of the files of the test.
+    stream : Stream
     stop : StopSignal
     """
 
     def __init__(
-        self,
-        prepared: PreparedRun,
-        run_state: RunState,
-        outputs: Outputs,
-        recording: PreTriggerBuffer | None,
-        screen: Screen,
-        stop: StopSignal,
+        self, cameras: Mapping[str, CameraRun], load: LoadCell, folder: Path, stream: Stream, stop: StopSignal
     ) -> None:
-        self._prepared, self._run_state, self._outputs = prepared, run_state, outputs
-        self._recording, self._screen, self._stop = recording, screen, stop
-        self._rig = prepared.rig
-        self._plan = GrabPlan.of(prepared.config, prepared.bursts)
-        on_burst = self._take_burst if recording is not None and recording.takes_bursts else None
-        self.grabber = Grabber(self._rig.camera, self._plan, run_state, self._take, on_burst)
-        run_state.health.began_t, self._hinted = time.monotonic(), False
-        self._has_recorded = self.recording
-        memory = memory_of_measured(self._rig.camera.info, self._plan)
-        self._burst_queue = BurstQueue(self.grabber, run_state.frame_counts, self._idle, memory)
-        self._load = LoadThread(self._rig.load, run_state, outputs, recording)
-        self._tares = tare_controls(self._rig.load, run_state)
-        latency = LatencyMonitor(lambda: recording.backlog if recording else 0.0)
-        self._measure_thread = MeasureThread(
-            prepared, run_state, outputs, self._burst_queue, latency, self._show
+        self.cameras, self.folder, self._load, self._stop = cameras, folder, load, stop
+        self._load_source = LoadSource(load, stream)
+        self._tares = TareControl(
+            load, self._has_measured, lambda: self.run_state.loads.latest, self._emit, time.monotonic
         )
+        self.run_state.event_log.add_listener(self._tares.take_event)
+
+    def _has_measured(self) -> bool:
+        return any(run.has_measured for run in self.cameras.values())
+
+    def _emit(self, kind: EventKind, source: str, text: str, level: Level) -> None:
+        for run in self._running:
+            run.run_state.event_log.emit(kind, source, text, level)
 
     # -- what may be called from other threads ------------------------------------------------
 
     @property
+    def first(self) -> CameraRun:
+        """The run of the leading camera."""
+        return next(iter(self.cameras.values()))
+
+    @property
+    def _running(self) -> list[CameraRun]:
+        """Those that go on; all again when all have ended."""
+        every = list(self.cameras.values())
+        return [run for run in every if run.running] or every
+
+    @property
     def paused(self) -> bool:
         """Whether measuring is paused."""
-        return self._burst_queue.paused
+        return self._running[0].paused
 
     @property
     def recording(self) -> bool:
-        """Whether frames are recorded; not after the recording has failed, as on a full disk."""
-        recording = self._recording
-        return recording is not None and recording.on and recording.failed is None
+        """Whether frames of every camera that goes on are recorded."""
+        return all(run.recording for run in self._running)
 
     @property
     def live(self) -> bool:
-        """Whether the camera is there now; else its pictures are recorded."""
-        return self._rig.camera.info.live
+        """Whether the cameras are there now; else their pictures are recorded."""
+        return self._running[0].live
 
     @property
     def rig(self) -> Rig:
-        """The devices."""
-        return self._rig
+        """The devices of the first camera."""
+        return self.first.rig
 
     @property
     def run_state(self) -> RunState:
-        """Events, counts, loads and history of the test so far."""
-        return self._run_state
+        """Events, counts, loads and history of the first camera so far."""
+        return self.first.run_state
 
     @property
-    def folder(self) -> Path:
-        """Of the files."""
-        return self._prepared.folder
+    def states(self) -> dict[str, RunState]:
+        """That of each camera."""
+        return {name: run.run_state for name, run in self.cameras.items()}
 
     def stop(self, reason: str) -> None:
-        """End the run cleanly, soon."""
+        """End the test cleanly, soon."""
         self._stop.request(reason)
 
     def command(self, kind: EventKind, note: str = "") -> str:
-        """Carry out a command of the operator and log it; raises ControlRefused where that is not possible."""
+        """Carry out a command on every camera that goes on; a tare is one for all.
+
+        Raises
+        ------
+        ControlRefused
+            No camera carries it out.
+        """
         if kind is EventKind.TARE:
             return self._tares.tare(note)
-        if kind in (EventKind.PAUSE, EventKind.RESUME):
-            self._pause(kind is EventKind.PAUSE)
-        elif kind is EventKind.NEW_REFERENCE:
-            self._emit(kind, "a new reference is taken from the next frames")
-            self.grabber.take_reference()
-        elif kind is EventKind.NOTE:
-            self._emit(kind, note)
-        elif kind is EventKind.ALARM:
-            self._silence()
-        elif kind is EventKind.RECORD:
-            if self._recording is None:
-                raise ControlRefused("this run records nothing (--no-record)")
-            text = self._recording.command(note)
-            self._has_recorded = True
-            return text
-        return ""
-
-    def _pause(self, wanted: bool) -> None:
-        if wanted is self._burst_queue.paused:
-            raise ControlRefused("measuring is paused already" if wanted else "measuring is not paused")
-        kind = EventKind.PAUSE if wanted else EventKind.RESUME
-        self._emit(kind, "measuring is paused" if wanted else "measuring goes on")
-        self._burst_queue.paused = self._run_state.health.paused = wanted
-        self._run_state.health.since_t = time.monotonic()
-
-    def _silence(self) -> None:
-        names = self._run_state.alarms.silence() + self._run_state.faults.silence()
-        if not names:
-            raise ControlRefused("no alarm is on")
-        self._emit(EventKind.ALARM, f"silenced: {', '.join(names)}")
-
-    def _emit(self, kind: EventKind, text: str) -> None:
-        self._run_state.event_log.emit(kind, "operator", text)
+        answers, refused = [], ControlRefused()
+        for run in self._running:
+            try:
+                answers.append(run.command(kind, note))
+            except ControlRefused as error:
+                refused = error
+        if not answers:
+            raise refused
+        return answers[0]
 
     # -- the run ------------------------------------------------------------------------------
 
     def __enter__(self) -> LiveRun:
-        with ExitStack() as stack:
-            stack.enter_context(self._rig.camera)
-            stack.enter_context(self._rig.load)
-            self._stop.on_request(self._rig.camera.stop)
-            self._run_state.health.began_t = time.monotonic()
-            waits = "" if self.recording or self._recording is None else _ARMED
-            self._run_state.health.state = self.state
-            self._run_state.event_log.emit(EventKind.START, "phasedic", f"the test begins{waits}")
-            self._load.start()
-            self.grabber.start()
-            stack.pop_all()
+        with ExitStack() as opened:
+            for run in self.cameras.values():
+                opened.enter_context(run.rig.camera)
+                self._stop.on_request(run.rig.camera.stop)
+            opened.enter_context(self._load)
+            for run in self.cameras.values():
+                run.begin()
+            self._load_source.start()
+            for run in self.cameras.values():  # no camera gives frames before all are open
+                run.start()
+            opened.pop_all()
         return self
 
     def wait(self) -> None:
-        """Measure until the camera has ended; raises where the start has failed."""
-        try:
-            self._measure_thread.run()
-        except PhasedicError:
-            self.stop("the start failed")
-            raise
+        """Measure until all cameras have ended; raises PhasedicError where the start has failed."""
+        for run in self.cameras.values():
+            run.start_measuring()
+        for run in self.cameras.values():
+            run.wait()
 
     def __exit__(self, *_: object) -> None:
-        """End all threads and close the devices, whatever happened before; no figure gets old by that."""
-        self._run_state.health.ended = True
-        self._rig.camera.stop()
+        """End all threads and close the devices, whatever happened before: the load last, for the last forces."""
+        for run in self.cameras.values():
+            run.stop_frames()
         self._load.stop()
-        self.grabber.bursts.close()
-        self.grabber.join()
-        if self.grabber.time_is_over:
-            self.stop(TIME_IS_OVER)
-        self._burst_queue.count_skipped()
-        self._load.join()
-        self._run_state.loads.close()
-        self._rig.load.close()
-        self._rig.camera.close()
+        for run in self.cameras.values():
+            run.drain()
+        self._load_source.join()
+        self._load.close()
 
-    @property
-    def exit_code(self) -> int:
-        """The exit code of the run, after it has been left."""
-        error = self.grabber.error
-        if error is not None:
-            return error.exit_code if isinstance(error, PhasedicError) else 1
-        if failure := self._load.failure or self._measure_thread.failure:
-            return failure
-        if self._stop.reason == INTERRUPTED:
-            return 130
-        frame_counts = self._run_state.frame_counts
-        unwritten = self._recording is not None and self._recording.failed is not None
-        lossy = frame_counts.loss or self._outputs.failed or unwritten
-        lossy = lossy or self._run_state.health.without_force_s > OLD_S
-        return 5 if lossy or not frame_counts.adds_up or not self._run_state.history.ends_with_values else 0
 
-    def _take(self, frame: Frame, is_reference: bool) -> None:
-        health = self._run_state.health
-        health.framed(time.monotonic(), self.grabber.fps)
-        if is_reference:
-            health.since_t = frame.t
-        if self._recording is not None:
-            self._recording.frame(frame, is_reference=is_reference)
-        self._outputs.frame(frame)
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraOfTest:
+    """One camera of a test to come.
 
-    def _take_burst(self, burst: Burst, is_reference: bool) -> None:
-        if self._recording is not None:
-            self._recording.burst(burst, is_reference=is_reference)
+    Attributes
+    ----------
+    config : Config
+    screen : Screen
+    consumers : callable taking RunInfo and RunState
+        As of ``run_live``.
+    """
 
-    def _idle(self, words: str) -> None:
-        """Called between bursts; ends a timed run whose camera gives no frames."""
-        now = time.monotonic()
-        silent = not now - self._run_state.health.frame_t < _SILENT_S
-        if words or self.paused:
-            self._show(words if silent or not self._has_measured else "")
-        if words == TAKING:
-            self._hint_once()
-        over = now - self.grabber.begun_t > self._plan.seconds
-        if silent and over and self._rig.camera.info.live and not self._stop.requested:
-            self.stop(TIME_IS_OVER)
-
-    def _hint_once(self) -> None:
-        """A reference needs frames without a gap: warn once where frames are lost again and again."""
-        n, counts = self._prepared.bursts[0], self._run_state.frame_counts
-        if self._hinted or self._has_measured or not counts.lost or counts.grabbed < _HINT_AFTER * n:
-            return
-        self._hinted = True
-        text = (
-            f"no {n} frames in a row for the reference, {counts.lost} were lost: lower the rate of the camera, or take"
-            " --reference-burst smaller"
-        )
-        self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "warning")
-
-    def _show(self, words: str = "") -> None:
-        """Renew the status line; called with every measurement."""
-        self._run_state.health.state = self.state
-        if self._screen.is_due:
-            self._screen.snapshot(self._run_state.snapshot(time.monotonic()), words)
-
-    @property
-    def _has_measured(self) -> bool:
-        return bool(self._run_state.history.time_steps)
-
-    @property
-    def state(self) -> str:
-        """What is done with the frames: "REC", "ARMED" ..."""
-        if self.recording:
-            state = "REC"
-        elif self._recording is not None:
-            state = "NOT RECORDING" if self._has_recorded else "ARMED"
-        else:
-            state = "not recorded"
-        return f"{state}, PAUSED" if self.paused else state
+    config: Config
+    screen: Screen
+    consumers: Compose
 
 
 def run_live(
@@ -285,7 +193,7 @@ def run_live(
     consumers: Compose = write_results,
     on_start: Callable[[LiveRun], object] = lambda live: None,
 ) -> Outcome:
-    """Run a test from opening the devices to closing the files.
+    """Run a test with one camera from opening the devices to closing the files.
 
     Parameters
     ----------
@@ -303,72 +211,90 @@ def run_live(
     ConfigError, DeviceError, DataError
         The start failed; whatever was recorded by then is closed and readable.
     """
-    stop, run_state = stop or StopSignal(), new_run_state(config, screen)
-    check_load_sign(config.load)
-    rig = open_rig(
-        config.camera.address,
-        config.load.address,
-        run_state.event_log,
-        crop=config.camera.crop,
-        zero_N=config.load.zero_N,
-    )
-    try:
-        prepared = set_up(config, rig, run_state.event_log, screen, stop)
-        return run_prepared(prepared, run_state, screen, stop, consumers, on_start)
-    finally:
-        rig.close()
+    camera = CameraOfTest(config, screen, consumers)
+    return run_cameras({"": camera}, stop=stop, on_start=on_start).cameras[""]
 
 
-def run_prepared(
-    prepared: PreparedRun,
-    run_state: RunState,
-    screen: Screen,
-    stop: StopSignal,
-    consumers: Compose,
-    on_start: Callable[[LiveRun], object],
-) -> Outcome:
-    """Run a prepared test to the closing of the files; the devices are left to the caller. As ``run_live``."""
-    rig, grid = prepared.rig, prepared.plan.grid
-    for line in prepared.announcement():
-        screen.print(line)
-    about = RunInfo(prepared.config, prepared.folder, rig.camera.info, grid, prepared.start, stop.request)
-    made = with_force_watch(consumers(about, run_state), run_state)
-    outputs = Outputs(made, run_state.loads, run_state.event_log, run_state.history)
-    code = _with_outputs(prepared, run_state, outputs, screen, stop, on_start)
-    test = finished(
-        prepared.folder, prepared.config, run_state, code, reference_force(run_state.event_log.events())
-    )
-    return Outcome(prepared.folder, prepared.config, run_state, outputs, rig, grid, code, test)
+def run_cameras(
+    cameras: Mapping[str, CameraOfTest],
+    *,
+    stop: StopSignal | None = None,
+    on_start: Callable[[LiveRun], object] = lambda live: None,
+) -> OutcomeOfTest:
+    """Run a test with any number of cameras, the leading one first; parameters and errors as of ``run_live``.
 
-
-def _with_outputs(
-    prepared: PreparedRun,
-    run_state: RunState,
-    outputs: Outputs,
-    screen: Screen,
-    stop: StopSignal,
-    on_start: Callable[[LiveRun], object],
-) -> int:
-    """The run itself; outputs and recording are closed in any case, the recording last, with all events."""
+    A camera that fails in the test leaves the others measuring. One that cannot be opened, or gives no reference,
+    ends the test: it did not begin.
+    """
+    stop, first = stop or StopSignal(), next(iter(cameras.values())).config
+    states = {
+        name: new_run_state(one.config, one.screen, both_sides=FRONT in cameras)
+        for name, one in cameras.items()
+    }
+    sinks = [state.event_log for state in states.values()]
+    opened = open_rigs([one.config.camera for one in cameras.values()], first.load, sinks)
+    rigs = dict(zip(cameras, opened, strict=True))
     with ExitStack() as closing:
-        closing.callback(outputs.end)
-        config = json.dumps(prepared.config.as_dict(), indent=1)
-        (prepared.folder / "config.json").write_text(config, encoding="utf-8")
-        recording = open_recording(prepared, run_state, screen, stop)
-        closing.pop_all()
-        closing.callback(lambda: _close(recording, run_state, outputs, stop))
-        live = LiveRun(prepared, run_state, outputs, recording, screen, stop)
-        with live:
+        for rig in rigs.values():
+            closing.callback(rig.close)
+        folder, configs = _folders(cameras)
+        prepared = {
+            name: set_up(configs[name], rigs[name], states[name].event_log, one.screen, stop)
+            for name, one in cameras.items()
+        }
+        if len(cameras) == 1:
+            folder = next(iter(prepared.values())).folder
+        runs = _run(cameras, _from_one_zero(prepared), states, folder, stop, on_start)
+        return OutcomeOfTest(folder, {name: run.outcome() for name, run in runs.items()})
+
+
+def _folders(cameras: Mapping[str, CameraOfTest]) -> tuple[Path, dict[str, Config]]:
+    """The folder of the test, made where it has several cameras, and configurations with a folder for each in it."""
+    configs = {name: one.config for name, one in cameras.items()}
+    first = next(iter(configs.values()))
+    if len(cameras) == 1:
+        return Path(), configs
+    folder = make_folder(first.output.dir, datetime.datetime.now(datetime.UTC))
+    return folder, {
+        name: replace(config, output=replace(config.output, dir=str(folder / name)))
+        for name, config in configs.items()
+    }
+
+
+def _from_one_zero(prepared: Mapping[str, PreparedRun]) -> dict[str, PreparedRun]:
+    """The same with the time zero of the first; raises ConfigError where the cameras have different clocks."""
+    if len({run.rig.camera.info.clock == "nominal" for run in prepared.values()}) > 1:
+        raise ConfigError(
+            "one camera has nominal times and another a clock; give cameras of one kind, or one alone"
+        )
+    start = next(iter(prepared.values())).start
+    return {name: replace(run, start=start) for name, run in prepared.items()}
+
+
+def _run(
+    cameras: Mapping[str, CameraOfTest],
+    prepared: Mapping[str, PreparedRun],
+    states: Mapping[str, RunState],
+    folder: Path,
+    stop: StopSignal,
+    on_start: Callable[[LiveRun], object],
+) -> dict[str, CameraRun]:
+    """The test itself; outputs and recordings are closed in any case, the recordings last, with all events."""
+    stream = Stream()
+    runs: dict[str, CameraRun] = {}
+    with ExitStack() as closing:
+        for name, one in cameras.items():
+            for line in prepared[name].announcement():
+                one.screen.print(line)
+            run = CameraRun(name, prepared[name], states[name], one.screen, stop, stream, one.consumers)
+            with ExitStack() as failed:
+                failed.callback(run.outputs.end)
+                run.open_recording()
+                failed.pop_all()
+            runs[name] = run
+            closing.callback(run.close)
+        load = next(iter(prepared.values())).rig.load
+        with LiveRun(runs, load, folder, stream, stop) as live:
             on_start(live)
             live.wait()
-    return live.exit_code
-
-
-def _close(
-    recording: PreTriggerBuffer | None, run_state: RunState, outputs: Outputs, stop: StopSignal
-) -> None:
-    outputs.end()
-    reason = stop.reason or "camera ended"
-    run_state.event_log.emit(EventKind.STOP, "phasedic", f"the test ends: {reason}")
-    if recording is not None:
-        recording.close({"stop_reason": reason})
+    return runs

@@ -1,27 +1,31 @@
-"""The end of a run: the signal that stops it from any thread, and its outcome."""
+"""The end of a test: the signal that stops it from any thread, the outcome of each camera, and the exit code."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from live.config.loading import Config
-from live.pipeline.consumer_thread import Outputs
 from live.pipeline.run_state import RunState
 from live.results.finished.finished_test import FinishedTest
 from live.setup.devices import Rig
+from live.stream.adapted import Outputs
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from analysis import ZoiGrid
 
+DEFECT, LOSS, EXIT_INTERRUPTED = 1, 5, 130
+INTERRUPTED, TIME_IS_OVER = "interrupted", "the time is over"
+"""Reasons to stop; INTERRUPTED gives EXIT_INTERRUPTED."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """The result of a run.
+    """The result of the run of one camera.
 
     Attributes
     ----------
@@ -46,6 +50,30 @@ class Outcome:
     grid: ZoiGrid
     exit_code: int
     test: FinishedTest
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OutcomeOfTest:
+    """The result of a test with any number of cameras.
+
+    Attributes
+    ----------
+    folder : Path
+        Those of several cameras are in it.
+    cameras : mapping of str to Outcome
+        By name, the leading one first.
+    """
+
+    folder: Path
+    cameras: Mapping[str, Outcome]
+
+    @property
+    def exit_code(self) -> int:
+        """That of all; finished with loss where one camera failed and another did not."""
+        codes = {outcome.exit_code for outcome in self.cameras.values()}
+        if len(codes) == 1:
+            return codes.pop()
+        return next((code for code in (DEFECT, EXIT_INTERRUPTED) if code in codes), LOSS)
 
 
 class StopSignal:

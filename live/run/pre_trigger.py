@@ -20,6 +20,8 @@ from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import FrameCounts
 from live.pipeline.timed.figure import TimedFigure
 from live.run.control import START, ControlRefused
+from live.stream.record import Record
+from live.stream.stream import Subscriber
 
 _SMALL = 512  # bytes counted for an event
 
@@ -68,7 +70,7 @@ class PreTrigger:
 Item = Frame | Burst | Event
 
 
-class PreTriggerBuffer:
+class PreTriggerBuffer(Subscriber):
     """Passes frames on to ``recorder`` while recording is on; may be called from any thread.
 
     Attributes
@@ -101,11 +103,20 @@ class PreTriggerBuffer:
         self._first_recorded: float = 0 if on else math.inf
         self._last_recorded = -1
         self._lock = threading.RLock()
+        # Means of bursts are made only where someone takes them.
+        self.takes = (Frame, LoadSample, Event, *([Burst] if settings.bursts else []))
 
-    @property
-    def takes_bursts(self) -> bool:
-        """Whether bursts replace frames."""
-        return self._settings.bursts
+    def take(self, record: Record) -> None:
+        """Take what is recorded: frames, bursts in their place, load samples and events."""
+        body, is_reference = record.body, record.role == "reference"
+        if isinstance(body, Frame):
+            self.frame(body, is_reference=is_reference)
+        elif isinstance(body, Burst):
+            self.burst(body, is_reference=is_reference)
+        elif isinstance(body, LoadSample):
+            self.sample(body)
+        elif isinstance(body, Event):
+            self.event(body)
 
     @property
     def failed(self) -> str | None:

@@ -75,11 +75,9 @@ def open_recording(
     def force() -> TimedFigure:
         return run_state.force(time.monotonic())
 
-    pre_trigger = PreTriggerBuffer(
+    return PreTriggerBuffer(
         recorder, run_state.frame_counts, run_state.event_log, settings, on=not record.armed, force=force
     )
-    run_state.event_log.add_listener(pre_trigger.event)
-    return pre_trigger
 
 
 def _open_writer(path: Path, prepared: PreparedRun, mode: RecordMode) -> SessionWriter | RotatingWriter:

@@ -1,4 +1,4 @@
-"""Open camera and load cell from their addresses, or two cameras and one load cell.
+"""Open cameras and the load cell from their addresses.
 
 Only this module opens the simulated devices of ``hw_mocks``. All ``sim:`` addresses share one specimen.
 """
@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 from acquire.addresses import parse_address, with_setting
 from acquire.camera import Camera, CroppedCamera, open_camera
 from acquire.errors import ConfigError
-from acquire.events import EventSink, ignore_event
-from acquire.load_cell import LoadCell, SharedLoadCell, ZeroedLoadCell, open_load_cell
+from acquire.events import Event, EventSink, ignore_event
+from acquire.load_cell import LoadCell, ZeroedLoadCell, open_load_cell
 from acquire.record_mode import Crop
 from live.config.sections import CameraConfig, LoadConfig
 
@@ -61,18 +61,17 @@ def open_rig(
     zero_N : float, N
         Force from which forces count.
     """
-    specimen = _specimen(camera_address, load_address)
-    with ExitStack() as opened:
-        camera = opened.enter_context(closing(_open_cropped(camera_address, on_event, specimen, crop)))
-        load = _zeroed_load(load_address, on_event, specimen, zero_N)
-        opened.pop_all()
-    return Rig(camera, load, specimen if _simulated(camera_address) else None)
+    camera, load = (
+        CameraConfig(address=camera_address, crop=crop),
+        LoadConfig(address=load_address, zero_N=zero_N),
+    )
+    return open_rigs([camera], load, [on_event])[0]
 
 
-def open_two_rigs(
+def open_rigs(
     cameras: Sequence[CameraConfig], load: LoadConfig, sinks: Sequence[EventSink]
 ) -> tuple[Rig, ...]:
-    """Open the cameras of both sides and one load cell, read once; raises as ``open_rig``.
+    """Open all cameras of a test and its load cell, which each ``Rig`` has; raises as ``open_rig``.
 
     Parameters
     ----------
@@ -84,19 +83,25 @@ def open_two_rigs(
         One of each camera; all take the events of the load cell.
     """
     check_load_sign(load)
-    _check_one_specimen([camera.address for camera in cameras])
     simulated = [camera.address for camera in cameras if _simulated(camera.address)]
+    if len(simulated) > 1:
+        _check_one_specimen(simulated)
     specimen = _specimen(simulated[0] if simulated else "none:", load.address)
+
+    def to_all(event: Event) -> None:
+        for sink in sinks:
+            sink(event)
+
     with ExitStack() as opened:
         found = [
             opened.enter_context(closing(_open_cropped(camera.address, sink, specimen, camera.crop)))
             for camera, sink in zip(cameras, sinks, strict=True)
         ]
-        shared = SharedLoadCell(lambda sink: _zeroed_load(load.address, sink, specimen, load.zero_N), sinks)
+        cell = _zeroed_load(load.address, sinks[0] if len(sinks) == 1 else to_all, specimen, load.zero_N)
         opened.pop_all()
     return tuple(
-        Rig(camera, reader, specimen if _simulated(one.address) else None)
-        for camera, reader, one in zip(found, shared.readers, cameras, strict=True)
+        Rig(camera, cell, specimen if _simulated(one.address) else None)
+        for camera, one in zip(found, cameras, strict=True)
     )
 
 
@@ -104,7 +109,7 @@ def _check_one_specimen(addresses: Sequence[str]) -> None:
     """Raises ConfigError where two simulated cameras would have different specimens."""
     from hw_mocks.specimen import SPECIMEN_KEYS
 
-    found = [parse_address(address) for address in addresses if _simulated(address)]
+    found = [parse_address(address) for address in addresses]
     for other in found[1:]:
         first, second = dict(found[0].settings), dict(other.settings)
         differ = sorted(key for key in SPECIMEN_KEYS if first.get(key) != second.get(key))

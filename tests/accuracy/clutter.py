@@ -2,7 +2,7 @@
 
 Share measured: of the points asked for. Share wrong: of those measured, with u more than 1 px from the median of
 what three of the eight points around or more say (for us, and where neighbours lie 8 px apart for all alike).
-pyvale and SUN-DIC run where they are installed (the extra ``peers``), as ``live.characterise.experiments.others``
+pyvale and SUN-DIC run where they are installed (the extra ``peers``), as ``tests.paper.others``
 calls them. Needs PHASEDIC_DATA.
 """
 
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis import PhaseKernel, Roi, ZoiGrid
-from live.characterise.experiments import others
+from tests.paper import others
 
 Floats = NDArray[np.float64]
 PAIRS = (

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from acquire.addresses import parse_address
 from hw_mocks.specimen import VirtualSpecimen, specimen_from
+from live.config.cameras import camera_configs
 from live.config.loading import load_config
-from live.config.sides import side_configs
 from live.pipeline.screen import Screen
 from live.results.run_folder import open_run
 from live.results.sides.together import SidesOfTest
 from live.results.writer import write_results
-from live.run.two_cameras import Side, run_two_cameras
+from live.run.live_run import CameraOfTest, run_cameras
 
 FPS, BURST = 16, 4
 VIEW = (
@@ -52,8 +52,8 @@ def simulated(seed: int) -> SidesError:
             "load.address": f"sim:?seed={seed}",
             "output.dir": name,
         }
-        configs = side_configs(load_config(None, {**SETTINGS, **cameras}), {})
-        run_two_cameras({side: Side(config, Screen(), write_results) for side, config in configs.items()})
+        configs = camera_configs(load_config(None, {**SETTINGS, **cameras}), {})
+        run_cameras({side: CameraOfTest(config, Screen(), write_results) for side, config in configs.items()})
         with open_run(Path(name) / "front") as front, open_run(Path(name) / "back") as back:
             sides = SidesOfTest.of_folders(front, back)
     return _errors(sides, specimen)

@@ -58,10 +58,10 @@ class Stamped(CameraBase):
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Outcome]:
     def running(n: int, stamp: Callable[[int], float], **more: Any) -> Outcome:
-        def rig(*arguments: Any, **named: Any) -> Rig:
-            return Rig(Stamped(n, stamp), open_load_cell("none:"), None)
+        def rigs(*arguments: Any) -> list[Rig]:
+            return [Rig(Stamped(n, stamp), open_load_cell("none:"), None)]
 
-        monkeypatch.setattr(live_module, "open_rig", rig)
+        monkeypatch.setattr(live_module, "open_rigs", rigs)
         return run_live(
             load_config(None, {**SMALL, "output.dir": str(tmp_path / "out"), **more}),
             TerminalScreen(quiet=True),

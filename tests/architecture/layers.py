@@ -28,7 +28,6 @@ ANALYSIS = {
     "analysis.follow": "analysis.field analysis.compiled",
     "analysis.evaluate": "analysis.field",
     "analysis.optics": "analysis.field analysis.evaluate",
-    "analysis.paper_estimator": "analysis.field",
     "analysis.quality": "analysis.field analysis.picture",
     "analysis.fit": "analysis.field analysis.compiled analysis.picture",
     "analysis.self_test": "analysis.field analysis.compiled",
@@ -40,15 +39,15 @@ ANALYSIS = {
 LIVE = (
     "live.config",
     "live.pipeline",
+    "live.stream",
     "live.results",
     "live.setup",
     "live.run",
     "live.replay",
     "live.ui",
-    "live.characterise",
     "live.commands",
 )
-SIDE_BY_SIDE = {"live.replay": "live.run", "live.characterise": "live.run live.replay"}
+SIDE_BY_SIDE = {"live.replay": "live.run"}
 LAYERS = {
     **ACQUIRE,
     **ANALYSIS,
@@ -69,11 +68,10 @@ LAYERS = {
     "live.cli": "acquire.errors acquire.printable live.commands.arguments live.commands.environment"
     " live.commands.exit_codes live.commands.signals live.commands.streams",
 }
-# One module opens the simulated devices. The characterisation and the demo compare with their truth.
+# One module opens the simulated devices. The demo compares with their truth.
 EXCEPTIONS = {
     "live.setup.devices": "hw_mocks",
     "live.commands.demo": "hw_mocks",
-    "live.characterise": "hw_mocks",
 }
 
 # Library -> the packages that alone import it.

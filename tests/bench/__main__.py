@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 
 from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
 from analysis.kernel.warm_up import warm_up
-from live.characterise.experiments.others import Points
 from tests.accuracy.truth import Speckle, affine, digitise
 from tests.bench import live, machine
 from tests.bench.peers import HOW_TO_ADD, Peer, missing, peers
+from tests.paper.others import Points
 
 DATA = Path(__file__).parents[2] / "docs" / "data"
 SHAPE = (1024, 1024)

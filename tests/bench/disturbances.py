@@ -136,13 +136,13 @@ class FloodedCell:
 
 def flood() -> Callable[[], object]:
     """The next rig opened has such a cell."""
-    told, opened = threading.Event(), live_run.open_rig
+    told, opened = threading.Event(), live_run.open_rigs
 
-    def open_flooded(*given: Any, **named: Any) -> Any:
-        rig = opened(*given, **named)
-        return replace(rig, load=FloodedCell(rig.load, told))  # type: ignore[arg-type]
+    def open_flooded(*given: Any) -> Any:
+        (rig,) = opened(*given)
+        return (replace(rig, load=FloodedCell(rig.load, told)),)  # type: ignore[arg-type]
 
-    live_run.open_rig = open_flooded
+    live_run.open_rigs = open_flooded
     return told.set
 
 

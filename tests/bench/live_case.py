@@ -23,13 +23,12 @@ from typing import Any
 import numpy as np
 
 from live.commands.consumers import standard_consumers
+from live.config.cameras import camera_configs
 from live.config.loading import Config, load_config
-from live.config.sides import side_configs
 from live.pipeline.consumer import Consumer
 from live.pipeline.measurement import Measurement
-from live.run.live_run import run_live
+from live.run.live_run import CameraOfTest, run_cameras, run_live
 from live.run.outcome import Outcome
-from live.run.two_cameras import Side, run_two_cameras
 from live.ui.rerun.view import url, viewer_binary
 from live.ui.terminal.screen import TerminalScreen
 
@@ -107,10 +106,10 @@ def run_both(case: argparse.Namespace, folder: Path) -> list[tuple[Outcome, np.n
     """A run with two cameras, front and back, and the rows of each."""
     screen, watches = TerminalScreen(quiet=not case.loud), dict[str, Watch]()
     sides = {}
-    for name, config in side_configs(configured(case, folder), {}).items():
+    for name, config in camera_configs(configured(case, folder), {}).items():
         watches[name] = Watch()
-        sides[name] = Side(config, screen, standard_consumers(screen, [watches[name]]))
-    outcomes = run_two_cameras(sides).sides
+        sides[name] = CameraOfTest(config, screen, standard_consumers(screen, [watches[name]]))
+    outcomes = run_cameras(sides).cameras
     return [(outcome, watches[name].rows()) for name, outcome in outcomes.items()]
 
 

@@ -1,6 +1,6 @@
 """Other engines on the same pair: speed and, beside it, how wrong they are.
 
-OpenCV's engines always; pyvale and SUN-DIC where they are installed, through ``live.characterise.experiments.others``.
+OpenCV's engines always; pyvale and SUN-DIC where they are installed, through ``tests.paper.others``.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis import ZoiGrid
-from live.characterise.experiments import others
-from live.characterise.experiments.others import Points
+from tests.paper import others
+from tests.paper.others import Points
 
 Flow = Callable[[], NDArray[np.floating]]
 HOW_TO_ADD = """The extra `peers` adds them: about 3 GB, and builds of OpenCV that overwrite ours, so best in an

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import live.characterise.experiments.others as others
 from analysis import Roi, ZoiGrid
-from live.characterise.experiments.others import Points
 from tests.bench import __main__ as bench
 from tests.bench import peers
 from tests.bench.peers import Peer
+from tests.paper import others
+from tests.paper.others import Points
 
 SECTION = "Beside other engines, on the same pair"
 X, Y = np.meshgrid(np.arange(48.0, 300, 8), np.arange(48.0, 200, 8))

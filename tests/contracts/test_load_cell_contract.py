@@ -15,7 +15,6 @@ import pytest
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError, DataError, DeviceError, PhasedicError
 from acquire.events import Event, EventKind
-from acquire.load_cell import SharedLoadCell
 from acquire.load_cell.contract import LoadCell, open_load_cell
 from hw_mocks.faults import FaultPlan
 from hw_mocks.indicator_output import Sensing
@@ -64,16 +63,6 @@ def simulated(folder: Path, stack: ExitStack, events: list[Event]) -> LoadCell:
     return open_sim_load(address, events.append, specimen_from(address))
 
 
-def shared(folder: Path, stack: ExitStack, events: list[Event]) -> LoadCell:
-    """The second of two tests that have one load cell."""
-    address = parse_address("sim:?rate=100")
-    cell = SharedLoadCell(
-        lambda sink: open_sim_load(address, sink, specimen_from(address)), [print, events.append]
-    )
-    stack.callback(cell.readers[0].close)
-    return cell.readers[1]
-
-
 def none(folder: Path, stack: ExitStack, events: list[Event]) -> LoadCell:
     return open_load_cell("none:", events.append)
 
@@ -87,7 +76,7 @@ def of_somebody_else(folder: Path, stack: ExitStack, events: list[Event]) -> Loa
 
 
 SERIAL: dict[str, Opener] = {name: indicator(name) for name in INDICATORS}
-LIVE: dict[str, Opener] = {**SERIAL, "sim": simulated, "shared": shared, "csv": of_somebody_else}
+LIVE: dict[str, Opener] = {**SERIAL, "sim": simulated, "csv": of_somebody_else}
 ALL: dict[str, Opener] = {**LIVE, "session": session, "none": none}
 
 

@@ -171,20 +171,20 @@ def test_plain_replay_measures_every_burst_with_other_zois(
 def test_replay_with_forced_skips_is_bit_equal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A camera that does not wait, and a measurement that is too slow for it."""
     folder = tmp_path / "run"
-    open_rig = live_module.open_rig
+    open_rigs = live_module.open_rigs
 
-    def hasty(*arguments: Any, **named: Any) -> Rig:
-        rig = open_rig(*arguments, **named)
+    def hasty(*arguments: Any, **named: Any) -> tuple[Rig, ...]:
+        (rig,) = open_rigs(*arguments, **named)
         monkeypatch.setattr(
             rig.camera, "info", replace(rig.camera.info, live=True, fps=None)
         )  # a rate unsaid: nothing is held for long
-        return rig
+        return (rig,)
 
     def slow(live: LiveRun, m: Measurement) -> None:
         if m.number < 2:
-            live.grabber.join()  # the camera has given everything before this one is done
+            live.first.source.join()  # the camera has given everything before this one is done
 
-    monkeypatch.setattr(live_module, "open_rig", hasty)
+    monkeypatch.setattr(live_module, "open_rigs", hasty)
     outcome = live_run(folder, each=slow)
     assert outcome.run_state.frame_counts.skipped > 0
     assert outcome.run_state.frame_counts.adds_up
@@ -216,19 +216,19 @@ def test_losses_are_the_same_live_and_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, skips: bool
 ) -> None:
     folder, out = tmp_path / "run", tmp_path / "again"
-    open_rig = live_module.open_rig
+    open_rigs = live_module.open_rigs
 
-    def lossy(*arguments: Any, **named: Any) -> Rig:
-        rig = open_rig(*arguments, **named)
+    def lossy(*arguments: Any, **named: Any) -> tuple[Rig, ...]:
+        (rig,) = open_rigs(*arguments, **named)
         camera = Lossy(rig.camera)
         camera.info = replace(camera.info, live=skips, fps=None)
-        return replace(rig, camera=camera)
+        return (replace(rig, camera=camera),)
 
     def slow(live: LiveRun, m: Measurement) -> None:
         if skips and m.number < 2:
-            live.grabber.join()
+            live.first.source.join()
 
-    monkeypatch.setattr(live_module, "open_rig", lossy)
+    monkeypatch.setattr(live_module, "open_rigs", lossy)
     outcome = live_run(folder, each=slow, **{"measure.burst": 2})
     frame_counts = outcome.run_state.frame_counts
     assert frame_counts.adds_up
@@ -331,7 +331,7 @@ def test_a_recording_that_has_failed_is_not_shown_as_one(
     def look(live: LiveRun, m: Measurement) -> None:
         if m.number == 6:
             until(lambda: not live.recording)
-        states.append((live.state, live.recording))
+        states.append((live.first.state, live.recording))
 
     monkeypatch.setattr(SessionWriter, "write_frame", write_frame)
     outcome = live_run(tmp_path / "run", each=look)

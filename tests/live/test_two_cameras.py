@@ -1,4 +1,4 @@
-"""Two cameras in one test: the mean by value, a side that fails, commands, and the same again in a replay."""
+"""Several cameras in one test: the mean by value, a camera that fails, commands, and the same again in a replay."""
 
 from __future__ import annotations
 
@@ -20,19 +20,18 @@ from acquire.events import EventKind
 from acquire.session import Session
 from hw_mocks.specimen import specimen_from
 from live.cli import main
+from live.config.cameras import camera_configs
 from live.config.loading import load_config
 from live.config.sections import CameraConfig, LoadConfig
-from live.config.sides import side_configs
+from live.pipeline.run_state import FrameCounts
 from live.pipeline.screen import Screen
 from live.results.reader import Strain
 from live.results.run_folder import open_run
 from live.results.sides.together import SidesOfTest, newest
 from live.results.writer import write_results
-from live.run.control import ControlRefused
-from live.run.live_run import TIME_IS_OVER
-from live.run.outcome import StopSignal
-from live.run.two_cameras import BothRuns, OutcomeOfSides, Side, linked, run_two_cameras
-from live.setup.devices import open_two_rigs
+from live.run.live_run import CameraOfTest, LiveRun, run_cameras
+from live.run.outcome import OutcomeOfTest
+from live.setup.devices import open_rigs
 
 BENDING = 0.04
 VIEW = (
@@ -231,7 +230,7 @@ class Commanding(Screen):
     """Gives commands at the first status lines of the front."""
 
     def __init__(self) -> None:
-        self.both: BothRuns | None = None
+        self.both: LiveRun | None = None
         self.shown: list[dict[str, Any]] = []
 
     @property
@@ -241,28 +240,28 @@ class Commanding(Screen):
     def snapshot(self, snapshot: Any, words: str = "") -> None:
         if self.both is None or not snapshot.time_step:
             return
-        runs = self.both.runs
+        runs = self.both.cameras
         self.shown.append(newest(runs["front"].run_state, runs["back"].run_state))
         if len(self.shown) == 1:
             self.both.command(EventKind.NOTE, "seen")
 
 
-def attended(folder: Path) -> tuple[OutcomeOfSides, Commanding]:
+def attended(folder: Path) -> tuple[OutcomeOfTest, Commanding]:
     given = {"camera.address": FRONT, "camera.back": BACK, "load.address": "sim:", "output.dir": str(folder)}
     measure = {"zoi": 32, "step": 16, "burst": 2, "reference_burst": 4, "roi": "all"}
     given |= {f"measure.{key}": value for key, value in measure.items()}
     screen = Commanding()
     sides = {
-        name: Side(config, screen if name == "front" else Screen(), write_results)
-        for name, config in side_configs(load_config(None, given), given).items()
+        name: CameraOfTest(config, screen if name == "front" else Screen(), write_results)
+        for name, config in camera_configs(load_config(None, given), given).items()
     }
-    return run_two_cameras(sides, on_start=lambda both: setattr(screen, "both", both)), screen
+    return run_cameras(sides, on_start=lambda both: setattr(screen, "both", both)), screen
 
 
 def test_mean_and_bending_while_it_runs(tmp_path: Path) -> None:
     outcome, screen = attended(tmp_path / "test")
     assert outcome.exit_code == 0
-    for one in outcome.sides.values():
+    for one in outcome.cameras.values():
         kinds = [event.kind for event in one.run_state.event_log.events()]
         assert kinds.count(EventKind.NOTE) == 1
     mean, bending, sigma, _ = next(values["axial"] for values in reversed(screen.shown) if values)
@@ -270,63 +269,6 @@ def test_mean_and_bending_while_it_runs(tmp_path: Path) -> None:
     assert 0 < sigma < 1e-5
     assert 0 <= bending < 0.25 * float(specimen.axial_strain(6.0)) + 5 * sigma
     assert -5 * sigma < mean < float(specimen.axial_strain(6.0)) + 5 * sigma
-
-
-class FakeRun:
-    """Notes its commands; ``refuses`` all but a tare."""
-
-    def __init__(self, refuses: bool = False) -> None:
-        self.calls: list[EventKind] = []
-        self.grabber, self.refuses, self.paused, self.recording = self, refuses, False, not refuses
-        self.running = True
-
-    def command(self, kind: EventKind, note: str = "") -> str:
-        if self.refuses and kind is not EventKind.TARE:
-            raise ControlRefused("not now")
-        self.calls.append(kind)
-        return "done"
-
-
-def test_a_command_is_for_both_and_a_tare_is_one() -> None:
-    front, back = FakeRun(), FakeRun()
-    runs: Any = {"front": front, "back": back}
-    both = BothRuns(runs, Path(), StopSignal())
-    assert both.command(EventKind.NOTE, "seen") == "done"
-    assert both.command(EventKind.TARE) == "done"
-    assert (front.calls, back.calls) == ([EventKind.NOTE, EventKind.TARE], [EventKind.NOTE])
-    front.refuses, back.recording = True, False
-    assert both.command(EventKind.PAUSE) == "done"
-    assert not both.recording
-    back.refuses = True
-    with pytest.raises(ControlRefused, match="not now"):
-        both.command(EventKind.PAUSE)
-    front.running = False  # its camera is gone: the back has the load cell
-    both.command(EventKind.TARE)
-    assert back.calls[-1] is EventKind.TARE
-
-
-def test_a_side_follows_the_stop_of_both_and_stops_both() -> None:
-    both = StopSignal()
-    one, other = linked(both), linked(both)
-    one.request(TIME_IS_OVER)
-    assert not both.requested and not other.requested
-    other.request("an alarm")
-    assert both.reason == "an alarm"
-    late = linked(both)
-    assert late.requested
-    assert one.reason == TIME_IS_OVER
-
-
-def test_the_exit_code_of_both() -> None:
-    class Ended:
-        def __init__(self, code: int) -> None:
-            self.exit_code = code
-
-    def code(front: int, back: int) -> int:
-        sides: Any = {"front": Ended(front), "back": Ended(back)}
-        return OutcomeOfSides(Path(), sides).exit_code
-
-    assert [code(0, 0), code(3, 3), code(0, 3), code(5, 3), code(0, 130), code(1, 3)] == [0, 3, 5, 5, 130, 1]
 
 
 def test_the_configuration_of_each_side(tmp_path: Path) -> None:
@@ -341,17 +283,17 @@ def test_the_configuration_of_each_side(tmp_path: Path) -> None:
         "gauges.axial": {"kind": "line", "start": [1, 1], "end": [1, 50]},
     }  # fmt: skip
     given = {"measure.zoi": 32}
-    one, other = side_configs(load_config(None, front | {"camera.back": str(back)}), given).values()
+    one, other = camera_configs(load_config(None, front | {"camera.back": str(back)}), given).values()
     assert (one.camera.back, one.measure.mask, one.operate.orders) == (None, "front.png", "9000")
     assert other.camera == CameraConfig(address="/dev/video1", crop=(1, 2, 300, 200))
     assert (other.measure.roi, other.measure.zoi, list(other.gauges)) == ((5, 6, 70, 80), 32, ["behind"])
     assert (other.load.address, other.specimen.area_mm2, other.operate.orders) == ("/dev/ttyUSB0", 7.0, None)
-    _, plain = side_configs(load_config(None, front | {"camera.back": "/dev/video2"}), {}).values()
+    _, plain = camera_configs(load_config(None, front | {"camera.back": "/dev/video2"}), {}).values()
     assert plain.camera == CameraConfig(address="/dev/video2")
     assert (plain.measure.mask, plain.measure.zoi, list(plain.gauges)) == (None, 24, ["axial"])
     back.write_text("[camera]\naddress = 'sim:'\nback = 'sim:'\n")
     with pytest.raises(ConfigError, match=r"no camera\.back or camera\.beside"):
-        side_configs(load_config(None, front | {"camera.back": str(back)}), {})
+        camera_configs(load_config(None, front | {"camera.back": str(back)}), {})
 
 
 FIELDS = ["--camera", FRONT, "--beside", FRONT.replace("?", "?seed=11&"), "--load", "sim:"]
@@ -386,7 +328,7 @@ def test_two_fields_have_one_clock_and_each_its_strains(
         assert not np.array_equal(first.strain.values["eyy"], second.strain.values["eyy"])
     text = (fields / "report.html").read_text()
     assert all(
-        words in text for words in ("two fields of view", "Budget of E, second", 'href="first/report.html"')
+        words in text for words in ("2 fields of view", "Budget of E, second", 'href="first/report.html"')
     )
     assert "Front minus mean" not in text
     assert main(["show", str(fields)]) == 4
@@ -400,6 +342,56 @@ def test_a_replay_of_two_fields_is_bit_equal(fields: Path, tmp_path: Path) -> No
         with Strain.open(fields / name / "strain.h5") as live, Strain.open(out / name / "strain.h5") as again:
             for column in live.names:
                 np.testing.assert_array_equal(live.maps(column), again.maps(column), err_msg=column)
+
+
+@pytest.fixture(scope="module")
+def three(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("three") / "test"
+    more = ["--beside", FRONT.replace("?", "?seed=13&")]
+    assert main(["run", *FIELDS, *more, *MEASURE, *QUIET, "--report", "--out", str(folder)]) == 0
+    return folder
+
+
+def test_three_cameras_have_one_clock_one_load_and_one_report(three: Path) -> None:
+    specimen = specimen_from(parse_address(FRONT))
+    with contextlib.ExitStack() as opened:
+        runs = [opened.enter_context(open_run(three / name)) for name in ("first", "second", "third")]
+        assert len({run.start_monotonic for run in runs}) == 1
+        assert runs[0].load_samples == runs[1].load_samples == runs[2].load_samples
+        ends = [run.strain.values["eyy"][-1] for run in runs]
+        bent = specimen.axial_strain(np.asarray(runs[0].strain.time_s))[-1] * (1 + BENDING)
+        assert ends == pytest.approx([bent + MOTION] * 3, abs=2e-5) and len(set(ends)) == 3
+    text = (three / "report.html").read_text()
+    assert all(
+        words in text for words in ("3 fields of view", "Budget of E, third", 'href="third/report.html"')
+    )
+
+
+def test_a_replay_of_three_cameras_is_bit_equal(three: Path, tmp_path: Path) -> None:
+    out = tmp_path / "again"
+    assert main(["replay", str(three), "--as-measured", "--out", str(out), *QUIET]) == 0
+    for name in ("first", "second", "third"):
+        with Strain.open(three / name / "strain.h5") as live, Strain.open(out / name / "strain.h5") as again:
+            for column in live.names:
+                np.testing.assert_array_equal(live.maps(column), again.maps(column), err_msg=column)
+
+
+LIVE_FIELD = "sim:?width=224&height=192&seconds=4&fps=10&max_strain=0.001&hold=1&noise=0.2"
+
+
+def test_live_cameras_all_give_frames_and_one_that_fails_leaves_the_others(tmp_path: Path) -> None:
+    """Not in lock step: each camera runs by the clock."""
+    folder = tmp_path / "test"
+    cameras = ["--camera", f"{LIVE_FIELD}&faults=gone@2", *("--beside", f"{LIVE_FIELD}&seed=5") * 2]
+    assert main(["run", *cameras, "--load", "sim:", *MEASURE, *QUIET, "--out", str(folder)]) == 5
+    measured = {}
+    for name in ("first", "second", "third"):
+        with Session.open(folder / name / "session.h5") as session:
+            assert session.frame_counts is not None
+            counts = FrameCounts(**{key: session.frame_counts[key] for key in FrameCounts().as_dict()})
+            assert counts.adds_up and counts.grabbed == counts.recorded > 10
+            measured[name] = counts.grabbed
+    assert measured["first"] < 25 < 35 < min(measured["second"], measured["third"])
 
 
 def test_two_fields_have_no_mean(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -417,4 +409,4 @@ def test_two_fields_have_no_mean(tmp_path: Path, capsys: pytest.CaptureFixture[s
 def test_simulated_cameras_see_one_specimen() -> None:
     cameras = CameraConfig(address=FRONT), CameraConfig(address=BACK.replace("0.001", "0.002"))
     with pytest.raises(ConfigError, match="give max_strain as in its address"):
-        open_two_rigs(cameras, LoadConfig(address="sim:"), [lambda event: None] * 2)
+        open_rigs(cameras, LoadConfig(address="sim:"), [lambda event: None] * 2)

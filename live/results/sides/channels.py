@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from live.config.sides import BACK, FRONT
+from live.config.cameras import BACK, FRONT
 from live.pipeline.measurement import AXIAL, TimeStep
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import BURST

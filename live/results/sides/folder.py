@@ -1,31 +1,33 @@
-"""The folder of a test with two cameras, which holds one of each side, and the clocks of two runs."""
+"""The folder of a test with several cameras, which holds one of each, and the clocks of two runs."""
 
 from __future__ import annotations
 
+import itertools
 from datetime import datetime
 from pathlib import Path
 
 from acquire.errors import DataError
-from live.config.sides import FIELDS, SIDES
+from live.config.cameras import FIELDS, SIDES
 from live.results.run_folder import SESSION, STRAIN, RunFolder
 
 CLOCKS_AGREE_S = 2.0  # the clock of the day may have been set in between
 
 
-def sides_in(folder: Path) -> tuple[str, str] | None:
-    """The names of both cameras, where ``folder`` is that of a test with two; else None."""
-    return None if (folder / STRAIN).exists() else _with_both(folder, STRAIN)
+def cameras_in(folder: Path) -> tuple[str, ...]:
+    """The names of the cameras, where ``folder`` is that of a test with several; else none."""
+    return () if (folder / STRAIN).exists() else _with(folder, STRAIN)
 
 
-def recorded_sides_in(folder: Path) -> tuple[str, str] | None:
-    """The names of both cameras, where ``folder`` has the recordings of both; else None."""
-    return _with_both(folder, SESSION)
+def recorded_cameras_in(folder: Path) -> tuple[str, ...]:
+    """The names of the cameras, where ``folder`` has the recordings of several; else none."""
+    return _with(folder, SESSION)
 
 
-def _with_both(folder: Path, file: str) -> tuple[str, str] | None:
-    return next(
-        (names for names in (SIDES, FIELDS) if all((folder / n / file).is_file() for n in names)), None
-    )
+def _with(folder: Path, file: str) -> tuple[str, ...]:
+    if all((folder / name / file).is_file() for name in SIDES):
+        return SIDES
+    found = tuple(itertools.takewhile(lambda name: (folder / name / file).is_file(), FIELDS))
+    return found if len(found) > 1 else ()
 
 
 def shift_s(front: RunFolder, back: RunFolder) -> float:

@@ -25,8 +25,8 @@ from analysis.evaluate import (
     TwoSides,
     evaluate_test,
 )
+from live.config.cameras import SIDES
 from live.config.sections import SpecimenConfig
-from live.config.sides import SIDES
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import BURST

@@ -7,9 +7,9 @@ import math
 from acquire.burst import sum_kind
 from acquire.hdf5 import free_bytes
 from acquire.record_mode import RecordMode
+from live.config.cameras import other_cameras
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST
-from live.config.sides import second_camera
 from live.setup.check.sample import FrameStack
 from live.setup.check.verdict import CheckLine
 
@@ -20,7 +20,7 @@ SHORTEST_S = 600.0
 def write_rate(stack: FrameStack, config: Config) -> float:
     """What the recording of these pictures writes, bytes/s: at the rate at which they came, in the recorder's form.
 
-    The part of a second camera is taken to be the same. 0 where nothing is recorded, or the pictures are not live.
+    The parts of further cameras are taken to be the same. 0 where nothing is recorded, or the pictures are not live.
     """
     camera, m = stack.camera, config.measure
     if not (config.record.enabled and camera.live):
@@ -33,7 +33,7 @@ def write_rate(stack: FrameStack, config: Config) -> float:
         size = (
             sum_kind(camera.bits, burst).itemsize + 1 / 8
         ) / burst  # the sum, and a bit for clipped pixels
-    return camera.width * camera.height * size * fps * (1 if second_camera(config) is None else 2)
+    return camera.width * camera.height * size * fps * (1 + len(other_cameras(config)))
 
 
 def disk_lines(rate: float, config: Config) -> list[CheckLine]:

@@ -30,27 +30,27 @@ def status_line(s: Snapshot, width: int, words: str = "") -> str:
     return fitted([*_test(s), (3, words), *_strain(s), _assumed(s), *_machine(s)], width)
 
 
-def sides_line(
-    sides: Mapping[str, Snapshot], both: Mapping[str, SideValues], width: int, words: str = ""
+def cameras_line(
+    cameras: Mapping[str, Snapshot], both: Mapping[str, SideValues], width: int, words: str = ""
 ) -> str:
-    """The line of a test with two cameras: mean and bending of each strain, and what each side does.
+    """The line of a test with several cameras: strains, of sides mean and bending, and what each camera does.
 
     Parameters
     ----------
-    sides : mapping of side to Snapshot
-        The front first.
+    cameras : mapping of str to Snapshot
+        By name, the leading one first.
     both : mapping of str to (mean, bending, sigma)
     width : int
     words : str
     """
-    first = next(iter(sides.values()))
-    strains = _both(both) if both else _each(sides)
-    return fitted([*_test(first), (3, words), *strains, *_machines(sides)], width)
+    first = next(iter(cameras.values()))
+    strains = _both(both) if both else _each(cameras)
+    return fitted([*_test(first), (3, words), *strains, *_machines(cameras)], width)
 
 
-def _each(sides: Mapping[str, Snapshot]) -> Iterator[Item]:
+def _each(cameras: Mapping[str, Snapshot]) -> Iterator[Item]:
     """The strain of each camera, where there is no mean."""
-    for name, s in sides.items():
+    for name, s in cameras.items():
         axial = s.figure(AXIAL)
         if text := figure_text(axial, strain_text(axial.value, axial.sigma), f"{axial.last * 1e6:+,.0f}"):
             yield 5, f"{name} {text} µm/m"
@@ -62,8 +62,8 @@ def _both(both: Mapping[str, SideValues]) -> Iterator[Item]:
         yield 5 if number == 0 else 10, text
 
 
-def _machines(sides: Mapping[str, Snapshot]) -> Iterator[Item]:
-    for name, s in sides.items():
+def _machines(cameras: Mapping[str, Snapshot]) -> Iterator[Item]:
+    for name, s in cameras.items():
         frames = s.frames
         done = f"{s.valid}/{s.zois} ZOIs" if s.time_step is not None else f"{frames['grabbed']} frames"
         yield 8, f"{name} {done}"

@@ -27,7 +27,7 @@ def json_bytes(value: Any) -> bytes:
     return json.dumps(plain(value), allow_nan=False, separators=(",", ":")).encode()
 
 
-class Subscriber:
+class PageStream:
     """The messages that wait for one page: one of each kind."""
 
     def __init__(self) -> None:
@@ -60,7 +60,7 @@ class Broadcaster:
     """Passes messages to all subscribers; a new one first gets the newest of each kind."""
 
     def __init__(self) -> None:
-        self._subscribers: set[Subscriber] = set()
+        self._subscribers: set[PageStream] = set()
         self._newest: dict[str, bytes] = {}
         self._lock = threading.Lock()
         self._closed = False
@@ -78,18 +78,18 @@ class Broadcaster:
             for subscriber in self._subscribers:
                 subscriber.put(kind, message)
 
-    def open(self) -> Subscriber | None:
+    def open(self) -> PageStream | None:
         """A new subscriber; None where ``MAX_PAGES`` are open, or after ``close``."""
         with self._lock:
             if self._closed or len(self._subscribers) >= MAX_PAGES:
                 return None
-            subscriber = Subscriber()
+            subscriber = PageStream()
             for kind, message in self._newest.items():
                 subscriber.put(kind, message)
             self._subscribers.add(subscriber)
             return subscriber
 
-    def remove(self, subscriber: Subscriber) -> None:
+    def remove(self, subscriber: PageStream) -> None:
         """Remove a page that was closed."""
         with self._lock:
             self._subscribers.discard(subscriber)

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Protocol
 
 from acquire.events import Event, EventKind
@@ -28,10 +29,10 @@ from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import BURST, DISK, FORCE, FPS, STRESS, Snapshot, peak_force
 from live.pipeline.timed.figure import TimedFigure
 from live.ui.web.broadcaster import Broadcaster
+from live.ui.web.cameras_panel import CamerasPanel
 from live.ui.web.curve_history import CurveHistory
 from live.ui.web.map_view import MapView, gauge_shapes, plate_shapes
 from live.ui.web.painting import as_jpeg, shrunk
-from live.ui.web.sides import SidesPanel
 
 MAX_EVENTS = 30
 STATE_S, PICTURE_S = 0.1, 0.25
@@ -55,6 +56,16 @@ class Running(Protocol):
 
     @property
     def folder(self) -> Path: ...
+
+
+class RunningTest(Running, Protocol):
+    """What the page reads of a test."""
+
+    @property
+    def cameras(self) -> Mapping[str, Running]: ...
+
+    @property
+    def states(self) -> Mapping[str, RunState]: ...
 
 
 class PageConsumer(Consumer):
@@ -103,7 +114,7 @@ class PageConsumer(Consumer):
         self._shown = 0
         self._scale: dict[str, Any] = {}
         self._running: Running | None = None
-        self._sides: SidesPanel | None = None
+        self._cameras: CamerasPanel | None = None
         self._newest: Measurement | None = None
         self._matched: Measurement | None = None
         self._peak: Measurement | None = None
@@ -118,10 +129,10 @@ class PageConsumer(Consumer):
         self._elongation_gauge, self._length_mm = elongation_length(config)
         self._due = {"state": 0.0, "picture": 0.0}
 
-    def attach(self, running: Running, sides: Mapping[str, RunState] | None = None) -> None:
-        """Use ``running``, which has begun; ``sides`` are those of a test with two cameras."""
-        if sides:
-            self._sides = SidesPanel(sides, self._config.specimen, self._now)
+    def attach(self, running: Running, states: Mapping[str, RunState] = MappingProxyType({})) -> None:
+        """Use ``running``, which has begun; ``states`` are those of the cameras of a test with several."""
+        if len(states) > 1:
+            self._cameras = CamerasPanel(states, self._config.specimen, self._now)
         self._running, self._start_t = running, running.run_state.health.began_t
         self._channels = ChannelValues(self._start_t, running.run_state.snapshot)
 
@@ -239,7 +250,7 @@ class PageConsumer(Consumer):
             "fps": s.figure(FPS).value,
             "ledger": s.frames,
             "disk_min": s.figure(DISK).value / 60,
-            "sides": None if self._sides is None else self._sides.state(),
+            "sides": None if self._cameras is None else self._cameras.state(),
         }
         return values | _measured(s)
 
@@ -259,6 +270,8 @@ class PageConsumer(Consumer):
     def _state_name(self, s: Snapshot) -> str:
         if self._running is None:
             return "opening"
+        if self._side and self._running.run_state.health.camera_ended:
+            return "ended"  # others go on
         if s.time_step is None:
             return "reference"
         return "paused" if self._running.paused else "measuring"

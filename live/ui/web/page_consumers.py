@@ -8,12 +8,16 @@ from typing import Any
 from live.config.loading import Config
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.page_consumer import PageConsumer, Running
+from live.ui.web.page_consumer import PageConsumer, RunningTest
 from live.ui.web.server import Response, json_response
+
+SHOWN = 2
 
 
 class PageConsumers:
     """The consumers of one run; none where there are no configurations.
+
+    The page shows the pictures of the first two cameras, and what each of all does.
 
     Parameters
     ----------
@@ -32,7 +36,7 @@ class PageConsumers:
         self, broadcaster: Broadcaster, configs: Mapping[str, Config], pictures: Mapping[str, bytes]
     ) -> None:
         self.by_name: dict[str, PageConsumer] = {}
-        for name, config in configs.items():
+        for name, config in list(configs.items())[:SHOWN]:
             kind, picture = "second" if self.by_name else "run", pictures.get(name, b"")
             self.by_name[name] = PageConsumer(broadcaster, config, picture=picture, kind=kind, side=name)
 
@@ -41,17 +45,11 @@ class PageConsumers:
         """That of the first camera."""
         return next(iter(self.by_name.values()), None)
 
-    def attach(self, live: Running) -> None:
-        """Show the state of ``live`` from now on."""
-        if self.first is not None:
-            self.first.attach(live)
-
-    def attach_both(self, both: Running, runs: Mapping[str, Running]) -> None:
-        """Show the state of ``both`` from now on, whose cameras are ``runs``."""
-        states = {name: run.run_state for name, run in runs.items()}
+    def attach(self, live: RunningTest) -> None:
+        """Show the state of ``live``, and of each of its cameras, from now on."""
         for name, consumer in self.by_name.items():
             leads = consumer is self.first
-            consumer.attach(both if leads else runs[name], states if leads else None)
+            consumer.attach(live if leads else live.cameras[name], live.states if leads else {})
 
     def points(self, query: Mapping[str, str]) -> Response:
         """The points of the curve that a page lacks.

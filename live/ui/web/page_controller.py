@@ -26,7 +26,7 @@ from live.results.maps.field_maps import FIELD_MAPS
 from live.run.control import ONCE, Controls, answer
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.page_consumer import PageConsumer, Running
+from live.ui.web.page_consumer import PageConsumer, RunningTest
 from live.ui.web.page_consumers import PageConsumers
 from live.ui.web.painting import RAMP, as_png
 from live.ui.web.run_result import peaks
@@ -43,7 +43,7 @@ FIRST = "specimen-1"
 GOODBYE_S = 0.5
 
 
-class ControlledRun(Controls, Running, Protocol):
+class ControlledRun(Controls, RunningTest, Protocol):
     """A run that accepts commands."""
 
 
@@ -61,8 +61,8 @@ class PageController:
     stage : str
     sessions : SetupSessions or None
         During set-up.
-    second : Config or None
-        Of the second camera of the test that ``set_up`` has begun.
+    others : list of Config
+        Of the further cameras of the test that ``set_up`` has begun.
     server : PageServer
     viewer : callable
         Opens a viewer at the port of the view; returns the answer for the page.
@@ -72,7 +72,7 @@ class PageController:
         self.draft = draft
         self.stage = RUN if draft is None else SET_UP
         self.sessions: SetupSessions | None = None
-        self.second: Config | None = None
+        self.others: list[Config] = []
         self._second_draft: ConfigDraft | None = None
         self._drawn: Mapping[str, DrawnRegion] = {}
         self._broadcaster = Broadcaster()
@@ -146,8 +146,7 @@ class PageController:
         return self._to_run(sessions) if started else None
 
     def _to_run(self, sessions: SetupSessions) -> Config:
-        config, *others = sessions.configs(Path(self._folder.name))
-        self.second = others[0] if others else None
+        config, *self.others = sessions.configs(Path(self._folder.name))
         wanted = self._folder_of(str(config.metadata["specimen"]))
         tries = (wanted.with_name(f"{wanted.name}_{n}") for n in range(2, 10_000))
         folder = next(one for one in tries if not one.exists()) if wanted.exists() else wanted
@@ -165,25 +164,16 @@ class PageController:
             name = next_name(name)
         return name
 
-    def begin(self, config: Config) -> PageConsumer:
-        """Begin the stage of the run; the consumer of its data."""
-        return self.begin_all({"": config})[""]
-
-    def begin_all(self, configs: Mapping[str, Config]) -> Mapping[str, PageConsumer]:
+    def begin(self, configs: Mapping[str, Config]) -> Mapping[str, PageConsumer]:
         """Begin the stage of a run with these cameras, by name; the consumers of their data."""
         self._consumers, self._live = PageConsumers(self._broadcaster, configs, self._last_pictures), None
         self._enter(RUN, "")
         return self._consumers.by_name
 
     def attach(self, live: ControlledRun) -> None:
-        """Pass commands to ``live`` from now on."""
+        """Pass commands to ``live`` from now on, and show it."""
         self._live = live
         self._consumers.attach(live)
-
-    def attach_both(self, both: ControlledRun, runs: Mapping[str, Running]) -> None:
-        """Pass commands to ``both`` from now on, whose cameras are ``runs``."""
-        self._live = both
-        self._consumers.attach_both(both, runs)
 
     def end(self, result: Mapping[str, Any]) -> None:
         """Begin the stage after the run and show its ``result``."""

@@ -18,10 +18,21 @@ from live.results.finished.finished_test import FinishedTest
 from live.results.report.curves import load_unit, strain_unit, stress_strain
 from live.results.report.evaluation import EvaluatedCurve, intercept_of
 from live.results.summary import why_nothing
+from live.run.outcome import Outcome
+from live.ui.web.cameras_panel import figures_of, side_figures
 from live.ui.web.page_consumer import PageConsumer
-from live.ui.web.sides import figures_of, side_figures
 
 MAX_TROUBLES = 20
+
+
+def result_of(cameras: Mapping[str, Outcome], folder: Path, words: str) -> dict[str, Any]:
+    """The result of a test, by its cameras; parameters as of ``run_result``."""
+    states = {name: one.run_state for name, one in cameras.items()}
+    tests = {name: one.test for name, one in cameras.items()}
+    if len(cameras) > 1:
+        return cameras_result(states, tests, folder, words)
+    (name,) = cameras
+    return run_result(states[name], tests[name], folder, words)
 
 
 def run_result(run_state: RunState, test: FinishedTest, folder: Path, words: str) -> dict[str, Any]:
@@ -43,10 +54,10 @@ def run_result(run_state: RunState, test: FinishedTest, folder: Path, words: str
     }
 
 
-def sides_result(
+def cameras_result(
     states: Mapping[str, RunState], tests: Mapping[str, FinishedTest], folder: Path, words: str
 ) -> dict[str, Any]:
-    """The result of a test with two cameras: figures of the mean and of each, warnings of both, else the first."""
+    """The result of a test with several cameras: figures of the mean and of each, warnings of all, else the first."""
     results = {side: run_result(state, tests[side], folder / side, words) for side, state in states.items()}
     specimen = next(iter(tests.values())).specimen
     found = figures_of(states, specimen)

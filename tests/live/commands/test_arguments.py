@@ -159,13 +159,16 @@ def test_a_page_gets_a_number_where_it_or_what_is_saved_beside_it_is_there(tmp_p
 
 
 def test_a_second_camera_makes_a_run_of_two_sides(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    taken: list[tuple[list[str], bool]] = []
+    taken: list[list[str]] = []
 
-    def run_sides(sides: Mapping[str, Config], screen: object, *, page: bool) -> int:
-        taken.append((list(sides), page))
-        return 42
+    def run_attended(configs: Mapping[str, Config], screen: object) -> SimpleNamespace:
+        taken.append(list(configs))
+        return SimpleNamespace(exit_code=42)
 
-    monkeypatch.setattr("live.commands.two_cameras.run_sides", run_sides)
+    monkeypatch.setattr("live.commands.run.run_attended", run_attended)
+    monkeypatch.setattr("live.commands.run.finish", lambda outcome, screen, verbose: outcome.exit_code)
     words = ["run", "--camera", "sim:", "--load", "none:", "--out", str(tmp_path / "run")]
     assert main([*words, "--back", "sim:?side=back"]) == 42
-    assert taken == [(["front", "back"], False)]
+    assert main([*words, "--beside", "sim:", "--beside", "sim:", "--beside", "sim:"]) == 42
+    assert main(words) == 42
+    assert taken == [["front", "back"], ["first", "second", "third", "fourth"], [""]]

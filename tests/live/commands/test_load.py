@@ -24,12 +24,12 @@ from live.commands import identify, load_calibrate, load_check, recover, run
 from live.commands.consumers import standard_consumers
 from live.config.loading import load_config
 from live.pipeline.consumer import RunInfo
-from live.pipeline.consumer_thread import Outputs
 from live.pipeline.run_state import RunState
 from live.ui.rerun import view as viewer
 from live.ui.terminal.screen import TerminalScreen
 from tests.acquire.session.test_damage import abandoned
 from tests.live.made_up import CAMERA, START, make_grid
+from tests.live.streaming import Published
 from tests.live.ui.waiting import LONG_S, until
 
 
@@ -166,7 +166,7 @@ def test_the_port_that_is_told_is_the_one_that_is_served(tmp_path: Path) -> None
         config = load_config(None, {"view.port": wanted, "view.rrd": False, "view.spawn": False})
         about = RunInfo(config, tmp_path, CAMERA, make_grid(), ClockPair(START, datetime.now(UTC)))
         consumers = standard_consumers(TerminalScreen())(about, run_state)
-        outputs = Outputs(consumers, run_state.loads, run_state.event_log, run_state.history)
+        outputs = Published(consumers, run_state)
         try:
             until(lambda: run_state.health.view_port is not None)
             port = run_state.health.view_port

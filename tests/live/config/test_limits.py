@@ -63,7 +63,7 @@ COUNTS: dict[str, tuple[int | None, int, int]] = {
     "view.port": (9876, 1024, 65_535),
 }
 OTHERS = {
-    "camera": {"address": "", "back": None, "beside": None, "crop": None, "dark": None, "flat": None},
+    "camera": {"address": "", "back": None, "beside": (), "crop": None, "dark": None, "flat": None},
     "load": {"address": "none:", "unit": None, "column": None, "decimal": None, "sign": 1},
     "measure": {
         "roi": None, "mask": None, "gauges": "given", "window": "gaussian", "estimator": "spectral",

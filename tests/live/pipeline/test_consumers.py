@@ -16,18 +16,19 @@ from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from examples.second_consumer import main
 from live.pipeline.consumer import Consumer, Policy
-from live.pipeline.consumer_thread import MAX_EVENTS, ConsumerThread, Outputs
 from live.pipeline.event_log import EventLog
-from live.pipeline.history import History
 from live.pipeline.measurement import Measurement
+from live.pipeline.run_state import RunState
 from live.results.writer import ResultsConsumer
 from live.run.alarms import AlarmWatch
 from live.run.strain_output import StrainOut
+from live.stream.adapted import MAX_EVENTS, Adapted
 from live.ui.rerun.consumer import CardWriter, FiguresWriter, RerunConsumer
 from live.ui.web.page_consumer import PageConsumer
 from tests.live.fakes import frame
 from tests.live.made_up import START, make_loads, make_measurement
-from tests.live.ui.waiting import LONG_S
+from tests.live.streaming import Published, record_of
+from tests.live.ui.waiting import LONG_S, until
 
 
 class RecordingConsumer(Consumer):
@@ -53,12 +54,12 @@ class RecordingConsumer(Consumer):
         return "kept"
 
 
-def outputs(*consumers: Consumer, loads: LoadLog | None = None) -> tuple[Outputs, EventLog]:
-    event_log = EventLog()
-    return Outputs(consumers, loads or LoadLog(), event_log, History()), event_log
+def outputs(*consumers: Consumer, loads: LoadLog | None = None) -> tuple[Published, EventLog]:
+    state = RunState.new(0.5)
+    return Published(consumers, state, loads), state.event_log
 
 
-def give(out: Outputs, numbers: Sequence[int]) -> None:
+def give(out: Published, numbers: Sequence[int]) -> None:
     for number in numbers:
         out.add(make_measurement(number))
 
@@ -264,16 +265,32 @@ def test_measurements_that_wait_for_their_force_come_at_the_end() -> None:
 
 def test_one_that_has_failed_takes_nothing_more() -> None:
     taker = RecordingConsumer(blocks=False, fails_at=1)
-    thread = ConsumerThread(taker, lambda name, why, critical: None)
+    thread = Adapted(taker, lambda name, why, critical: None)
     thread.start()
-    assert thread.wants("measurement") and not thread.wants("frame")
+    assert thread.takes == [Measurement]
     for number in range(3):
-        thread.give("measurement", make_measurement(number))
-    assert taker.rows == [0] and not thread.wants("measurement")
+        thread.take(record_of(make_measurement(number)))
+    assert taker.rows == [0]
     report = thread.end()
     assert (report.taken, report.dropped, report.failed) == (
         {"measurement": 1}, {}, "strain.h5: the disk is full",
     )  # fmt: skip
+
+
+def test_one_that_has_failed_queues_nothing_more() -> None:
+    taker, go = RecordingConsumer(queue_size=2, fails_at=0), threading.Event()
+
+    def busy(name: str, why: str, critical: bool) -> None:
+        go.wait(LONG_S)
+
+    thread = Adapted(taker, busy)
+    thread.start()
+    thread.take(record_of(make_measurement(0)))
+    until(lambda: bool(thread.failed))
+    for number in range(1, 10):
+        thread.take(record_of(make_measurement(number)))
+    go.set()
+    assert thread.end().dropped == {}
 
 
 def test_it_sees_every_measurement_and_stands_in_the_report(

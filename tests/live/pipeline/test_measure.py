@@ -26,7 +26,7 @@ from live.pipeline.history import SHORT, AxisFinder, History, curve_of
 from live.pipeline.measure import NewReference, Tracker, measure
 from live.pipeline.measurement import HOLD_S, ForceMatching, Measurement, TimeStep, ordered_mean
 from live.pipeline.reference import averaged, frame_noise, motion_between, prepare
-from live.run.measuring import SmearGuard
+from live.run.measurer import SmearGuard
 from tests.live.fakes import frame
 from tests.live.made_up import START, make_loads, make_measurement
 

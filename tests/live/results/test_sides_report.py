@@ -17,11 +17,11 @@ import pytest
 from acquire.errors import DataError
 from analysis.evaluate import Curve, GaugeValue, TwoSides
 from live.pipeline.run_state import RunState
-from live.results.report.sides import _strains, _stress_strain, report_of_fields, report_of_sides
+from live.results.report.cameras import _strains, _stress_strain, report_of_fields, report_of_sides
 from live.results.run_folder import open_run
 from live.results.sides import folder as clocks
 from live.results.sides.channels import JointChannels
-from live.results.sides.folder import recorded_sides_in, shift_s, sides_in
+from live.results.sides.folder import cameras_in, recorded_cameras_in, shift_s
 from live.results.sides.together import SideOfTest, SidesOfTest, _at_the_front, _mean_of, newest, write_sides
 from tests.live.made_run import CONFIG, GAUGES, PULLED, force_of, make_run, noisy
 from tests.live.made_up import START, make_measurement
@@ -148,7 +148,7 @@ def test_the_report_of_two_fields(folder: Path) -> None:
         [1e6 * share * PULLED[-1] for share in (1 + BENT, 1 - BENT)], rel=0.02
     )
     np.testing.assert_allclose(plot.curves[1].x, 0.1 * np.arange(len(PULLED)), atol=1e-9)
-    assert "Budget of E, second" in made.html and "S1: two fields of view" in made.html
+    assert "Budget of E, second" in made.html and "S1: 2 fields of view" in made.html
 
 
 def test_a_side_has_its_clock_and_its_gauges(folder: Path) -> None:
@@ -230,12 +230,12 @@ def test_which_folder_holds_two_cameras(tmp_path: Path) -> None:
     for name in ("front/strain.h5", "back/strain.h5", "back/session.h5"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).touch()
-    assert sides_in(tmp_path) == ("front", "back") and recorded_sides_in(tmp_path) is None
+    assert cameras_in(tmp_path) == ("front", "back") and recorded_cameras_in(tmp_path) == ()
     (tmp_path / "front/session.h5").touch()
-    assert recorded_sides_in(tmp_path) == ("front", "back")
+    assert recorded_cameras_in(tmp_path) == ("front", "back")
     (tmp_path / "strain.h5").touch()
-    assert sides_in(tmp_path) is None and recorded_sides_in(tmp_path) == ("front", "back")
-    with pytest.raises(DataError, match=r"a test with two cameras; give the folder of one, .*front"):
+    assert cameras_in(tmp_path) == () and recorded_cameras_in(tmp_path) == ("front", "back")
+    with pytest.raises(DataError, match=r"a test with several cameras; give the folder of one, .*front"):
         (tmp_path / "strain.h5").unlink()
         open_run(tmp_path)
 

@@ -8,20 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquire.frame import Frame
 from live.pipeline.run_state import RunState
-from live.run.grabber import Grabber, GrabPlan
+from live.run.camera_source import CameraSource, GrabPlan
 from tests.live.fakes import ListCamera, frame
+from tests.live.streaming import KeptState, Noted
 
 
-def grabbed(frames: list[Any]) -> tuple[RunState, Grabber, list[Any]]:
+def grabbed(frames: list[Any]) -> tuple[RunState, CameraSource, list[Any]]:
     """What comes of frames 0.05 s apart, by a reference of 2 and bursts of 2."""
-    state, seen = RunState.new(0.5), []
-    camera = ListCamera(frames, live=True)
-    grabber = Grabber(camera, GrabPlan(2, 2), state, lambda one, role: seen.append(one))
+    kept = KeptState()
+    seen, camera = Noted(kept.stream, Frame), ListCamera(frames, live=True)
+    source = CameraSource(camera, GrabPlan(2, 2), kept.state, kept.stream)
     with camera:
-        grabber.start()
-        grabber.join()
-    return state, grabber, seen
+        source.start()
+        source.join()
+    return kept.state, source, seen.bodies()
 
 
 def frames(n: int, damaged: range) -> list[Any]:
@@ -50,7 +52,7 @@ def test_those_that_last_to_the_end_are_said_at_their_begin() -> None:
 def test_a_picture_of_another_size_is_a_damaged_one() -> None:
     given = frames(10, range(0))
     given[5] = replace(given[5], image=np.zeros((4, 7), given[5].image.dtype))
-    state, grabber, seen = grabbed(given)
-    assert grabber.error is None and state.frame_counts.lost == 1
+    state, source, seen = grabbed(given)
+    assert source.error is None and state.frame_counts.lost == 1
     assert [one.index for one in seen if one.damaged] == [5]
     assert seen[5].image.shape == given[0].image.shape and not seen[5].image.any()

@@ -13,25 +13,25 @@ from typing import Any
 import pytest
 
 from live.pipeline.latency import LatencyMonitor, LatencySample
-from live.run import measuring
-from live.run.measuring import MeasureThread
+from live.run import measurer
+from live.run.measurer import Measurer
 from tests.live.made_up import START, make_measurement
 
 
 @pytest.fixture
-def thread(monkeypatch: pytest.MonkeyPatch) -> MeasureThread:
+def thread(monkeypatch: pytest.MonkeyPatch) -> Measurer:
     """One that is not started; half a second has passed since START."""
-    monkeypatch.setattr(measuring, "time", SimpleNamespace(monotonic=lambda: START + 0.5))
+    monkeypatch.setattr(measurer, "time", SimpleNamespace(monotonic=lambda: START + 0.5))
     nothing: Any = None
-    return MeasureThread(nothing, nothing, nothing, nothing, nothing, nothing)
+    return Measurer(nothing, nothing, nothing, nothing, nothing, nothing)
 
 
-def test_it_counts_from_the_last_frame(thread: MeasureThread) -> None:
+def test_it_counts_from_the_last_frame(thread: Measurer) -> None:
     """The burst's time is that of its middle, and it took 0.07 s."""
     assert thread._timed(make_measurement(0)).time_step.latency_s == pytest.approx(0.5 - 0.035)
 
 
-def test_nominal_times_have_none(thread: MeasureThread) -> None:
+def test_nominal_times_have_none(thread: Measurer) -> None:
     made = make_measurement(0)
     made = replace(made, burst=replace(made.burst, clock="nominal"))
     assert math.isnan(thread._timed(made).time_step.latency_s)

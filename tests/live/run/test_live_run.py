@@ -10,16 +10,20 @@ import pytest
 
 from acquire.errors import DataError, DeviceError
 from acquire.events import EventKind
+from acquire.frame import Frame
 from acquire.load_cell.contract import NoLoadCell
 from live.config.loading import load_config
-from live.pipeline.consumer_thread import Outputs
+from live.pipeline.consumer import Consumer
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
-from live.run import live_run as module
-from live.run.burst_queue import TAKING
+from live.run import camera_run as module
+from live.run.camera_run import CameraRun
 from live.run.control import ControlRefused
-from live.run.live_run import INTERRUPTED, TIME_IS_OVER, LiveRun
-from live.run.outcome import StopSignal
+from live.run.incoming_bursts import TAKING
+from live.run.live_run import CameraOfTest, LiveRun, _run
+from live.run.outcome import INTERRUPTED, TIME_IS_OVER, StopSignal
+from live.stream.record import Waiting
+from live.stream.stream import Stream, Subscriber
 from tests.live.fakes import ListCamera, frame
 from tests.live.made_up import make_measurement
 
@@ -36,15 +40,17 @@ class Words(Screen):
         self.shown.append((snapshot.state, words))
 
 
-class Recording:
+class Recording(Subscriber):
     """In place of the pre-trigger buffer."""
 
-    def __init__(self, *, on: bool = True) -> None:
-        self.on, self.failed, self.takes_bursts, self.backlog = on, None, False, 0.0
-        self.given: list[tuple[int, bool]] = []
+    takes = (Frame,)
 
-    def frame(self, one: Any, *, is_reference: bool) -> None:
-        self.given.append((one.index, is_reference))
+    def __init__(self, *, on: bool = True) -> None:
+        self.on, self.failed, self.backlog = on, None, 0.0
+        self.given: list[tuple[int, str]] = []
+
+    def take(self, record: Any) -> None:
+        self.given.append((record.body.index, record.role))
 
     def command(self, what: str) -> str:
         self.on = what == "start"
@@ -53,34 +59,39 @@ class Recording:
 
 def run(recording: Any = None, *, live: bool = True, seconds: float | None = None, measured: int = 0) -> Any:
     """A run of a reference of 4 and bursts of 2, that has ``measured`` so many bursts."""
-    run_state, screen, stop = RunState.new(0.5), Words(), StopSignal()
+    run_state, screen, stop, stream = RunState.new(0.5), Words(), StopSignal(), Stream()
     prepared: Any = SimpleNamespace(
         rig=SimpleNamespace(camera=ListCamera([], live=live), load=NoLoadCell()),
         config=load_config(None, {} if seconds is None else {"output.seconds": seconds}),
         bursts=(4, 2),
         folder=Path("run"),
+        plan=SimpleNamespace(grid=None),
+        start=None,
     )
     for k in range(measured):
         run_state.history.add(make_measurement(k).time_step)
-    outputs = Outputs([], run_state.loads, run_state.event_log, run_state.history)
-    found = LiveRun(prepared, run_state, outputs, recording, screen, stop)
-    return SimpleNamespace(run=found, state=run_state, screen=screen, stop=stop, outputs=outputs)
+    one = CameraRun("", prepared, run_state, screen, stop, stream, lambda about, state: [])
+    one.record_with(recording)
+    whole = LiveRun({"": one}, prepared.rig.load, Path("run"), stream, stop)
+    return SimpleNamespace(
+        run=whole, one=one, state=run_state, screen=screen, stop=stop, stream=stream, prepared=prepared
+    )
 
 
 def test_the_state_is_what_is_done_with_the_frames() -> None:
-    assert run().run.state == "not recorded" and not run().run.recording
+    assert run().one.state == "not recorded" and not run().run.recording
     recording = Recording()
     bench = run(recording)
-    assert bench.run.state == "REC" and bench.run.recording
+    assert bench.one.state == "REC" and bench.run.recording
     bench.run.command(EventKind.PAUSE)
-    assert bench.run.state == "REC, PAUSED" and bench.run.paused
+    assert bench.one.state == "REC, PAUSED" and bench.run.paused
     recording.failed = "the disk is full"  # type: ignore[assignment]
-    assert bench.run.state == "NOT RECORDING, PAUSED"
+    assert bench.one.state == "NOT RECORDING, PAUSED"
     armed = run(Recording(on=False))
-    assert armed.run.state == "ARMED"
-    assert armed.run.command(EventKind.RECORD, "start") == "start" and armed.run.state == "REC"
+    assert armed.one.state == "ARMED"
+    assert armed.run.command(EventKind.RECORD, "start") == "start" and armed.one.state == "REC"
     armed.run.command(EventKind.RECORD, "stop")
-    assert armed.run.state == "NOT RECORDING"
+    assert armed.one.state == "NOT RECORDING"
     with pytest.raises(ControlRefused, match="records nothing"):
         run().run.command(EventKind.RECORD, "start")
 
@@ -104,15 +115,15 @@ def test_commands_that_change_nothing_are_refused_and_others_are_events() -> Non
         (EventKind.NOTE, "slipped"), (EventKind.NEW_REFERENCE, "a new reference is taken from the next frames"),
         (EventKind.ALARM, "silenced: a"),
     ]  # fmt: skip
-    assert bench.run.grabber._retake.is_set()
+    assert bench.one.source._retake.is_set()
 
 
 def test_a_frame_is_of_a_reference_until_that_is_complete() -> None:
     recording = Recording()
     bench = run(recording)
     for k in range(6):
-        bench.run.grabber._take(frame(k))
-    assert recording.given == [(k, k < 4) for k in range(6)]
+        bench.one.source._take(frame(k))
+    assert recording.given == [(k, "reference" if k < 4 else "plain") for k in range(6)]
     assert bench.state.health.fps == pytest.approx(10.0)
 
 
@@ -128,9 +139,9 @@ def test_the_exit_code_says_what_was_lost(what: str, code: int) -> None:
     recording: Any = Recording()
     bench = run(recording, measured=0 if what == "no values" else 1)
     errors = {"DataError": DataError("x"), "DeviceError": DeviceError("x"), "a defect": ValueError("x")}
-    bench.run.grabber.error = errors.get(what)
-    bench.run._load.failure = 3 if what == "load" else 0
-    bench.run._measure_thread.failure = int(what == "measuring")
+    bench.one.source.error = errors.get(what)
+    bench.one._keeper.load_failure = 3 if what == "load" else 0
+    bench.one._measurer.failure = int(what == "measuring")
     bench.stop.request(INTERRUPTED if what == "interrupted" else "the time is over")
     counts = {"lost": {"lost": 1}, "load_lost": {"load_lost": 1}, "not counted": {"grabbed": 1},
               "unrecorded": {"unrecorded": 1, "grabbed": 1, "measured": 1},
@@ -138,8 +149,8 @@ def test_the_exit_code_says_what_was_lost(what: str, code: int) -> None:
     bench.state.frame_counts.add(**counts.get(what, {}))
     recording.failed = "the disk is full" if what == "disk" else None
     if what == "results":
-        bench.outputs._threads.append(SimpleNamespace(failed="stuck", critical=True))
-    assert bench.run.exit_code == code
+        bench.one.outputs._adapted.append(SimpleNamespace(failed="stuck", critical=True))
+    assert bench.one.exit_code == code
 
 
 @pytest.mark.parametrize(
@@ -154,9 +165,13 @@ def test_a_timed_run_ends_where_a_live_camera_has_gone_silent(
 ) -> None:
     bench = run(live=live, seconds=10.0)
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: 100.0))
-    bench.run.grabber.begun_t, bench.state.health.frame_t = 100.0 - begun_s, 100.0 - silent_s
-    bench.run._idle("")
-    assert (bench.stop.requested, bench.stop.reason) == (ends, TIME_IS_OVER if ends else "")
+    bench.one.source.begun_t, bench.state.health.frame_t = 100.0 - begun_s, 100.0 - silent_s
+    bench.stream.publish(Waiting(""))
+    assert bench.prepared.rig.camera.stopped.is_set() is ends
+    assert not bench.stop.requested, "other cameras go on"
+    bench.one.close()
+    (ended,) = bench.state.event_log.events()
+    assert ended.text == f"the test ends: {TIME_IS_OVER if ends else 'camera ended'}"
 
 
 def test_what_it_waits_for_is_shown_while_nothing_comes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -165,8 +180,8 @@ def test_what_it_waits_for_is_shown_while_nothing_comes(monkeypatch: pytest.Monk
     def shown(words: str, silent_s: float, measured: int, *, paused: bool = False) -> list[tuple[str, str]]:
         bench = run(measured=measured)
         bench.state.health.frame_t = 100.0 - silent_s
-        bench.run._burst_queue.paused = paused
-        bench.run._idle(words)
+        bench.one._incoming.paused = paused
+        bench.stream.publish(Waiting(words))
         return list(bench.screen.shown)
 
     assert shown("waiting for frames", 2.0, 1) == [("not recorded", "waiting for frames")]
@@ -185,12 +200,12 @@ def test_a_hint_where_frames_are_lost_again_and_again_in_the_reference(
     bench = run(measured=measured)
     bench.state.frame_counts.add(grabbed=grabbed, lost=lost)
     for _ in range(2):
-        bench.run._idle(TAKING)
+        bench.stream.publish(Waiting(TAKING))
     assert len(bench.state.event_log.events("warning")) == hints
 
 
 def ending(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, opened: Any) -> list[Any]:
-    """What is done about the outputs of a run whose recording is ``opened``, or cannot be."""
+    """What is done at the end of a test whose recording is ``opened``, or cannot be, and whose start fails."""
     bench, done = run(), list[Any]()
 
     def open_recording(*given: Any) -> Any:
@@ -201,15 +216,19 @@ def ending(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, opened: Any) -> list
     def fails(live: Any) -> None:
         raise DeviceError("the start failed")
 
-    prepared: Any = bench.run._prepared
-    prepared.folder, outputs = (
-        tmp_path,
-        SimpleNamespace(end=lambda: done.append("outputs"), frame=done.append),
-    )
+    class Ends(Consumer):
+        blocks = False
+
+        def end(self) -> str:
+            done.append("outputs")
+            return ""
+
     monkeypatch.setattr(module, "open_recording", open_recording)
     bench.state.event_log.add_listener(lambda event: done.append(event.text))
+    bench.prepared.folder, bench.prepared.announcement = tmp_path, lambda: ()
+    camera = CameraOfTest(bench.prepared.config, bench.screen, lambda about, state: [Ends()])
     with pytest.raises((DataError, DeviceError)):
-        module._with_outputs(prepared, bench.state, outputs, bench.screen, bench.stop, fails)  # type: ignore[arg-type]
+        _run({"": camera}, {"": bench.prepared}, {"": bench.state}, tmp_path, bench.stop, fails)
     assert '"address"' in (tmp_path / "config.json").read_text(encoding="utf-8")
     return done
 
@@ -229,6 +248,17 @@ def test_the_recording_is_closed_last_with_the_reason(
     done = ending(tmp_path, monkeypatch, recording)
     assert done[0] == "the test begins" and done[-2:] == ["outputs", "the test ends: camera ended"]
     assert closed == [{"stop_reason": "camera ended"}]
+
+
+def test_all_that_measure_have_ended_before_the_outputs_are_closed() -> None:
+    """The reference of one camera is refused while another still measures."""
+    bench, order = run(), list[str]()
+    measurer: Any = SimpleNamespace(end=lambda: order.append("measured"))
+    bench.one._measurer = measurer
+    bench.one.outputs = SimpleNamespace(end=lambda: order.append("outputs"))
+    bench.one.drain()
+    bench.one.close()
+    assert order == ["measured", "outputs"]
 
 
 def test_a_run_that_is_armed_says_so_when_it_begins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

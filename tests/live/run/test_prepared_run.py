@@ -16,7 +16,7 @@ from acquire.load_sample import LoadSample
 from live.config.loading import load_config
 from live.pipeline.event_log import EventLog
 from live.run import prepared_run
-from live.run.grabber import GrabPlan, _bytes_a_pixel, _held, _held_at_first
+from live.run.camera_source import GrabPlan, _bytes_a_pixel, held_at_first, held_bursts
 from live.run.prepared_run import PreparedRun, _burst_lengths, _device_names, _time_zero, new_run_state
 from tests.live.fakes import ListCamera, frame
 
@@ -69,7 +69,7 @@ def test_so_many_bursts_may_wait_for_the_first_measurement_and_later(
     info: CameraInfo, burst: int, at_first: int, later: int
 ) -> None:
     plan = GrabPlan(burst, 32)
-    assert (_held_at_first(info, plan), _held(info, plan, 0.25)) == (at_first, later)
+    assert (held_at_first(info, plan), held_bursts(info, plan, 0.25)) == (at_first, later)
 
 
 def test_the_bytes_of_a_burst_that_waits() -> None:

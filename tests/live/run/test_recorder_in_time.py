@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from acquire.events import Event, EventKind
-from acquire.frame import CameraInfo
+from acquire.frame import Burst, CameraInfo
 from acquire.load_cell.contract import NoLoadCell
 from acquire.load_sample import LoadSample
 from live.config.loading import load_config
@@ -53,7 +53,7 @@ class Opened:
 
 def test_a_recording_is_opened_as_configured(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Opened(monkeypatch)
-    assert bench.found is not None and bench.found.on and not bench.found.takes_bursts
+    assert bench.found is not None and bench.found.on and Burst not in bench.found.takes
     assert bench.given["writer"][:2] == ("SessionWriter", Path("run/session.h5"))
     assert (bench.given["limit"], bench.given["waits"], bench.given["mode"].kind) == (
         512_000_000,
@@ -67,7 +67,7 @@ def test_a_recording_is_opened_as_configured(monkeypatch: pytest.MonkeyPatch) ->
         monkeypatch, live=False, buffer_MB=4.0, rotate_MB=20.0, keep_s=0.5, armed=True, start_above_N=30.0,
         mode="bursts",
     )  # fmt: skip
-    assert other.found is not None and not other.found.on and other.found.takes_bursts
+    assert other.found is not None and not other.found.on and Burst in other.found.takes
     assert other.given["writer"][0] == "RotatingWriter" and other.given["writer"][3] == 20_000_000
     assert (other.given["limit"], other.given["waits"], other.given["mode"].kind) == (
         4_000_000,

@@ -11,10 +11,14 @@ import pytest
 
 from acquire.frame import Frame
 from live.pipeline.event_log import EventLog
+from live.pipeline.reference import ReferenceBurst
 from live.pipeline.run_state import RunState
-from live.run.grabber import Grabber, GrabPlan
+from live.run.camera_source import CameraSource, GrabPlan
 from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
+from live.stream.record import ReferenceWanted
+from live.stream.stream import Stream
 from tests.live.fakes import ListCamera, frame
+from tests.live.streaming import Noted
 
 FRAMES, PLACES = 24, ("before", "handed on", "recorded", "averaged")
 
@@ -49,29 +53,25 @@ def test_no_frame_of_a_reference_is_missing_wherever_the_command_comes(place: st
 
 def _once(rng: random.Random, place: str) -> None:
     written, n, at, on = Written(), rng.randint(1, 5), rng.randrange(FRAMES), rng.random() < 0.3
-    state, settings = RunState.new(0.25), PreTrigger(0.4, 10**6)
-    buffer = PreTriggerBuffer(written, state.frame_counts, EventLog(), settings, on=on)  # type: ignore[arg-type]
+    state, stream, settings = RunState.new(0.25), Stream(), PreTrigger(0.4, 10**6)
 
-    def give(here: str, one: Frame) -> None:
-        if here == place and one.index == at:
-            _on_a_thread(grabber.take_reference)
+    def give(here: str, index: int) -> None:
+        if here == place and index == at:
+            _on_a_thread(lambda: stream.publish(ReferenceWanted()))
 
-    def take(one: Frame, is_reference: bool) -> None:
-        give("handed on", one)
-        buffer.frame(one, is_reference=is_reference)
-        give("recorded", one)
+    def giving(here: str) -> None:
+        Noted(stream, Frame, each=lambda record: give(here, record.body.index))
 
-    def before(one: Frame) -> None:
-        give("before", one)
-        rate(one)
-
-    grabber = Grabber(ListCamera([], live=True), GrabPlan(1, n), state, take)
-    rate, grabber._rate = grabber._rate, before  # type: ignore[method-assign]
+    references = Noted(stream, ReferenceBurst)
+    giving("handed on")
+    stream.add(PreTriggerBuffer(written, state.frame_counts, EventLog(), settings, on=on))  # type: ignore[arg-type]
+    giving("recorded")
+    source = CameraSource(ListCamera([], live=True), GrabPlan(1, n), state, stream)
     for k in range(FRAMES):
-        grabber._take(frame(k))
-        give("averaged", frame(k))
+        give("before", k)
+        source._take(frame(k))
+        give("averaged", k)
     indices = [one.index for one in written.frames]
     assert indices == sorted(set(indices))
-    while not grabber.references.empty():
-        burst = grabber.references.get().burst
-        assert {*range(burst.first_index, burst.last_index + 1)} <= {*indices}
+    for reference in references.bodies():
+        assert {*range(reference.burst.first_index, reference.burst.last_index + 1)} <= {*indices}

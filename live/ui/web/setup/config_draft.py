@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import write_picture
+from live.config.cameras import camera_configs, other_cameras
 from live.config.loading import Config, from_dict, load_config, settings_in
 from live.config.rig_file import write_rig
-from live.config.sides import second_camera, side_configs
 
 CHANGEABLE = frozenset(
     {
@@ -118,18 +118,29 @@ class ConfigDraft:
 
 
 def second_draft(first: ConfigDraft) -> ConfigDraft | None:
-    """That of a second camera, with a rig file of its own; None where there is one camera. Raises ConfigError."""
-    address = second_camera(first.config)
-    if address is None:
+    """That of a second camera, with a rig file of its own; None where there is one camera.
+
+    Raises
+    ------
+    ConfigError
+        There are more than two; the rig file of the second cannot be read.
+    """
+    given = other_cameras(first.config)
+    if len(given) > 1:
+        raise ConfigError(
+            "the page sets up one camera beside the first; phasedic run --page takes all of them"
+        )
+    if not given:
         return None
-    name, own = list(side_configs(first.config, first.overrides).items())[1]
+    (address,) = given
+    name, own = list(camera_configs(first.config, first.overrides).items())[1]
     if address.lower().endswith(".toml"):
         return ConfigDraft(own, Path(address), {})
-    given, usual = own.as_dict(), Config().as_dict()
+    values, usual = own.as_dict(), Config().as_dict()
     taken = {
         f"{section}.{key}": value
         for section in ("measure", "scale", "gauges")
-        for key, value in given[section].items()
+        for key, value in values[section].items()
         if value != usual[section].get(key)
     }
     path = first.path.with_stem(f"{first.path.stem}-{name}")

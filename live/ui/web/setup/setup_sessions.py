@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
+from live.config.cameras import BACK, names_of
 from live.config.loading import Config
-from live.config.sides import BACK, names_of
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.setup.config_draft import ConfigDraft
 from live.ui.web.setup.drawn_region import DrawnRegion

@@ -10,13 +10,14 @@ const WORDS = {
   opening: "opening", reference: "reference: keep still", measuring: "measuring", paused: "paused", ended: "closing the files",
 };
 const RECORDING = { on: "REC", off: "NOT RECORDING" };
-let state = null, firstEnded = false;
+let state = null, firstEnded = false, secondGoesOn = false;
 
 $("strainunit").value = strainUnit().name;
 $("strainunit").addEventListener("change", (event) => { chooseStrainUnit(event.target.value); event.target.blur(); });
 addEventListener("unit", () => { if (state) showStrains(state); });
 
 export function beginRun(stage) {
+  secondGoesOn = false;
   clearCurves();
   beginMap(stage);
   beginViews("run", (value) => { if (value.picture) showMap(value.picture, value.side); });
@@ -25,7 +26,8 @@ export function beginRun(stage) {
 
 export function showRun(value) {
   firstEnded = value.state === "ended";
-  show(value);
+  if (firstEnded && secondGoesOn) state = value;
+  else show(value);
   noteFailed(value.sides?.cameras);
   showMapOf(value, false);
   if (value.points) updateCurves(value.points);
@@ -70,7 +72,8 @@ function showFigure(id, one, text, beside = "") {
 
 // The other one of two cameras has its card, and its map where it is chosen; the figures too once the first has ended.
 export function showSecond(value) {
-  if (firstEnded && value.state !== "ended") show({ ...value, sides: state.sides && { ...state.sides, strains: [] } });
+  secondGoesOn = value.state !== "ended";
+  if (firstEnded && secondGoesOn) show({ ...value, sides: state.sides && { ...state.sides, strains: [] } });
   showMapOf(value, true);
 }
 

@@ -9,12 +9,12 @@ import pytest
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from live.config.sections import SpecimenConfig
-from live.pipeline.consumer_thread import Outputs
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import RunState
 from live.results.summary import StatusCard
 from live.ui.rerun.consumer import CARD_TIME_STEPS, CardWriter, FiguresWriter, RerunConsumer
 from tests.live.made_up import START, make_frame, make_loads, make_measurement
+from tests.live.streaming import Published
 
 
 class RecordingView:
@@ -35,12 +35,10 @@ class RecordingView:
     report = "all drawn"
 
 
-def watched(*views: RecordingView) -> tuple[Outputs, EventLog]:
+def watched(*views: RecordingView) -> tuple[Published, EventLog]:
     run_state = RunState.new(1.0)
     watching = [RerunConsumer(view, run_state) for view in views]  # type: ignore[arg-type]
-    return Outputs(
-        watching, make_loads(10.0, lambda t: t), run_state.event_log, run_state.history
-    ), run_state.event_log
+    return Published(watching, run_state, make_loads(10.0, lambda t: t)), run_state.event_log
 
 
 def test_everything_is_offered() -> None:

@@ -16,7 +16,7 @@ import pytest
 from acquire.errors import DataError
 from live.commands import page as page_command
 from live.commands.exit_codes import EXIT_INTERRUPTED, LOSS
-from live.commands.two_cameras import finish
+from live.commands.run import finish
 from live.config.loading import load_config
 from live.pipeline.screen import Screen
 from live.ui.web import page_controller
@@ -64,9 +64,9 @@ def test_a_specimen_has_a_folder_of_its_name(at: PageController, tmp_path: Path)
     assert at._free_name("bar-1") == "bar-3" and at._free_name("bar-7") == "bar-7"
     config = load_config(None, {"metadata.specimen": "bar-1"})
     sessions: Any = SimpleNamespace(configs=lambda folder: [config, "another"])
-    assert at._to_run(sessions).output.dir == str(runs / "bar-1_2") and at.second == "another"
+    assert at._to_run(sessions).output.dir == str(runs / "bar-1_2") and at.others == ["another"]
     sessions.configs = lambda folder: [load_config(None, {"metadata.specimen": "bar-9"})]
-    assert at._to_run(sessions).output.dir == str(runs / "bar-9") and at.second is None
+    assert at._to_run(sessions).output.dir == str(runs / "bar-9") and at.others == []
 
 
 def test_each_stage_has_its_commands(at: PageController) -> None:
@@ -216,7 +216,9 @@ def served(
             (place / "report.html").touch()
         return "" if made else "why not"
 
-    monkeypatch.setattr(page_command, "_run", run)
+    monkeypatch.setattr(page_command, "run_with_page", run)
+    monkeypatch.setattr(page_command, "camera_configs", lambda config, given, others: {"": config})
+    controller.others = []  # type: ignore[attr-defined]
     monkeypatch.setattr(page_command, "write_report", written)
     page_command.serve(controller, {}, Said(), interrupted)  # type: ignore[arg-type]
     return interrupted
@@ -252,20 +254,26 @@ def test_two_cameras_are_put_together_at_the_end(
         if fails:
             raise DataError("not of one test")
 
-    monkeypatch.setattr("live.commands.two_cameras.put_together", put)
-    monkeypatch.setattr("live.commands.two_cameras.print_summary", lambda side, *_: side.print("a summary"))
-    monkeypatch.setattr("live.commands.two_cameras.trouble_lines", lambda *_: [])
+    def summary(screen: Screen, *given: Any, **named: Any) -> None:
+        assert not named["with_report"], "there is one report, of all cameras"
+        screen.print("a summary")
+
+    monkeypatch.setattr("live.commands.run.put_together", put)
+    monkeypatch.setattr("live.commands.run.print_summary", summary)
+    monkeypatch.setattr("live.commands.run.trouble_lines", lambda *_, **named: [])
     monkeypatch.setattr(
         "live.commands.report.write_report", lambda folder, screen: screen.print(f"report {folder}")
     )
     side: Any = SimpleNamespace(run_state=None, test=None, outputs=SimpleNamespace(reports=()), folder=tmp_path,
                                 config=SimpleNamespace(specimen=None, output=SimpleNamespace(report=True)))  # fmt: skip
-    both: Any = SimpleNamespace(screen=screen, side=lambda name: screen)
-    outcome: Any = SimpleNamespace(folder=tmp_path, exit_code=code, sides={"front": side, "back": side})
-    assert finish(outcome, both) == found
+    outcome: Any = SimpleNamespace(folder=tmp_path, exit_code=code, cameras={"front": side, "back": side})
+    assert finish(outcome, screen) == found
     assert joined == [(tmp_path / "front", tmp_path / "back", tmp_path / "strain.csv")]
-    assert screen.lines[:3] == ["a summary", "a summary", ""] and f"report {tmp_path}" in screen.lines
+    assert (
+        screen.lines[:3] == ["front: a summary", "back: a summary", ""]
+        and f"report {tmp_path}" in screen.lines
+    )
     assert any("were not put together: not of one test" in line for line in screen.lines) is fails
     assert (f"exit code {found}: " in screen.lines[-1]) is bool(found)
-    outcome.sides = {"first": side, "second": side}
-    assert finish(outcome, both) == code and len(joined) == 1, "fields are not put together"
+    outcome.cameras = {"first": side, "second": side}
+    assert finish(outcome, screen) == code and len(joined) == 1, "fields are not put together"

@@ -20,16 +20,18 @@ from analysis import StrainField
 from analysis.evaluate import GAUGE_KINDS, GaugeValue
 from live.config.loading import Config, load_config
 from live.pipeline.consumer import Consumer
-from live.pipeline.consumer_thread import ConsumerThread
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.results.maps.field_maps import FIELD_MAPS
+from live.stream.adapted import Adapted
+from live.stream.record import Matched
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.curve_history import MAX_POINTS, CurveHistory
 from live.ui.web.map_view import MapView, plate_shapes
 from live.ui.web.page_consumer import PageConsumer, elongation_length
 from live.ui.web.painting import RED, mark_saturated, shrunk, traffic_light
 from tests.live.made_up import make_frame, make_measurement
+from tests.live.streaming import record_of
 from tests.live.ui.waiting import until
 from tests.live.ui.web.sentences import (
     LANGUAGES,
@@ -156,30 +158,30 @@ def test_points_are_bounded_and_a_page_gets_what_it_lacks() -> None:
 
 
 @pytest.fixture
-def worker(config: Config) -> Iterator[ConsumerThread]:
+def worker(config: Config) -> Iterator[Adapted]:
     broadcaster = Broadcaster()
     for _ in range(8):
         assert broadcaster.open() is not None
-    worker = ConsumerThread(PageConsumer(broadcaster, config), lambda *told: pytest.fail(str(told)))
+    worker = Adapted(PageConsumer(broadcaster, config), lambda *told: pytest.fail(str(told)))
     worker.start()
     yield worker
     worker.end()
 
 
-def costs_of(worker: ConsumerThread, m: Measurement) -> list[float]:
+def costs_of(worker: Adapted, m: Measurement) -> list[float]:
     """Time that each of many measurements takes of the thread that passes it on, s."""
     costs = []
     for _ in range(200):
         began = time.thread_time()
-        worker.give("measurement", m)
-        worker.give("matched", m)
+        worker.take(record_of(m))
+        worker.take(record_of(Matched(m)))
         costs.append(time.thread_time() - began)
         time.sleep(0.002)
     return costs
 
 
 @pytest.mark.timed
-def test_eight_frozen_pages_cost_the_measuring_thread_under_a_millisecond(worker: ConsumerThread) -> None:
+def test_eight_frozen_pages_cost_the_measuring_thread_under_a_millisecond(worker: Adapted) -> None:
     """In thread time: other busy programs do not count."""
     assert np.percentile(costs_of(worker, measurement()), 95) < 1e-3
 
@@ -190,9 +192,9 @@ def test_a_failing_page_is_one_consumer_that_failed(config: Config) -> None:
             raise RuntimeError("no")
 
     told: list[tuple[str, str, bool]] = []
-    worker = ConsumerThread(Broken(Broadcaster(), config), lambda *said: told.append(said))
+    worker = Adapted(Broken(Broadcaster(), config), lambda *said: told.append(said))
     worker.start()
-    worker.give("measurement", measurement())
+    worker.take(record_of(measurement()))
     report = worker.end()
     assert report.failed and told[0][2] is False
     assert isinstance(Broken(Broadcaster(), config), Consumer)

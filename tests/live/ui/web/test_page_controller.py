@@ -13,8 +13,8 @@ import pytest
 from acquire.events import EventKind
 from acquire.files.picture import write_picture
 from acquire.frame import Frame
+from live.config.cameras import camera_configs
 from live.config.loading import Config, load_config
-from live.config.sides import side_configs
 from live.pipeline.run_state import RunState
 from live.setup.devices import at_rest, open_rig
 from live.ui.web.broadcaster import Broadcaster
@@ -172,9 +172,9 @@ def test_two_cameras_are_set_up_checked_saved_and_started_together(tmp_path: Pat
         )
         assert own.measure.roi == (20, 20, 181, 151) and "behind" in own.gauges
         assert at.command("start") == "ok"
-        config, second = at.has_ended(), at.controller.second
-        assert config is not None and second is not None
-        configs = side_configs(config, {}, second)
+        config, others = at.has_ended(), at.controller.others
+        assert config is not None and len(others) == 1
+        configs = camera_configs(config, {}, others)
         assert configs["back"].measure.roi == (20, 20, 181, 151) and configs["back"].load.address == "sim:"
         assert configs["back"].specimen.width_mm == 12.5 and configs["front"].measure.roi != (
             20,
@@ -207,6 +207,7 @@ class Run:
     def __init__(self) -> None:
         self.received: list[str] = []
         self.run_state = RunState.new(0.5)
+        self.states, self.cameras = {"": self.run_state}, {"": self}
 
     def stop(self, reason: str) -> None:
         self.received.append("quit")
@@ -219,7 +220,7 @@ class Run:
 def test_commands_during_a_run_and_after(at: PageSession) -> None:
     at.controller.quit()
     assert at.has_ended() is None
-    at.controller.begin(load_config(None, {}))
+    at.controller.begin({"": load_config(None, {})})
     assert at.command("tare") == "no: the test is being opened"
     run: Any = Run()
     at.controller.attach(run)

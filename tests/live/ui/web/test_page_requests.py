@@ -50,7 +50,9 @@ def test_requests_name_their_camera() -> None:
     config, states = load_config(None, {}), {}
     runs = {name: Run(config) for name in both.by_name}
     states = {name: run.run_state for name, run in runs.items()}
-    both.attach_both(runs["front"], runs)
+    test: Any = runs["front"]
+    test.cameras, test.states = runs, states
+    both.attach(test)
     assert back.state()["sides"] is None and front.state()["sides"] is not None
     states["back"].history.add(pictured(strain=4e-3).time_step)
     assert back.state()["axial"]["value"] == pytest.approx(4e-3) and "axial" not in front.state()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from live.config.loading import load_config
-from live.pipeline.consumer_thread import ConsumerThread
+from live.stream.adapted import Adapted
 from live.ui.web.broadcaster import MAX_PAGES
 from live.ui.web.page_controller import PageController
 from tests.live.ui.waiting import until
@@ -98,8 +98,8 @@ def test_eight_pages_that_do_not_read_cost_under_a_millisecond_a_measurement() -
     """In the time of the thread that measures: another busy program is not the page's doing."""
     config, m = load_config(None, {}), measurement()
     with PageController(None, port=0) as controller:
-        watching = controller.begin(config)
-        worker = ConsumerThread(watching, lambda *told: pytest.fail(str(told)))
+        watching = controller.begin({"": config})[""]
+        worker = Adapted(watching, lambda *told: pytest.fail(str(told)))
         worker.start()
         pages = [HttpPage(controller.address) for _ in range(MAX_PAGES)]
         streams = list(controller._broadcaster._subscribers)

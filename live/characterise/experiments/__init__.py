@@ -1,1 +1,0 @@
-"""One module an experiment: a table or figure of the paper, or one beyond it."""

@@ -1,0 +1,89 @@
+"""``phasedic inspect``: one ZOI of a session, its windowed spectrum and its phases.
+
+live.setup.pattern.spectrum draws the figure and needs matplotlib. Heavy modules are imported when the command runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from acquire.errors import ConfigError, DataError
+from live.ui.terminal.screen import print_line
+
+if TYPE_CHECKING:
+    from analysis.field import ZoiGrid
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic inspect``."""
+    parser.add_argument("session", help="session.h5, or the folder of its run")
+    parser.add_argument("--zoi", required=True, metavar="R,C", help="row and column of the ZOI in the grid")
+    parser.add_argument(
+        "--frame", type=int, required=True, metavar="N", help="number of the frame (or burst), from 0"
+    )
+    parser.add_argument("--reference", type=int, default=0, metavar="N", help="reference frame (default 0)")
+    parser.add_argument("--size", type=int, metavar="PX", help="side of a ZOI (default: as recorded)")
+    parser.add_argument("--step", type=int, metavar="PX", help="distance of ZOIs (default: as recorded)")
+    parser.add_argument("--out", default="zoi.png", metavar="FILE", help="the figure (default zoi.png)")
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """``phasedic inspect SESSION --zoi R,C --frame N``."""
+    from acquire.session import Session
+    from live.setup.pattern.outcome import figure, save_new
+    from live.setup.pattern.spectrum import draw_spectrum, zoi_spectrum
+
+    row, column = _row_and_column(arguments.zoi)
+    out = Path(arguments.out)
+    with Session.open(arguments.session) as session:
+        grid = _grid_of(session, arguments)
+        rows, columns = grid.shape
+        if not (0 <= row < rows and 0 <= column < columns):
+            raise ConfigError(
+                f"--zoi {arguments.zoi}: the grid has rows 0 to {rows - 1} and columns 0 to {columns - 1}"
+            )
+        pictures = [_picture(session, n) for n in (arguments.reference, arguments.frame)]
+    left, top = int(grid.first_x[column]), int(grid.first_y[row])
+    spectrum = zoi_spectrum(pictures[0], pictures[1], left, top, grid.size)
+    where = f"ZOI {row},{column} ({grid.size} px at x {left}, y {top})"
+    drawn = figure(15, 4)
+    title = f"{Path(arguments.session).name}: {where}, frame {arguments.frame}"
+    draw_spectrum(drawn, spectrum, title)
+    save_new(drawn, out)
+    print_line(
+        f"{title}\nu = {spectrum.u:.4f} px, v = {spectrum.v:.4f} px from {spectrum.used.sum()} frequencies"
+    )
+    print_line(f"figure: {out}")
+    return 0
+
+
+def _row_and_column(text: str) -> tuple[int, int]:
+    try:
+        row, column = (int(part) for part in text.split(","))
+    except ValueError:
+        raise ConfigError(f"--zoi {text}: give row,column of the ZOI, for example 3,5") from None
+    return row, column
+
+
+def _picture(session: Any, number: int) -> Any:
+    """A frame, or the mean of a burst where only bursts were recorded."""
+    return session.frame(number).image if len(session) else session.burst(number).mean
+
+
+def _grid_of(session: Any, arguments: argparse.Namespace) -> ZoiGrid:
+    """The grid of the session's configuration, or with the given size and step."""
+    from analysis.field import Roi, ZoiGrid
+    from live.config.loading import from_dict
+    from live.setup.grid import whole_picture
+
+    measure = from_dict({"measure": session.config.get("measure", {})}, {}, str(session.path)).measure
+    height, width = _picture(session, 0).shape
+    size = measure.zoi if arguments.size is None else arguments.size
+    step = measure.step if arguments.step is None else arguments.step
+    roi = measure.roi if isinstance(measure.roi, tuple) else whole_picture(width, height, size)
+    try:
+        return ZoiGrid.cover(Roi(*roi), size, step)
+    except ValueError as error:
+        raise DataError(f"{session.path}: {error}; give --size and --step") from error

@@ -1,0 +1,215 @@
+"""The outcome of a characterisation: what it consists of, its file, its progress.
+
+An ``ExperimentOutcome`` is text, tables and verdicts, stored as JSON without loss; figures and CSV files are beside it.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import json
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, TextIO
+
+from acquire.errors import ConfigError, DataError
+
+FORMAT = 1
+DPI = 80
+_BAR = 24  # letters
+Word = Literal["better", "equal", "worse"]
+
+
+@dataclass(frozen=True, slots=True)
+class ResultTable:
+    """Rows under headings that carry their units; ``name`` is that of its CSV file."""
+
+    name: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]
+
+    def csv(self) -> str:
+        """As CSV, numbers in full."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(self.columns)
+        writer.writerows(self.rows)
+        return text.getvalue()
+
+    def markdown(self) -> str:
+        """As a Markdown table, numbers to three digits."""
+        lines = ["| " + " | ".join(self.columns) + " |", "|" + " --- |" * len(self.columns)]
+        lines += ["| " + " | ".join(shown(value) for value in row) + " |" for row in self.rows]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Our result against another one.
+
+    Attributes
+    ----------
+    subject : str
+        The quantity, with both figures.
+    against : str
+        "the paper", "the paper's estimator", "the limit", the name of a peer ...
+    word : "better" | "equal" | "worse"
+    """
+
+    subject: str
+    against: str
+    word: Word
+
+
+@dataclass(frozen=True, slots=True)
+class ExperimentOutcome:
+    """The result of one experiment.
+
+    Attributes
+    ----------
+    name, title : str
+    text : str
+        Markdown under the title, with links ``![...](figure.png)``.
+    tables : tuple of ResultTable
+    figures : tuple of str
+        File names beside the page.
+    verdicts : tuple of Comparison
+    seconds : float, s
+        Time it took.
+    """
+
+    name: str
+    title: str
+    text: str
+    tables: tuple[ResultTable, ...] = ()
+    figures: tuple[str, ...] = ()
+    verdicts: tuple[Comparison, ...] = ()
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class ExperimentContext:
+    """The folder, extent, data and progress of an experiment.
+
+    Attributes
+    ----------
+    folder : Path
+        Of its figures.
+    quick : bool
+        Fewer ZOIs and cases.
+    data : Path or None
+        Folder of real image sets.
+    tick : callable
+        Called with the share done so far, 0 to 1.
+    """
+
+    folder: Path
+    quick: bool = False
+    data: Path | None = None
+    tick: Callable[[float], None] = field(default=lambda share: None)
+
+    def steps(self, items: Iterable[Any]) -> Iterable[Any]:
+        """The items one by one, ticking after each."""
+        everything = list(items)
+        for number, item in enumerate(everything):
+            yield item
+            self.tick((number + 1) / len(everything))
+
+
+def shown(value: Any) -> str:
+    """A value as text: three digits, with a power of ten where needed."""
+    if not isinstance(value, float):
+        return str(value)
+    if math.isnan(value):
+        return "-"
+    if value == 0:
+        return "0"
+    if 1e-3 <= abs(value) < 1e4:
+        digits = max(0, 2 - math.floor(math.log10(abs(value))))
+        return f"{value:.{digits}f}"
+    return f"{value:.2e}"
+
+
+def figure(width: float = 9.0, height: float = 3.6) -> Any:
+    """An empty figure (inches) that needs no display.
+
+    Raises
+    ------
+    ConfigError
+        matplotlib is missing.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise ConfigError(
+            "figures need matplotlib, which is not installed: pip install phasedic[plots]"
+        ) from None
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def save_figure(context: ExperimentContext, name: str, drawn: Any) -> str:
+    """Write a figure beside the page; returns its file name."""
+    drawn.savefig(context.folder / name, dpi=DPI, metadata={"Software": None})
+    return name
+
+
+def write_outcome(outcome: ExperimentOutcome, folder: Path, key: str) -> None:
+    """Store an outcome as JSON, and its tables as CSV. The JSON appears complete or not at all."""
+    for table in outcome.tables:
+        (folder / f"{table.name}.csv").write_text(table.csv(), encoding="utf-8")
+    document = {"format": FORMAT, "key": key, "outcome": dataclasses.asdict(outcome)}
+    new = folder / f".{outcome.name}.json.new"
+    new.write_text(json.dumps(document, indent=1), encoding="utf-8")
+    new.replace(folder / f"{outcome.name}.json")
+
+
+def save_new(drawn: Any, path: Path) -> None:
+    """Write a figure to a new file, in the format that its name ends in.
+
+    Raises
+    ------
+    ConfigError
+        The file exists, or has another ending than .png, .svg and .pdf.
+    DataError
+        It cannot be written.
+    """
+    if path.suffix.lower() not in (".png", ".svg", ".pdf"):
+        raise ConfigError(f"{path}: choose a name that ends in .png, .svg or .pdf")
+    try:
+        with path.open("xb") as file:
+            drawn.savefig(file, dpi=110, format=path.suffix.lower()[1:])
+    except FileExistsError:
+        raise ConfigError(f"{path} exists and is not overwritten; choose another name") from None
+    except OSError as error:
+        raise DataError(
+            f"{path}: cannot be written: {error.strerror}; look at the folder and the disk"
+        ) from None
+
+
+class ProgressBar:
+    """The progress of an experiment: a bar on a terminal, else one line at the end. Called with the share done."""
+
+    def __init__(self, name: str, screen: TextIO | None) -> None:
+        self._name, self._screen = name, screen
+        self._live = screen is not None and screen.isatty()
+        self(0.0)
+
+    def __call__(self, share: float) -> None:
+        if self._live:
+            filled = round(_BAR * min(max(share, 0.0), 1.0))
+            self._write(f"\r{self._name:12} [{'#' * filled}{'.' * (_BAR - filled)}] {100 * share:3.0f} %")
+
+    def done(self, words: str) -> None:
+        """Show the end of the experiment."""
+        if self._live:
+            self(1.0)
+            self._write(f"  {words}\n")
+        else:
+            self._write(f"{self._name:12} {words}\n")
+
+    def _write(self, text: str) -> None:
+        if self._screen is not None:
+            print(text, end="", file=self._screen, flush=True)

@@ -1,0 +1,107 @@
+"""Keeps the state of a camera's run: loads, history, counts and health, from the records of the stream."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+
+from acquire.errors import PhasedicError
+from acquire.events import Event, EventKind
+from acquire.frame import Frame
+from acquire.load_sample import LoadSample
+from live.pipeline.measurement import Measurement
+from live.pipeline.run_state import RunState
+from live.stream.record import LoadEnded, Record
+from live.stream.stream import Subscriber
+
+SILENT_S, SILENT_PERIODS = 1.0, 10
+"""A load cell that has sent nothing for both is away."""
+_RATE_SHARE = 0.1  # of the newest interval in the rate of the frames
+
+
+class StateKeeper(Subscriber):
+    """Fills ``run_state``, before all others take a record.
+
+    Parameters
+    ----------
+    run_state : RunState
+    load : str
+        Address of the load cell, for events; empty in a replay, whose loads are there already.
+    clock : callable giving monotonic seconds
+
+    Attributes
+    ----------
+    load_failure : int
+        The exit code of the error that ended the load; 0 without one.
+    """
+
+    takes: Sequence[type] = (Frame, LoadSample, Measurement, Event, LoadEnded)
+
+    def __init__(self, run_state: RunState, load: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self._run_state, self._load, self._clock = run_state, load, clock
+        self._last_frame_t = math.nan
+        self._samples, self._first_t, self._last_t = 0, math.nan, math.nan
+        self._load_ended = False
+        self.load_failure = 0
+        if not load:
+            self.takes = (Measurement,)
+
+    def take(self, record: Record) -> None:
+        """Note what it says."""
+        state, body = self._run_state, record.body
+        if isinstance(body, Frame):
+            self._framed(body)
+            if record.role == "reference":
+                state.health.since_t = body.t
+        elif isinstance(body, LoadSample):
+            self._loaded(body)
+        elif isinstance(body, Measurement):
+            state.history.add(body.time_step)
+        elif isinstance(body, Event):
+            state.loads.take_event(body)
+        elif isinstance(body, LoadEnded):
+            self._end_load(body.error)
+
+    def begin(self) -> None:
+        """The test begins now."""
+        self._last_t = self._clock()
+
+    def _framed(self, frame: Frame) -> None:
+        health = self._run_state.health
+        fps, before = health.fps, self._last_frame_t
+        if frame.t > before:
+            rate = 1 / (frame.t - before)
+            fps = fps + _RATE_SHARE * (rate - fps) if fps else rate
+        self._last_frame_t = frame.t
+        health.framed(self._clock(), fps)
+
+    def _loaded(self, sample: LoadSample) -> None:
+        state, now = self._run_state, self._clock()
+        self._first_t = self._first_t if self._samples else now
+        self._samples, self._last_t = self._samples + 1, now
+        state.loads.append(sample)
+        state.health.loaded(now, sample.force, tells=state.loads.telling is sample)
+        state.frame_counts.add(load_samples=1)
+
+    def _end_load(self, error: Exception | None) -> None:
+        self._load_ended = True
+        if error is not None:
+            self.load_failure = error.exit_code if isinstance(error, PhasedicError) else 1
+            text = f"the load is lost, images go on: {error}"
+            self._run_state.event_log.emit(EventKind.DEVICE, self._load, text, "error")
+        self._run_state.loads.close()
+
+    def end(self) -> None:
+        """Count the samples of a load cell that is away when the test ends; 1 where the rate is not known."""
+        if self._load_ended:
+            return
+        silent_s, span = self._clock() - self._last_t, self._last_t - self._first_t
+        rate = (self._samples - 1) / span if self._samples > 1 and span > 0 else 0.0
+        if silent_s <= max(SILENT_S, SILENT_PERIODS / rate if rate else SILENT_S):
+            return
+        missing = max(1, round(silent_s * rate))
+        self._run_state.frame_counts.add(load_lost=missing)
+        text = f"the load is missing at the end: no sample came for the last {silent_s:.1f} s"
+        data = {"count": missing, "where": "end"}
+        self._run_state.event_log.emit(EventKind.LOST, self._load, text, "warning", data)
