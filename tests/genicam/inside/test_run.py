@@ -112,7 +112,9 @@ def test_pulled_for_four_seconds_in_mid_test(tmp_path: Path) -> None:
     assert counts is not None and counts["lost"] >= 40
     gap = max(frame.lost_before for frame in frames)
     later = next(k for k, frame in enumerate(frames) if frame.lost_before == gap)
-    assert gap == pytest.approx((frames[later].t - frames[later - 1].t) * 10 - 1, abs=1)
+    pace = np.median(np.diff([frame.t for frame in frames[:later]]))  # a busy machine's camera keeps its own
+    assert pace == pytest.approx(0.1, rel=0.1)
+    assert gap == pytest.approx((frames[later].t - frames[later - 1].t) / pace - 1, abs=1.5)
 
 
 def test_away_until_the_end_is_counted_and_ctrl_c_ends_it_within_a_second(tmp_path: Path) -> None:
