@@ -1,19 +1,17 @@
-"""What a camera is (``contract``), what opens any of them (``opening``), and what drivers share (``timing``)."""
+"""What a camera is (``contract``), what opens any of them (``opening``), and the loop over live devices (``live``)."""
 
 from acquire.camera.contract import Camera, CameraBase
+from acquire.camera.live import DeviceFault, Driver, LiveCamera, Picture
 from acquire.camera.opening import (
     CAMERAS,
     CameraListing,
     CroppedCamera,
-    FailureGuard,
-    RepeatGuard,
     list_cameras,
     open_camera,
     with_scheme,
 )
 from acquire.camera.timing import (
     FrameCounter,
-    FramePace,
     StallWatch,
     exposure_and_gain,
     longest_pause_s,
@@ -28,10 +26,11 @@ __all__ = [
     "CameraBase",
     "CameraListing",
     "CroppedCamera",
-    "FailureGuard",
+    "DeviceFault",
+    "Driver",
     "FrameCounter",
-    "FramePace",
-    "RepeatGuard",
+    "LiveCamera",
+    "Picture",
     "StallWatch",
     "exposure_and_gain",
     "list_cameras",

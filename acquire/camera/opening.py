@@ -1,9 +1,7 @@
-"""Opening the camera of an address, listing the cameras, and what their drivers share.
+"""Opening the camera of an address, and listing the cameras.
 
-``RepeatGuard`` and ``FailureGuard`` find faults that drivers hide: repeated pictures, dead handles. They get
-pictures and times, touch no device and read no clock. ``CroppedCamera`` is a part
-of a camera's picture as a camera of its own: nothing else is measured or stored, and all coordinates
-downstream (ROI, mask, results) count from the corner of that part.
+``CroppedCamera`` is a part of a camera's picture as a camera of its own: nothing else is measured or stored, and all
+coordinates downstream (ROI, mask, results) count from the corner of that part.
 """
 
 from __future__ import annotations
@@ -15,10 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Self
 
 from acquire.addresses import RECORDING, Address, Registry, expanded, parse_address
 from acquire.camera.contract import Camera
@@ -44,7 +39,7 @@ CAMERAS: Registry[Camera] = Registry(
     {
         "": "acquire.v4l2.camera:open_v4l2" if HAS_V4L2 else "acquire.camera.opening:without_v4l2",
         "genicam": "acquire.genicam.camera:open_genicam",
-        "pylon": "acquire.pylon.camera:PylonCamera",
+        "pylon": "acquire.pylon.camera:open_pylon",
         "opencv": "acquire.opencv.webcam:open_opencv",
         "video": "acquire.opencv.video:open_video",
         "files": "acquire.opencv.images:open_files",
@@ -142,54 +137,6 @@ def open_camera(address: str, on_event: EventSink = ignore_event) -> Camera:
         The device or file cannot be used; says why and what to do.
     """
     return CAMERAS.open(with_scheme(address), on_event)
-
-
-class RepeatGuard:
-    """Finds a driver that hands out the same picture again and again.
-
-    A sensor has noise: three pictures that agree in every bit are one picture.
-
-    Parameters
-    ----------
-    limit : int
-        Equal pictures in a row from which on they count as repeated.
-    """
-
-    def __init__(self, limit: int = 3) -> None:
-        self._limit = limit
-        self._last: NDArray[Any] | None = None
-        self.run = 0
-
-    def repeated(self, image: NDArray[Any]) -> bool:
-        """Whether this picture is the last of ``limit`` or more equal ones."""
-        same = self._last is not None and np.array_equal(self._last, image)
-        self.run = self.run + 1 if same else 1
-        self._last = image
-        return self.run >= self._limit
-
-    @property
-    def just_found(self) -> bool:
-        """Whether the last picture was the first to count as repeated (for one message a run)."""
-        return self.run == self._limit
-
-
-class FailureGuard:
-    """Separates a read that failed at once (a dead handle) from one that waited in vain (a stall).
-
-    Parameters
-    ----------
-    instant_s : float, s
-        A failure faster than this waited for nothing.
-    """
-
-    def __init__(self, instant_s: float = 0.005) -> None:
-        self._instant_s = instant_s
-
-    def verdict(self, took_s: float) -> str:
-        """Words for a failed read that took so long."""
-        if took_s < self._instant_s:
-            return "the device is gone or dead (its reads fail at once)"
-        return f"no picture within {took_s:.1f} s"
 
 
 class CroppedCamera:

@@ -17,7 +17,6 @@ from acquire.frame import CameraInfo, CameraSetting
 StampOf = Literal["start", "end", ""]
 STAMPS: tuple[StampOf, ...] = ("start", "end", "")
 Bounded = tuple[float, float, float]
-DEAD = 4.0  # so many times the longest pause, and the device counts as dead
 
 
 def mid_exposure(raw_t: float, exposure_s: float | None, stamp: StampOf) -> float:
@@ -147,37 +146,44 @@ class FrameCounter:
         self.counts_itself = True
         self.pace = FramePace()
         self._sequence: int | None = None
+        self._away, self._left_out = False, 0
+
+    def leave_out(self, sequence: int | None) -> None:
+        """A picture came that is handed to nobody; one without a number is counted with the next frame."""
+        self._left_out += sequence is None
 
     def restart(self) -> None:
         """The stream was opened anew: the driver's numbers begin again."""
-        self._sequence = None
+        self._away = True
 
-    def count(self, sequence: int, t: float, fps: float | None) -> int:
+    def count(self, sequence: int | None, t: float, fps: float | None, timed: bool = True) -> int:
         """Take the next frame and give how many were lost before it.
 
         Parameters
         ----------
-        sequence : int
-            The driver's number.
+        sequence : int or None
+            The driver's number; None: it has none, and stamps alone tell.
         t : float, s
             Its stamp.
         fps : float or None, 1/s
             For frames lost while the device was away, found from the time that passed, where the rate that comes
             is not known yet.
+        timed : bool
+            Whether a gap between stamps means lost frames; times of arrival have gaps of their own.
         """
-        lost = self._lost(sequence, t, fps)
-        if self.index < 0 and self._sequence is None:
-            self.index = sequence
-        else:
-            self.index += 1 + lost
-        self._sequence, self.t = sequence, max(t, self.t)
+        lost = self._lost(sequence, t, fps, timed)
+        self.index = (sequence or 0) if self.index < 0 else self.index + 1 + lost
+        self._sequence, self._away, self._left_out, self.t = sequence, False, 0, max(t, self.t)
         return lost
 
-    def _lost(self, sequence: int, t: float, fps: float | None) -> int:
+    def _lost(self, sequence: int | None, t: float, fps: float | None, timed: bool) -> int:
         if self.index < 0:
             return 0
-        if self._sequence is None:
+        if self._away:
             return missing_between(self.t, t, fps and (self.pace.fps or fps))
+        if sequence is None or self._sequence is None:
+            missing = self.pace.missing(max(0.0, t - self.t))
+            return max(missing if timed else 0, self._left_out)
         step = (sequence - self._sequence) % self._cycle
         if 0 < step < self._cycle // 2:
             self.pace.missing((t - self.t) / step)

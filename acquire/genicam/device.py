@@ -248,14 +248,6 @@ class GenicamDevice:
             taken=taken,
         )
 
-    def discard_waiting(self) -> None:
-        """Give back what has been received already."""
-        with self._pictures:
-            while self._stream is not None and (
-                buffer := self._library.call("arv_stream_try_pop_buffer", self._stream)
-            ):
-                self._library.call("arv_stream_push_buffer", self._stream, buffer)
-
     def close(self) -> None:
         """Stop and give everything back; may be called again without effect."""
         with self._requests, self._pictures:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+from acquire.camera.live import DeviceFault
 from acquire.errors import DeviceError
 
 LIBRARY = "libaravis-0.8.so.0"
@@ -30,7 +31,7 @@ _ERROR = c.POINTER(c.POINTER(_GError))
 _Bounds = tuple[float, float]
 
 
-class GenicamError(Exception):
+class GenicamError(DeviceFault):
     """A request that the library or the camera refused; the text is theirs."""
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
 
 from acquire.genicam.device import GenicamDevice
 from acquire.genicam.library import GenicamError
@@ -18,12 +17,15 @@ class SoftwareTrigger:
     device : GenicamDevice
         Streaming.
     period_s : float, s
-    report : callable taking a text
-        Called once, when a trigger is refused.
+
+    Attributes
+    ----------
+    refused : str
+        Why the camera takes no more triggers; "" while all is well.
     """
 
-    def __init__(self, device: GenicamDevice, period_s: float, report: Callable[[str], None]) -> None:
-        self._device, self._period_s, self._report = device, period_s, report
+    def __init__(self, device: GenicamDevice, period_s: float) -> None:
+        self._device, self._period_s, self.refused = device, period_s, ""
         self._stopped = threading.Event()
         threading.Thread(target=self._work, name="genicam-trigger", daemon=True).start()
 
@@ -34,7 +36,7 @@ class SoftwareTrigger:
                 self._device.ask("arv_camera_software_trigger")
             except GenicamError as error:
                 if not self._stopped.is_set():
-                    self._report(f"triggers are refused: {error}")
+                    self.refused = str(error)
                 return
             due = max(due + self._period_s, time.monotonic())
 

@@ -1,18 +1,16 @@
 """Cameras through OpenCV: ``opencv:0?width=&height=&fps=&exposure=&gain=&gray=``.
 
 For cameras of other systems; on Linux ``acquire.v4l2`` has stamps and losses too. Pictures are 8-bit colour made
-grey. A thread of its own drains a live camera, since OpenCV's read may block for seconds; dead handles are opened
-anew.
+grey. A thread of its own drains a live camera, since OpenCV's read may block for seconds.
 """
 
 from __future__ import annotations
 
-import logging
 import queue
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -20,17 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.addresses import Address, Options
-from acquire.camera import CameraBase, FailureGuard, FramePace, RepeatGuard
+from acquire.camera.live import DeviceFault, LiveCamera, Picture
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DeviceError
-from acquire.events import EventSink, device_event
-from acquire.frame import CameraInfo, Clock, Frame, frozen
+from acquire.events import EventSink
+from acquire.frame import CameraInfo, Clock, frozen
 from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
 
-log = logging.getLogger(__name__)
-
-BACKOFF_S = (0.2, 0.5, 1.0, 2.0)
-STALL_S = 2.0
+STALL_S, INSTANT_S = 2.0, 0.005
 
 
 class Capture(Protocol):
@@ -139,16 +134,14 @@ class _Drain(threading.Thread):
             return
 
 
-class OpenCVCamera(CameraBase):
-    """A live camera through OpenCV; see ``acquire.camera.Camera``.
+class OpenCVDriver:
+    """A live camera through OpenCV; see ``acquire.camera.live.Driver``.
 
     Parameters
     ----------
     address : str
-    opener : callable giving a Capture
-        Called at once, and again after every fault.
+    capture : Capture
     settings : OpenCVSettings
-    on_event : callable taking an Event
     now : callable giving monotonic s
 
     Raises
@@ -159,36 +152,29 @@ class OpenCVCamera(CameraBase):
         It does not honour what was asked.
     """
 
-    def __init__(
-        self,
-        address: str,
-        opener: Callable[[], Capture],
-        settings: OpenCVSettings,
-        on_event: EventSink,
-        now: Callable[[], float] = time.monotonic,
-    ) -> None:
-        super().__init__()
-        self._address, self._opener, self._settings = address, opener, settings
-        self._on_event, self._now = on_event, now
-        self._repeats, self._failures, self._pace = RepeatGuard(), FailureGuard(), FramePace()
-        self._index, self._last_t = -1, float("-inf")
-        self._drain: _Drain | None = None
-        self._capture: Capture | None = self._open()
-        self.info = self._describe(self._capture)
+    cycle = 1
 
-    def _open(self) -> Capture:
-        capture = self._opener()
+    def __init__(
+        self, address: str, capture: Capture, settings: OpenCVSettings, now: Callable[[], float]
+    ) -> None:
+        self.name, self._capture, self._settings, self._now = address, capture, settings, now
+        self._drain: _Drain | None = None
         try:
             if not capture.isOpened():
                 raise DeviceError(
-                    f"{self._address}: no camera opens there; see what `phasedic devices` lists, and whether "
-                    "another program holds it"
+                    f"{address}: no camera opens there; see what `phasedic devices` lists, and whether another"
+                    " program holds it"
                 )
             self._set(capture)
+            self.info = self._describe(capture)
         except BaseException:
             capture.release()
             raise
-        return capture
+
+    @property
+    def alike(self) -> tuple[int, int]:
+        """What its pictures are; OpenCV does not tell who it is."""
+        return self.info.width, self.info.height
 
     def _set(self, capture: Capture) -> None:
         properties = _properties()
@@ -204,7 +190,7 @@ class OpenCVCamera(CameraBase):
             got = capture.get(properties[name])
             if abs(got - value) > 0.01 * abs(value):
                 raise ConfigError(
-                    f"{self._address}: asked for {name}={value:g}, the driver gives {got:g}; "
+                    f"{self.name}: asked for {name}={value:g}, the driver gives {got:g}; "
                     f"ask for that, or leave {name} out"
                 )
 
@@ -215,12 +201,10 @@ class OpenCVCamera(CameraBase):
         began = self._now()
         well, picture = capture.read()
         if not well:
-            capture.release()
-            verdict = self._failures.verdict(self._now() - began)
-            raise DeviceError(f"{self._address}: opens but gives no picture: {verdict}")
+            raise DeviceError(f"{self.name}: opens but gives no picture: {_verdict(self._now() - began)}")
         stamp = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000
         self._clock: Clock = "device" if abs(self._now() - stamp) < 1 else "host"
-        self._shape = self._gray(picture).shape
+        height, width = self._gray(picture).shape
         controls = {name: capture.get(prop) for name, prop in _properties().items()}
         fps = controls["fps"]
         warnings = [WEBCAM_WARNING]
@@ -232,10 +216,10 @@ class OpenCVCamera(CameraBase):
         if self._clock == "host":
             warnings.append("OpenCV tells neither stamps nor losses here: times are those of this program")
         return CameraInfo(
-            address=self._address,
-            name=f"OpenCV camera {self._address}",
-            width=self._shape[1],
-            height=self._shape[0],
+            address=self.name,
+            name=f"OpenCV camera {self.name}",
+            width=width,
+            height=height,
             bits=8,
             live=True,
             clock=self._clock,
@@ -243,94 +227,50 @@ class OpenCVCamera(CameraBase):
             pixel_format="BGR",
             controls=controls,
             warnings=tuple(warnings),
+            pause_s=STALL_S,
         )
 
     def _gray(self, picture: NDArray[Any]) -> NDArray[Any]:
-        image = to_gray(np.asarray(picture), self._settings.gray, self._address)
+        image = to_gray(np.asarray(picture), self._settings.gray, self.name)
         return image.copy() if image is picture else image
 
-    def _start(self) -> None:
-        if self._capture is not None and self._drain is None:
-            self._begin(self._capture)
+    def start(self) -> None:
+        """Stream."""
+        if self._drain is None:
+            self._drain = _Drain(self._capture, self._now)
+            self._drain.start()
 
-    def _begin(self, capture: Capture) -> None:
-        self._capture, self._drain = None, _Drain(capture, self._now)
-        self._drain.start()
-
-    def _release(self) -> None:
-        if self._capture is not None:
-            self._capture.release()
-        self._end_drain()
-
-    def _end_drain(self) -> None:
-        if self._drain is not None:
-            self._drain.ended.set()
-            self._drain.join(0.5)
-            self._drain = None
-
-    def __iter__(self) -> Iterator[Frame]:
-        while not self.stopped.is_set():
-            shot = self._next_shot()
-            if shot is None:
-                continue
-            if shot.picture is None:
-                self._recover(self._failures.verdict(shot.took))
-            elif (frame := self._frame(shot)) is not None:
-                yield frame
-
-    def _next_shot(self) -> _Shot | None:
-        """The next read; None when stopped, or when there was a stall or a dead handle to report."""
-        self._start()
-        began = self._now()
-        while self._drain is not None and not self.stopped.is_set():
-            try:
-                return self._drain.shots.get(timeout=0.1)
-            except queue.Empty:
-                waited = self._now() - began
-            if waited > STALL_S:
-                self._report(f"no picture for {waited:.1f} s; still waiting")
-                return None
-        return None
-
-    def _frame(self, shot: _Shot) -> Frame | None:
-        image = self._gray(shot.picture)  # type: ignore[arg-type]  # asked by the caller
-        if image.shape != self._shape:
-            self._report(f"a picture of another size, {image.shape[1]}x{image.shape[0]}, was left out")
+    def fetch(self, timeout_s: float) -> Picture | None:
+        """See ``Driver``."""
+        assert self._drain is not None
+        try:
+            shot = self._drain.shots.get(timeout=timeout_s)
+        except queue.Empty:
             return None
-        raw_t = shot.stamp if self._clock == "device" else shot.returned
-        t = max(raw_t, self._last_t)
-        missing = self._pace.missing(t - self._last_t) if self._index >= 0 else 0
-        lost = missing if self._clock == "device" else 0
-        if remark := self._pace.remark(self.info.fps):
-            self._report(remark)
-        self._index, self._last_t = self._index + 1 + lost, t
-        return Frame(frozen(image), self._index, t, self._clock, lost, 8, raw_t, self._repeated(image))
+        if shot.picture is None:
+            raise DeviceFault(_verdict(shot.took))
+        image, t = self._gray(shot.picture), shot.stamp if self._clock == "device" else shot.returned
+        if image.shape != (self.info.height, self.info.width):
+            return Picture(None, t, None, f"it is of {image.shape[1]}x{image.shape[0]} px", self._clock)
+        return Picture(frozen(image), t, None, "", self._clock, arrived=shot.returned)
 
-    def _repeated(self, image: NDArray[Any]) -> bool:
-        repeated = self._repeats.repeated(image)
-        if repeated and self._repeats.just_found:
-            self._report("the driver hands out the same picture again and again; none of them is measured")
-        return repeated
-
-    def _recover(self, verdict: str) -> None:
-        self._report(f"{verdict}; opening it again", "error")
-        self._end_drain()
-        for attempt in range(10**9):
-            if self.stopped.wait(BACKOFF_S[min(attempt, len(BACKOFF_S) - 1)]):
-                return
-            try:
-                self._begin(self._open())
-            except (DeviceError, ConfigError) as error:
-                log.debug("%s", error)
-            else:
-                self._report("opened again; the recording goes on", "info")
-                return
-
-    def _report(self, text: str, level: Any = "warning") -> None:
-        device_event(self._on_event, self._address, f"{self._address}: {text}", level, last_index=self._index)
+    def close(self) -> None:
+        """Give it back; a read that still blocks does so when it returns."""
+        if self._drain is None:
+            self._capture.release()
+            return
+        self._drain.ended.set()
+        self._drain.join(0.5)
 
 
-def open_opencv(address: Address, on_event: EventSink) -> OpenCVCamera:
+def _verdict(took_s: float) -> str:
+    """Words for a failed read that took so long: one that failed at once waited for nothing."""
+    if took_s < INSTANT_S:
+        return "the device is gone or dead (its reads fail at once)"
+    return f"no picture within {took_s:.1f} s"
+
+
+def open_opencv(address: Address, on_event: EventSink) -> LiveCamera:
     """Open ``opencv:0?width=&height=&fps=&exposure=&gain=&gray=``.
 
     Raises
@@ -350,7 +290,18 @@ def open_opencv(address: Address, on_event: EventSink) -> OpenCVCamera:
         gray=options.choice("gray", GRAYS, "luma"),
     )
     options.done()
-    return OpenCVCamera(address.text, lambda: capture(int(address.target)), settings, on_event)
+    return live_camera(address.text, lambda: capture(int(address.target)), settings, on_event)
+
+
+def live_camera(
+    address: str,
+    opened: Callable[[], Capture],
+    settings: OpenCVSettings,
+    on_event: EventSink,
+    now: Callable[[], float] = time.monotonic,
+) -> LiveCamera:
+    """The camera of the captures that ``opened`` gives, at once and after every fault."""
+    return LiveCamera(address, lambda before: OpenCVDriver(address, opened(), settings, now), on_event, now)
 
 
 def capture(number: int) -> Capture:

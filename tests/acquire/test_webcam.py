@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import queue
 import threading
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -14,10 +13,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from acquire.camera.live import LiveCamera
 from acquire.camera.opening import open_camera
 from acquire.errors import ConfigError, DataError, DeviceError
 from acquire.events import Event, ignore_event
-from acquire.opencv.webcam import OpenCVCamera, OpenCVSettings
+from acquire.opencv import webcam
+from acquire.opencv.webcam import OpenCVSettings, live_camera
 
 
 def write_video(path: Path, count: int = 6) -> Path:
@@ -97,12 +98,12 @@ def camera_of(
     *captures: FakeCapture,
     settings: OpenCVSettings | None = None,
     events: Callable[[Event], None] = ignore_event,
-) -> OpenCVCamera:
+) -> LiveCamera:
     waiting = list(captures)
-    return OpenCVCamera("opencv:0", lambda: waiting.pop(0), settings or OpenCVSettings(), events)
+    return live_camera("opencv:0", lambda: waiting.pop(0), settings or OpenCVSettings(), events)
 
 
-def take(camera: OpenCVCamera, count: int) -> list[Any]:
+def take(camera: LiveCamera, count: int) -> list[Any]:
     frames = []
     with camera:
         for frame in camera:
@@ -121,7 +122,7 @@ def test_the_picture_taken_at_opening_is_thrown_away() -> None:
 
 def test_a_dead_handle_is_opened_again_and_told() -> None:
     events: list[Event] = []
-    first, second = FakeCapture(shots(1, 2)), FakeCapture(shots(3, 4))
+    first, second = FakeCapture(shots(1, 2)), FakeCapture(shots(9, 3, 4))
     frames = take(camera_of(first, second, events=events.append), 3)
     assert [int(frame.image[0, 0]) for frame in frames] == [2, 3, 4]
     assert [frame.index for frame in frames] == [0, 1, 2]
@@ -175,7 +176,7 @@ class StampedCapture(FakeCapture):
 def test_stamps_of_the_driver_tell_how_many_were_lost() -> None:
     steps = [0, 1, 2, 3, 4, 5, 8, 9, 10, 12, 13]
     capture = StampedCapture([100.0, *(100.1 + k / 30 for k in steps), 100.1 + 14 / 30])
-    camera = OpenCVCamera("opencv:0", lambda: capture, OpenCVSettings(), ignore_event, now=lambda: 100.0)
+    camera = live_camera("opencv:0", lambda: capture, OpenCVSettings(), ignore_event, now=lambda: 100.0)
     frames = take(camera, len(steps))
     assert {frame.clock for frame in frames} == {"device"}
     assert [frame.lost_before for frame in frames] == [0, 0, 0, 0, 0, 0, 2, 0, 0, 1, 0]
@@ -186,7 +187,7 @@ def test_stamps_of_the_driver_tell_how_many_were_lost() -> None:
 def test_a_camera_that_gives_half_of_the_rate_it_says_loses_nothing_and_is_named() -> None:
     events: list[Event] = []
     capture = StampedCapture([100.0 + k / 15 for k in range(42)])
-    camera = OpenCVCamera("opencv:0", lambda: capture, OpenCVSettings(), events.append, now=lambda: 100.0)
+    camera = live_camera("opencv:0", lambda: capture, OpenCVSettings(), events.append, now=lambda: 100.0)
     frames = take(camera, 40)
     assert sum(frame.lost_before for frame in frames) == 0 and frames[-1].index == 39
     told = [event.text for event in events if "frames a second come" in event.text]
@@ -197,7 +198,7 @@ def test_a_camera_that_slows_down_in_low_light_loses_one_frame_at_most() -> None
     stamps = [100.0 + k / 30 for k in range(30)]
     stamps += [stamps[-1] + k / 15 for k in range(1, 31)]
     capture = StampedCapture(stamps)
-    camera = OpenCVCamera("opencv:0", lambda: capture, OpenCVSettings(), ignore_event, now=lambda: 100.0)
+    camera = live_camera("opencv:0", lambda: capture, OpenCVSettings(), ignore_event, now=lambda: 100.0)
     assert sum(frame.lost_before for frame in take(camera, 58)) <= 1
 
 
@@ -236,7 +237,9 @@ class StalledCapture(FakeCapture):
             self.gate.wait()
         return super().read()
 
-    gate = threading.Event()
+    def __init__(self, reads: Sequence[Read]) -> None:
+        super().__init__(reads)
+        self.gate = threading.Event()
 
 
 def test_stop_ends_a_stalled_camera() -> None:
@@ -310,7 +313,7 @@ def test_a_rate_beyond_sense_is_not_known(fps: float, known: float | None) -> No
 
 @pytest.mark.parametrize(("now", "clock"), [(100.9, "device"), (99.1, "device"), (101.1, "host")])
 def test_stamps_are_the_drivers_where_they_are_of_this_clock(now: float, clock: str) -> None:
-    camera = OpenCVCamera(
+    camera = live_camera(
         "opencv:0", lambda: StampedCapture([100.0]), OpenCVSettings(), ignore_event, now=lambda: now
     )
     assert camera.info.clock == clock
@@ -321,38 +324,29 @@ def test_a_picture_of_another_size_is_left_out_and_told() -> None:
     events: list[Event] = []
     reads: list[Read] = [*shots(0, 1), (True, np.zeros((8, 6, 3), np.uint8)), *shots(2)]
     frames = take(camera_of(FakeCapture(reads), events=events.append), 2)
-    assert [(int(frame.image[0, 0]), frame.index) for frame in frames] == [(1, 0), (2, 1)]
-    assert events[0].text == "opencv:0: a picture of another size, 6x8, was left out"
-    assert (events[0].level, events[0].data) == ("warning", {"last_index": 0})
-
-
-def test_a_dead_camera_is_tried_ever_more_seldom(monkeypatch: pytest.MonkeyPatch) -> None:
-    waits: list[float] = []
-    events: list[Event] = []
-    dead = [FakeCapture([], opens=False) for _ in range(5)]
-    camera = camera_of(FakeCapture(shots(1)), *dead, FakeCapture(shots(2)), events=events.append)
-    monkeypatch.setattr(camera.stopped, "wait", lambda seconds: bool(waits.append(seconds)))
-    camera._recover("no picture within 2.1 s")
-    camera.close()
-    assert waits == [0.2, 0.5, 1.0, 2.0, 2.0, 2.0] and all(one.released for one in dead)
-    assert [(event.level, event.text) for event in events] == [
-        ("error", "opencv:0: no picture within 2.1 s; opening it again"),
-        ("info", "opencv:0: opened again; the recording goes on"),
+    assert [(int(frame.image[0, 0]), frame.index, frame.lost_before) for frame in frames] == [
+        (1, 0, 0),
+        (2, 2, 1),
     ]
+    assert "1 frame(s) came without a whole picture (it is of 6x8 px)" in events[0].text
 
 
-def test_a_stall_is_told_after_two_seconds() -> None:
-    now = iter((100.0, 101.0, 102.0, 102.1))
-    events: list[Event] = []
-    camera = camera_of(FakeCapture(shots(1)), events=events.append)
+@pytest.mark.parametrize(
+    ("took_s", "words"),
+    [
+        (0.0049, "the device is gone or dead (its reads fail at once)"),
+        (0.0051, "no picture within 0.0 s"),
+        (1.24, "no picture within 1.2 s"),
+    ],
+)
+def test_a_read_that_fails_at_once_has_waited_for_nothing(took_s: float, words: str) -> None:
+    assert webcam._verdict(took_s) == words
 
-    class Nothing:
-        def get(self, timeout: float) -> None:
-            raise queue.Empty
 
-    camera._now = lambda: next(now)
-    camera._drain = SimpleNamespace(shots=Nothing())  # type: ignore[assignment]
-    assert camera._next_shot() is None
-    assert [event.text for event in events] == ["opencv:0: no picture for 2.1 s; still waiting"]
-    camera._drain = None
-    camera.close()
+def test_a_read_that_takes_its_time_is_a_stall_not_a_fault() -> None:
+    capture = StalledCapture(shots(1))
+    driver = webcam.OpenCVDriver("opencv:0", capture, OpenCVSettings(), time.monotonic)
+    driver.start()
+    assert driver.fetch(0.01) is None and driver.info.pause_s == 2.0
+    driver.close()
+    capture.gate.set()

@@ -17,7 +17,7 @@ from acquire.camera.opening import CroppedCamera, open_camera
 from acquire.events import ignore_event
 from acquire.frame import Frame, frozen, saturation
 from acquire.session import Session
-from acquire.v4l2.camera import V4L2Camera, v4l2_settings
+from acquire.v4l2.camera import open_v4l2
 from analysis.quality.exposure import exposure
 from live.ui.web.painting import RED, mark_saturated, shrunk
 from tests.acquire.session import fixtures
@@ -56,9 +56,7 @@ def test_pictures_and_a_part_of_them_have_it(tmp_path: Path) -> None:
 def test_a_v4l2_camera_has_it() -> None:
     address = parse_address("/dev/video0?format=Y12&white=4080")
     kernel = FakeKernel(FakeCamera())
-    with V4L2Camera(
-        address.text, address.target, v4l2_settings(address), ignore_event, kernel, kernel.pause
-    ) as camera:
+    with open_v4l2(address, ignore_event, kernel) as camera:
         assert next(iter(camera)).saturation == camera.info.saturation == 4080
 
 

@@ -21,9 +21,8 @@ from acquire.camera.opening import open_camera
 from acquire.errors import ConfigError, DataError, DeviceError, PhasedicError
 from acquire.events import ignore_event
 from acquire.frame import Frame
-from acquire.opencv.webcam import OpenCVCamera, OpenCVSettings
-from acquire.v4l2.camera import V4L2Camera
-from acquire.v4l2.setup import V4L2Settings
+from acquire.opencv.webcam import OpenCVSettings, live_camera
+from acquire.v4l2.camera import open_v4l2
 from live.cli import main
 from live.commands.init import find_devices
 from live.setup.devices import open_rig
@@ -73,12 +72,12 @@ class Webcam:
 
 
 def opencv(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Camera:
-    return OpenCVCamera("opencv:0", Webcam, OpenCVSettings(), ignore_event)
+    return live_camera("opencv:0", Webcam, OpenCVSettings(), ignore_event)
 
 
 def v4l2(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Camera:
     kernel = FakeKernel(FakeCamera())
-    return V4L2Camera("/dev/video0", "/dev/video0", V4L2Settings(), ignore_event, kernel, kernel.pause)
+    return open_v4l2(parse_address("/dev/video0"), ignore_event, kernel)
 
 
 def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Camera:

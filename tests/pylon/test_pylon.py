@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Iterator
 from inspect import signature
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -14,11 +15,12 @@ from numpy.typing import NDArray
 
 from acquire.addresses import parse_address
 from acquire.camera.contract import Camera
+from acquire.camera.live import LiveCamera
 from acquire.camera.opening import list_cameras, open_camera
 from acquire.errors import ConfigError, DeviceError
-from acquire.events import Event, ignore_event
+from acquire.events import Event
 from acquire.frame import Frame
-from acquire.pylon.camera import PylonCamera
+from acquire.pylon.camera import PylonDriver, open_pylon
 from acquire.session.reader import Session
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
@@ -116,10 +118,16 @@ def test_frames_are_the_pictures_bit_for_bit(tmp_path: Path) -> None:
 def test_a_frame_that_is_not_whole_is_lost() -> None:
     events: list[Event] = []
     address = f"{ADDRESS}&format=Mono8&ForceFailedBufferCount=2"
-    with contextlib.closing(PylonCamera(parse_address(address), events.append)) as camera:
-        frames = first(camera, 10, {3: lambda: camera._camera.ForceFailedBuffer.Execute()})
+    with contextlib.closing(open_pylon(parse_address(address), events.append)) as camera:
+        frames = first(camera, 10, {3: lambda: basler(camera).ForceFailedBuffer.Execute()})
     assert sum(frame.lost_before for frame in frames) == 2
     assert sum("without a whole picture" in event.text for event in events) == 2
+
+
+def basler(camera: LiveCamera) -> Any:
+    """The maker's own object."""
+    assert isinstance(camera._driver, PylonDriver)
+    return camera._driver._camera
 
 
 def first(camera: Camera, count: int, at: dict[int, object]) -> list[Frame]:
@@ -136,8 +144,8 @@ def first(camera: Camera, count: int, at: dict[int, object]) -> list[Frame]:
 
 def test_a_stream_that_ends_is_begun_again() -> None:
     events: list[Event] = []
-    with contextlib.closing(PylonCamera(parse_address(f"{ADDRESS}&format=Mono8"), events.append)) as camera:
-        frames = first(camera, 8, {3: lambda: camera._camera.StopGrabbing()})
+    with contextlib.closing(open_pylon(parse_address(f"{ADDRESS}&format=Mono8"), events.append)) as camera:
+        frames = first(camera, 8, {3: lambda: basler(camera).StopGrabbing()})
     texts = [event.text for event in events]
     assert "no longer answers" in texts[0] and "opened again" in texts[-1]
     gap = next(frame for frame in frames if frame.lost_before)
@@ -146,19 +154,17 @@ def test_a_stream_that_ends_is_begun_again() -> None:
 
 
 def test_the_end_does_not_wait_for_a_camera_that_is_away(monkeypatch: pytest.MonkeyPatch) -> None:
-    camera = PylonCamera(parse_address(f"{ADDRESS}&format=Mono8"), ignore_event)
-
-    def away() -> None:
+    def away(driver: PylonDriver) -> None:
         raise DeviceError("there is none")
 
     def stopped_when_looking(event: Event) -> None:
         if "looking for it again" in event.text:
-            monkeypatch.setattr(camera, "_open", away)
+            monkeypatch.setattr(PylonDriver, "_open", away)
             camera.stop()
 
-    camera._on_event = stopped_when_looking
+    camera = open_pylon(parse_address(f"{ADDRESS}&format=Mono8"), stopped_when_looking)
     with camera:
-        assert len(first(camera, 50, {3: lambda: camera._camera.StopGrabbing()})) < 50
+        assert len(first(camera, 50, {3: lambda: basler(camera).StopGrabbing()})) < 50
 
 
 def test_from_the_devices_to_the_replay(

@@ -12,7 +12,7 @@ import pytest
 from acquire.addresses import parse_address
 from acquire.camera import CAMERAS, CameraListing, CroppedCamera, list_cameras, with_scheme
 from acquire.camera.contract import CameraBase
-from acquire.camera.opening import FailureGuard, RepeatGuard, without_v4l2
+from acquire.camera.opening import without_v4l2
 from acquire.errors import ConfigError
 from acquire.events import ignore_event
 from acquire.frame import CameraInfo, Frame, frozen
@@ -48,25 +48,6 @@ def test_what_is_not_there_stays_as_it_is(tmp_path: Path) -> None:
     assert with_scheme(f"{tmp_path}/gone.h5") == f"session:{tmp_path}/gone.h5"
     assert with_scheme(f"{tmp_path}/*.tif?fps=5") == f"files:{tmp_path}/*.tif?fps=5"
     assert with_scheme(str(tmp_path)) == f"files:{tmp_path}"
-
-
-def test_three_pictures_that_agree_in_every_bit_are_one() -> None:
-    guard, one, other = RepeatGuard(), np.zeros((2, 2), np.uint8), np.ones((2, 2), np.uint8)
-    seen = [(guard.repeated(image.copy()), guard.just_found) for image in (one, one, one, one, other, other)]
-    assert [repeated for repeated, _ in seen] == [False, False, True, True, False, False]
-    assert [found for _, found in seen] == [False, False, True, False, False, False]
-
-
-@pytest.mark.parametrize(
-    ("took_s", "words"),
-    [
-        (0.0049, "the device is gone or dead (its reads fail at once)"),
-        (0.0051, "no picture within 0.0 s"),
-        (1.24, "no picture within 1.2 s"),
-    ],
-)
-def test_a_read_that_fails_at_once_has_waited_for_nothing(took_s: float, words: str) -> None:
-    assert FailureGuard().verdict(took_s) == words
 
 
 class Counting(CameraBase):

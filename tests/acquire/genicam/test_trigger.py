@@ -1,4 +1,4 @@
-"""Software triggers: at a steady rate, none to catch up, a refusal said once."""
+"""Software triggers: at a steady rate, none to catch up, a refusal kept."""
 
 from __future__ import annotations
 
@@ -58,16 +58,14 @@ class Bench:
         self.triggered.append(self.now)
         self.now += self.costs.pop(0) if self.costs else 0.0
 
-    def work(self, period_s: float) -> list[str]:
-        """What it reports."""
-        said: list[str] = []
-        trigger.SoftwareTrigger(cast(GenicamDevice, self), period_s, said.append)
-        return said
+    def work(self, period_s: float) -> str:
+        """Why it is refused."""
+        return trigger.SoftwareTrigger(cast(GenicamDevice, self), period_s).refused
 
 
 def test_one_picture_each_period_whatever_a_trigger_takes(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench(monkeypatch, [0.01, 0.03, 0.0, 0.02], turns=5)
-    assert bench.work(0.05) == []
+    assert bench.work(0.05) == ""
     assert bench.triggered == pytest.approx([100.0, 100.05, 100.10, 100.15, 100.20])
     assert set(bench.asked) == {"arv_camera_software_trigger"}
 
@@ -78,15 +76,15 @@ def test_periods_that_a_trigger_blocked_are_not_caught_up(monkeypatch: pytest.Mo
     assert bench.triggered == pytest.approx([100.0, 100.05, 100.27, 100.32, 100.37])
 
 
-def test_a_refusal_is_reported_once_and_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_refusal_is_kept_and_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
     bench = Bench(monkeypatch, [], turns=10)
     bench.refused_from = 3
-    assert bench.work(0.05) == ["triggers are refused: the line is down"]
+    assert bench.work(0.05) == "the line is down"
     assert len(bench.triggered) == 3 and bench.turns == 6
 
 
-def test_a_refusal_after_stop_is_not_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_refusal_after_stop_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     """A camera that is being closed refuses."""
     bench = Bench(monkeypatch, [], turns=10)
     bench.refused_from, bench.at_refusal = 3, bench.set
-    assert bench.work(0.05) == []
+    assert bench.work(0.05) == ""

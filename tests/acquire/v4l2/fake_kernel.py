@@ -129,6 +129,7 @@ class FakeKernel(api.Kernel):
         self.t = 1000.0
         self._handles: dict[int, FakeCamera] = {}
         self._next_fd = 3
+        self.looking = False
         self.on_wait: Iterator[Callable[[], None]] = iter(())
 
     # -- the calls
@@ -169,16 +170,13 @@ class FakeKernel(api.Kernel):
         return True
 
     def nodes(self) -> list[str]:
+        if self.looking:  # once a round, where a camera is looked for again
+            self.t += 0.5
+            next(self.on_wait, lambda: None)()
         return [camera.path for camera in self.cameras if camera.present]
 
     def now(self) -> float:
         return self.t
-
-    def pause(self, seconds: float) -> bool:
-        """Stands in for waiting between two attempts."""
-        self.t += seconds
-        next(self.on_wait, lambda: None)()
-        return False
 
     def ioctl(self, fd: int, request: int, argument: Any) -> None:
         camera = self._handles[fd]

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquire import opening_thread
 from acquire.addresses import parse_address
+from acquire.camera.live import LiveCamera
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import Event
 from acquire.frame import CameraSetting, Frame
 from acquire.v4l2 import api
-from acquire.v4l2.camera import V4L2Camera, v4l2_settings
+from acquire.v4l2.camera import open_v4l2
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
 
 
@@ -27,12 +29,10 @@ class CameraRig:
         self.events: list[Event] = []
         self.address = address
 
-    def open(self) -> V4L2Camera:
-        parsed = parse_address(self.address)
-        settings = v4l2_settings(parsed)
-        return V4L2Camera(
-            self.address, parsed.target, settings, self.events.append, self.kernel, self.kernel.pause
-        )
+    def open(self) -> LiveCamera:
+        camera = open_v4l2(parse_address(self.address), self.events.append, self.kernel)
+        self.kernel.looking = True
+        return camera
 
     def take(self, count: int) -> list[Frame]:
         with self.open() as camera:
@@ -40,6 +40,11 @@ class CameraRig:
 
     def texts(self) -> str:
         return "\n".join(event.text for event in self.events)
+
+
+@pytest.fixture(autouse=True)
+def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(opening_thread, "RETRY_S", 0.001)
 
 
 def test_request_codes_are_those_of_videodev2_h() -> None:
@@ -280,8 +285,6 @@ def test_stop_ends_the_iteration_also_while_the_camera_is_away() -> None:
     rig = CameraRig()
     camera = rig.open()
     rig.fake.script.extend([_nothing, _set(present=False)])
-    camera._pause = lambda seconds: camera.stopped.is_set()
-    rig.kernel.on_wait = iter(())
     with camera:
         frames = []
         for frame in camera:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquire.camera import FailureGuard, FrameCounter, RepeatGuard, missing_between
+from acquire.camera import FrameCounter, missing_between
 from acquire.errors import DataError
 from acquire.events import RateLimiter
 from acquire.v4l2 import api
@@ -112,18 +112,6 @@ def test_missing_between_never_counts_backwards() -> None:
     assert missing_between(1.0, 1.5, 10.0) == 4
     assert missing_between(1.0, 0.5, 10.0) == 0
     assert missing_between(1.0, 9.0, None) == 0
-
-
-def test_repeated_pictures_are_found_once_a_run() -> None:
-    guard = RepeatGuard()
-    a, b = np.zeros((2, 2)), np.ones((2, 2))
-    seen = [(guard.repeated(image), guard.just_found) for image in (a, a, a, a, b, b)]
-    assert seen == [(False, False)] * 2 + [(True, True), (True, False)] + [(False, False)] * 2
-
-
-def test_a_dead_handle_is_told_from_a_stall() -> None:
-    assert "fail at once" in FailureGuard().verdict(0.0001)
-    assert "within 1.0 s" in FailureGuard().verdict(1.0)
 
 
 def test_a_fault_with_every_frame_is_told_once_a_while_and_none_is_forgotten() -> None:

@@ -10,8 +10,7 @@ import pytest
 
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError, DataError
-from acquire.events import Event
-from acquire.v4l2.camera import V4L2Camera, v4l2_settings
+from acquire.v4l2.camera import v4l2_settings
 from acquire.v4l2.controls import MANUAL, changeable, control_name, exposure_s, list_controls, still_automatic
 from acquire.v4l2.faults import fault_in_words, why_not_open
 from acquire.v4l2.formats import FORMATS, Plane, decode, picture_size, warning_of
@@ -194,21 +193,3 @@ def test_faults_in_words(number: int, words: str) -> None:
     assert gone == (
         "/dev/video3: there is no such device; cameras here: /dev/video0 (fake camera); see phasedic devices"
     )
-
-
-def test_a_camera_is_dead_after_four_of_its_longest_pauses() -> None:
-    told: list[Event] = []
-    address, kernel = parse_address("/dev/video0?format=Y12&stall_s=1.5"), FakeKernel(FakeCamera())
-    camera = V4L2Camera(
-        address.text, address.target, v4l2_settings(address), told.append, kernel, kernel.pause
-    )
-    begin = kernel.t
-    camera._stall.restart(begin)
-    for waited in (1.4, 1.6, 5.9):
-        kernel.t = begin + waited
-        camera._look_for_stall()
-    kernel.t = begin + 6.1
-    with pytest.raises(OSError, match=r"no picture for 6\.1 s"):
-        camera._look_for_stall()
-    assert [event.text.partition(";")[0] for event in told] == ["/dev/video0: no picture for 1.6 s"]
-    camera.close()

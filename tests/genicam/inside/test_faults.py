@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from acquire.camera.timing import DEAD
+from acquire.camera.live import DEAD
 from acquire.genicam.device import GenicamDevice
 from acquire.genicam.library import Aravis, GenicamError
 from tests.genicam.inside.fakes import FakeCameraProcess, FrameWatch
