@@ -150,10 +150,8 @@ class LiveCamera(CameraBase):
     def _release(self) -> None:
         with self._guard:
             driver, self._driver = self._driver, None
-        if driver is not None:  # requests to a camera that is gone may block for seconds
-            closing = threading.Thread(target=driver.close, name="closing", daemon=True)
-            closing.start()
-            closing.join(0.0 if self._stall.stalled else CLOSE_S)
+        if driver is not None:
+            _closing(driver, 0.0 if self._stall.stalled else CLOSE_S)
 
     # -- frames ---------------------------------------------------------------------------------
 
@@ -254,15 +252,18 @@ class LiveCamera(CameraBase):
 
     def _recover(self, why: str) -> None:
         """Close it, look for it, open it again; until it works or the test ends."""
-        if not self._stall.stalled:
-            self._report(f"{why}; looking for it again", "error")
         with self._guard:
             before, self._driver = self._driver, None
         if before is None:
             return
+        closing = _closing(
+            before, SLICE_S
+        )  # first: an open handle makes a replugged camera take another name
+        if not self._stall.stalled:
+            self._report(f"{why}; looking for it again", "error")
 
         def attempt() -> Driver:
-            before.close()  # at once: an open handle makes a replugged camera come back under another name
+            closing.join()
             return _opened_alike(self._opener, before)
 
         driver = open_again(
@@ -294,6 +295,14 @@ class LiveCamera(CameraBase):
     def _report(self, text: str, level: Level = "warning") -> None:
         last = f" (last good frame {self._counter.index})" if level == "error" else ""
         device_event(self._on_event, self._address, f"{self._name}: {text}{last}", level)
+
+
+def _closing(driver: Driver, wait_s: float) -> threading.Thread:
+    """Close it in a thread, and wait so long for it: requests to a camera that is gone may block for seconds."""
+    closing = threading.Thread(target=driver.close, name="closing", daemon=True)
+    closing.start()
+    closing.join(wait_s)
+    return closing
 
 
 def _opened(opener: Opener, address: str) -> Driver:

@@ -100,7 +100,8 @@ def camera_of(
     events: Callable[[Event], None] = ignore_event,
 ) -> LiveCamera:
     waiting = list(captures)
-    return live_camera("opencv:0", lambda: waiting.pop(0), settings or OpenCVSettings(), events)
+    asked = settings or OpenCVSettings()
+    return live_camera("opencv:0", lambda: waiting.pop(0), asked, events, now=lambda: 100.0)
 
 
 def take(camera: LiveCamera, count: int) -> list[Any]:

