@@ -21,6 +21,7 @@ from urllib.parse import quote, unquote
 from acquire.bounds import NotAllowed, as_integer, as_number
 from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
+from acquire.text import Message
 
 # A glob may hold a question mark too: settings are the last one followed by key=value pairs.
 _SETTINGS = re.compile(r"\?((?:[A-Za-z_]\w*=[^&?]*)(?:&[A-Za-z_]\w*=[^&?]*)*)$")
@@ -68,7 +69,7 @@ def parse_address(text: str) -> Address:
     pairs = [pair.partition("=") for pair in found[1].split("&")] if found else []
     settings = tuple((key, unquote(value)) for key, _, value in pairs)
     if len({key for key, _ in settings}) < len(settings):
-        raise ConfigError(f"{text}: a setting is given twice; give each once")
+        raise ConfigError("{text}: a setting is given twice; give each once", text)
     scheme = _SCHEME.match(body)
     if not scheme:
         return Address(text, "", body, settings)
@@ -105,7 +106,9 @@ def expanded(path: str) -> Path:
     try:
         return Path(path).expanduser()
     except RuntimeError:
-        raise ConfigError(f"{path}: there is no such user, so no home folder; give the whole path") from None
+        raise ConfigError(
+            "{path}: there is no such user, so no home folder; give the whole path", path
+        ) from None
 
 
 RECORDING = "session.h5"
@@ -140,7 +143,7 @@ class Options:
         """One of ``allowed``."""
         value = self.text(key, default)
         if value not in allowed:
-            raise self._wrong(key, value, "one of " + ", ".join(allowed))
+            raise self._wrong(key, value, Message("one of ") + ", ".join(allowed))
         return value
 
     @overload
@@ -203,7 +206,7 @@ class Options:
         if value is None:
             return default
         if value.lower() not in TRUE_WORDS + FALSE_WORDS:
-            raise self._wrong(key, value, "yes or no")
+            raise self._wrong(key, value, Message("yes or no"))
         return value.lower() in TRUE_WORDS
 
     def rest(self) -> dict[str, str]:
@@ -222,11 +225,20 @@ class Options:
         if self._left:
             known = ", ".join(self._known) or "none"
             raise ConfigError(
-                f"{self.address.text}: unknown setting {next(iter(self._left))!r}; known: {known}"
+                "{text}: unknown setting {next}; known: {known}",
+                self.address.text,
+                repr(next(iter(self._left))),
+                known,
             )
 
     def _wrong(self, key: str, value: object, allowed: str) -> ConfigError:
-        return ConfigError(f"{self.address.text}: {key}={value} is not possible; allowed: {allowed}")
+        return ConfigError(
+            "{text}: {key}={value} is not possible; allowed: {allowed}",
+            self.address.text,
+            key,
+            value,
+            allowed,
+        )
 
 
 Device = TypeVar("Device")
@@ -302,7 +314,11 @@ class Registry(Generic[Device]):
                 f"{scheme}:" if scheme else "/dev/..." for scheme in [*self.schemes(), *self._elsewhere]
             )
             raise ConfigError(
-                f"{address.text}: no {self._what} has the scheme {address.scheme}:; known: {known}"
+                "{text}: no {what} has the scheme {scheme}:; known: {known}",
+                address.text,
+                self._what,
+                address.scheme,
+                known,
             )
         return _load(opener) if isinstance(opener, str) else opener
 

@@ -4,25 +4,28 @@ from __future__ import annotations
 
 import math
 
+from acquire.errors import Spoken
+from acquire.text import Message
 
-class NotAllowed(ValueError):
+
+class NotAllowed(Spoken, ValueError):
     """A value is not possible; the text is what is allowed. The caller adds the key and the value."""
 
 
 def as_number(value: object, low: float = -math.inf, high: float = math.inf) -> float:
     """A number from ``low`` to ``high``, never NaN and no boolean; raises ``NotAllowed``."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise NotAllowed(f"a number{_between(low, high)}")
+        raise NotAllowed("a number{between}", _between(low, high))
     try:
         return float(value)
     except OverflowError:
-        raise NotAllowed(f"a number{_between(low, high)} of fewer digits") from None
+        raise NotAllowed("a number{between} of fewer digits", _between(low, high)) from None
 
 
 def as_integer(value: object, low: float = -math.inf, high: float = math.inf) -> int:
     """A whole number from ``low`` to ``high``, and no boolean; raises ``NotAllowed``."""
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise NotAllowed(f"a whole number{_between(low, high)}")
+        raise NotAllowed("a whole number{between}", _between(low, high))
     return value
 
 
@@ -35,8 +38,8 @@ def same_value(got: str, asked: str) -> bool:
 
 
 def _between(low: float, high: float) -> str:
-    start = "" if low == -math.inf else f" from {_shown(low)}"
-    return start if high == math.inf else f"{start} to {_shown(high)}"
+    start = "" if low == -math.inf else Message(" from {shown}", _shown(low))
+    return start if high == math.inf else Message("{start} to {shown}", start, _shown(high))
 
 
 def _shown(bound: float) -> str:

@@ -7,8 +7,26 @@ traceback in the log.
 
 from __future__ import annotations
 
+from typing import Any
 
-class PhasedicError(Exception):
+from acquire.text import Message
+
+
+class Spoken(Exception):
+    """An error whose text is for people: ``Spoken("{path}: there is no such file", path)``, as a ``Message`` takes it.
+
+    Attributes
+    ----------
+    text : str
+        Its message, which keeps template and values where it has any.
+    """
+
+    def __init__(self, text: str = "", *values: Any) -> None:
+        self.text = Message(text, *values) if values else text
+        super().__init__(self.text)
+
+
+class PhasedicError(Spoken):
     """Base of all errors a person can act on; ``exit_code`` is what the process ends with."""
 
     exit_code = 1

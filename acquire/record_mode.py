@@ -9,9 +9,10 @@ from typing import Any, Literal, Self
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 
 Crop = tuple[int, int, int, int]
-RECORD_MODES = "'all', 'bursts' or 'every=K' with K from 1"
+RECORD_MODES = Message("'all', 'bursts' or 'every=K' with K from 1")
 _EVERY = re.compile("every=([1-9][0-9]{0,8})")
 
 
@@ -48,7 +49,9 @@ class RecordMode:
         every = _EVERY.fullmatch(text)
         if every:
             return cls("every", int(every[1]), crop)
-        raise ConfigError(f"record mode {text!r} is not possible; allowed: {RECORD_MODES}")
+        raise ConfigError(
+            "record mode {text} is not possible; allowed: {RECORD_MODES}", repr(text), RECORD_MODES
+        )
 
     def keeps(self, number: int) -> bool:
         """Whether the ``number``-th frame (from 0) of the test is recorded as a frame."""
@@ -66,7 +69,13 @@ class RecordMode:
         x, y, w, h = self.crop
         if x < 0 or y < 0 or w < 1 or h < 1 or x + w > width or y + h > height:
             raise ConfigError(
-                f"crop {x},{y},{w},{h} leaves the picture of {width} x {height} px; give x,y,width,height within it"
+                "crop {x},{y},{w},{h} leaves the picture of {width} x {height} px; give x,y,width,height within it",
+                x,
+                y,
+                w,
+                h,
+                width,
+                height,
             )
 
     def cut(self, image: NDArray[Any]) -> NDArray[Any]:

@@ -110,13 +110,17 @@ def _parse(text: str, allowed: Mapping[str, float], where: str) -> Fault:
     name, at, rest = text.partition("@")
     time, star, amount = rest.partition("*")
     if name not in allowed:
-        raise ConfigError(f"{where}: unknown fault {name!r}; known: {', '.join(allowed)}")
+        raise ConfigError(
+            "{where}: unknown fault {name}; known: {join}", where, repr(name), ", ".join(allowed)
+        )
     try:
         fault = Fault(name, float(time), float(amount) if star else allowed[name])
     except ValueError:
         fault = Fault(name, -1.0, 0.0)
     if not at or not (0 <= fault.t < float("inf") and 0 <= fault.amount < float("inf")):
-        raise ConfigError(f"{where}: fault {text!r}; write name@seconds or name@seconds*amount")
+        raise ConfigError(
+            "{where}: fault {text}; write name@seconds or name@seconds*amount", where, repr(text)
+        )
     return fault
 
 

@@ -25,6 +25,7 @@ from acquire.closing import Closing
 from acquire.errors import DeviceError
 from acquire.events import EventSink, device_event
 from acquire.frame import CameraInfo, CameraSetting, Clock, Frame
+from acquire.text import Message
 from hw_mocks.faults import CAMERA_FAULTS, FaultPlan, Planned, parse_faults, plan_frames
 from hw_mocks.optics import Optics, take_optics
 from hw_mocks.scene import Exposer, Scene, Sensor, rendered_fps, take_sensor, upper_half
@@ -186,7 +187,7 @@ class SimCamera(Closing):
             exposure_s=settings.exposure_s,
             pixel_format=FORMATS[sensor.bits],
             controls=controls,
-            warnings=("simulated: no camera and no specimen",),
+            warnings=(Message("simulated: no camera and no specimen"),),
             settings=self._changeable(),
         )
 
@@ -299,12 +300,16 @@ class SimCamera(Closing):
         trouble = planned.fate if planned.fate in ("stalled", "disconnected") else ""
         source = self.info.address
         if planned.fate == "gone":
-            text = "the camera was disconnected and does not come back; plug it in and start again"
-            self._error = DeviceError(f"{source}: {text}")
+            text = Message("the camera was disconnected and does not come back; plug it in and start again")
+            self._error = DeviceError("{source}: {text}", source, text)
         elif trouble and trouble != self._trouble:
-            device_event(self._on_event, source, f"the camera is {trouble}; waiting for it", "error")
+            device_event(
+                self._on_event, source, Message("the camera is {trouble}; waiting for it", trouble), "error"
+            )
         elif self._trouble and not trouble:
-            device_event(self._on_event, source, f"the camera was {self._trouble} and is back", "info")
+            device_event(
+                self._on_event, source, Message("the camera was {trouble} and is back", self._trouble), "info"
+            )
         self._trouble = trouble
         return planned.fate in ("good", "damaged")
 

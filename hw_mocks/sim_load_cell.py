@@ -22,6 +22,7 @@ from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink, device_event
 from acquire.load_cell import LoadCell, open_load_cell
 from acquire.load_sample import LoadCellInfo, LoadSample
+from acquire.text import Message
 from hw_mocks.faults import SERIAL_FAULTS, FaultPlan, parse_faults
 from hw_mocks.indicator import AsciiIndicator, Indicator, Style
 from hw_mocks.indicator_output import Sensing
@@ -36,7 +37,7 @@ PASSED_ON = (
     "sign", "capacity", "max_step", "timeout", "wait", "tare", "mode", "decimal", "gain", "zero", "calibration",
 )  # fmt: skip
 TIMED = {"millis": "1", "column": "2"}
-WARNING = "simulated: no load cell and no specimen"
+WARNING = Message("simulated: no load cell and no specimen")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,7 +150,7 @@ class NominalLoadCell(Closing):
         self._rng = np.random.default_rng(settings.seed)
         self._next, self._stopped, self._offset, self._last = 0, False, 0.0, 0.0
         self._before: list[float] = []
-        info = LoadCellInfo(address, "simulated load cell on nominal time", "none", "nominal")
+        info = LoadCellInfo(address, Message("simulated load cell on nominal time"), "none", "nominal")
         self.info = _described(info, address, settings, self.noise_N)
 
     def __iter__(self) -> Iterator[LoadSample]:
@@ -169,14 +170,14 @@ class NominalLoadCell(Closing):
     def tare(self, *, force: bool = False) -> None:
         """Make the last sample zero."""
         self._before.append(self._offset)
-        self._move(self._last, f"tared: {self._last:.6g} N is zero now")
+        self._move(self._last, Message("tared: {last:.6g} N is zero now", self._last))
 
     def undo_tare(self) -> None:
         """As before the last tare, if there was one."""
         if self._before:
-            self._move(self._before.pop(), "the last tare is undone")
+            self._move(self._before.pop(), Message("the last tare is undone"))
         else:
-            device_event(self._on_event, self.info.address, "there is no tare to undo", tared=False)
+            device_event(self._on_event, self.info.address, Message("there is no tare to undo"), tared=False)
 
     def _move(self, offset: float, text: str) -> None:
         data = {"offset_N": offset, "step_N": offset - self._offset}
@@ -222,7 +223,7 @@ def _described(info: LoadCellInfo, address: str, settings: SimLoadSettings, nois
         "simulated_capacity_N": settings.capacity_N,
         "seed": settings.seed,
     }
-    name = f"simulated load cell ({info.name})"
+    name = Message("simulated load cell ({name})", info.name)
     warnings = (WARNING, *info.warnings)
     return dataclasses.replace(info, address=address, name=name, settings=more, warnings=warnings)
 
@@ -278,8 +279,12 @@ def _refuse_another_specimen(address: Address, specimen: VirtualSpecimen) -> Non
         return
     given = [key for key, _ in address.settings if key in SPECIMEN_KEYS and key != "lockstep"]
     if given:
-        raise ConfigError(f"{address.text}: {given[0]} belongs to the camera's sim: address, say it there")
+        raise ConfigError(
+            "{text}: {given} belongs to the camera's sim: address, say it there", address.text, given[0]
+        )
     if address.target not in ("", specimen.kind):
-        raise ConfigError(f"{address.text}: the camera's specimen is {specimen.kind}; say sim: alone here")
+        raise ConfigError(
+            "{text}: the camera's specimen is {kind}; say sim: alone here", address.text, specimen.kind
+        )
     if Options(address).flag("lockstep", specimen.nominal) != specimen.nominal:
-        raise ConfigError(f"{address.text}: camera and load must both be in lock step or neither")
+        raise ConfigError("{text}: camera and load must both be in lock step or neither", address.text)

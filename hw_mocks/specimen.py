@@ -244,13 +244,20 @@ def _kind(address: Address) -> Kind:
     for kind in KINDS:
         if kind == wanted:
             return kind
-    raise ConfigError(f"{address.text}: there is no simulated specimen {wanted!r}; known: {', '.join(KINDS)}")
+    raise ConfigError(
+        "{text}: there is no simulated specimen {wanted}; known: {join}",
+        address.text,
+        repr(wanted),
+        ", ".join(KINDS),
+    )
 
 
 def _take_neck(options: Options, kind: Kind, material: FlowCurve | PowerLaw) -> float:
     width = options.number("neck", 0.0, minimum=4, maximum=8192)
     if width and (kind != "uniform" or not isinstance(material, PowerLaw)):
-        raise ConfigError(f"{options.address.text}: a neck needs sim:uniform of a sheet metal; give n or r")
+        raise ConfigError(
+            "{text}: a neck needs sim:uniform of a sheet metal; give n or r", options.address.text
+        )
     return width
 
 
@@ -273,7 +280,9 @@ def _take_programme(options: Options, material: FlowCurve | PowerLaw, clock: Tes
     top = options.number("max_strain", 8e-3, minimum=0, maximum=0.5)
     if hold + end >= seconds:
         raise ConfigError(
-            f"{options.address.text}: hold and end leave no time to pull; give seconds above {hold + end:g}"
+            "{text}: hold and end leave no time to pull; give seconds above {hold:g}",
+            options.address.text,
+            hold + end,
         )
     plastic = top > material.yield_strain
     knee_strain, knee = (material.yield_strain, 0.6) if plastic else (top / 2, 0.5)

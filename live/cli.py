@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from acquire.errors import ConfigError, DataError, PhasedicError
-from acquire.printable import brief, printable
+from acquire.text.printable import brief, printable
 from live.commands.arguments import Command, parse
 from live.commands.environment import check_environment, limit_resources
 from live.commands.exit_codes import EXIT_INTERRUPTED

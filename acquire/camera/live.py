@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from acquire.camera.contract import CameraBase
 from acquire.camera.timing import FrameCounter, StallWatch, StampOf, longest_pause_s, mid_exposure
-from acquire.errors import DeviceError, PhasedicError
+from acquire.errors import DeviceError, PhasedicError, Spoken
 from acquire.events import EventSink, Level, RateLimiter, device_event
 from acquire.frame import CameraInfo, Clock, Frame
 from acquire.opening_thread import open_again
+from acquire.text import Message
 
 log = logging.getLogger(__name__)
 
@@ -31,7 +32,7 @@ CLOSE_S = 0.8  # of a camera that may have died a moment ago; a thread goes on w
 DEAD = 4.0  # so many times the longest pause, and the camera is opened again
 
 
-class DeviceFault(Exception):
+class DeviceFault(Spoken):
     """A device cannot go on as it is, and must be opened again; the text says what happened."""
 
 
@@ -144,7 +145,9 @@ class LiveCamera(CameraBase):
         try:
             self._driver.start()
         except DeviceFault as fault:
-            raise DeviceError(f"{self._address}: {self._name} does not stream: {fault}") from fault
+            raise DeviceError(
+                "{address}: {name} does not stream: {fault}", self._address, self._name, fault
+            ) from fault
         self._stall.restart(self._now())
 
     def _release(self) -> None:
@@ -192,14 +195,26 @@ class LiveCamera(CameraBase):
             self._counter.leave_out(picture.number)  # and count it as lost with the next one
             if count := self._lost.due(picture.t):
                 why = f" ({picture.trouble})" if picture.trouble else ""
-                self._report(f"{count} frame(s) came without a whole picture{why} and are counted as lost")
+                self._report(
+                    Message(
+                        "{count} frame(s) came without a whole picture{why} and are counted as lost",
+                        count,
+                        why,
+                    )
+                )
             return None
         lost = self._count(picture)
         self._t = max(self._t, mid_exposure(picture.t, self.info.exposure_s, picture.stamp))
         info, damaged = self.info, bool(picture.trouble) or self._is_repeated(picture)
         if picture.trouble and (count := self._damaged.due(picture.t)):
-            more = f" ({picture.trouble}; {count} since the last such line)" if count > 1 else ""
-            self._report(f"frame {self._counter.index} is damaged: recorded, not measured{more}")
+            more = (
+                Message(" ({trouble}; {count} since the last such line)", picture.trouble, count)
+                if count > 1
+                else ""
+            )
+            self._report(
+                Message("frame {index} is damaged: recorded, not measured{more}", self._counter.index, more)
+            )
         return Frame(
             picture.image, self._counter.index, self._t, picture.clock, lost, info.bits, picture.t, damaged,
             info.white_level,
@@ -211,7 +226,9 @@ class LiveCamera(CameraBase):
         if remark := self._counter.pace.remark(self.info.fps):
             self._report(remark)
         if counted and not self._counter.counts_itself:
-            self._report("the driver does not number its frames; losses are counted from their stamps alone")
+            self._report(
+                Message("the driver does not number its frames; losses are counted from their stamps alone")
+            )
         return lost
 
     def _is_repeated(self, picture: Picture) -> bool:
@@ -220,7 +237,9 @@ class LiveCamera(CameraBase):
             return False
         repeated = self._repeats.repeated(picture.image)
         if repeated and self._repeats.just_found:
-            self._report("the driver hands out the same picture again and again; none of them is measured")
+            self._report(
+                Message("the driver hands out the same picture again and again; none of them is measured")
+            )
         return repeated
 
     def _is_stale(self, arrived: float) -> bool:
@@ -229,14 +248,18 @@ class LiveCamera(CameraBase):
             self._stale += 1
             return True
         if self._stale:
-            self._report(f"{self._stale} frames older than the start were left out", "info")
+            self._report(Message("{stale} frames older than the start were left out", self._stale), "info")
         self._stale, self._not_before = 0, float("-inf")
         return False
 
     def _look_for_delay(self, age: float) -> None:
         late = age > max(1.0, 2 * self._period_s)
         if late and not self._late:
-            self._report(f"frames are {age:.1f} s old when they are fetched: this machine does not keep up")
+            self._report(
+                Message(
+                    "frames are {age:.1f} s old when they are fetched: this machine does not keep up", age
+                )
+            )
         self._late = late
 
     @property
@@ -260,7 +283,7 @@ class LiveCamera(CameraBase):
             before, SLICE_S
         )  # first: an open handle makes a replugged camera take another name
         if not self._stall.stalled:
-            self._report(f"{why}; looking for it again", "error")
+            self._report(Message("{why}; looking for it again", why), "error")
 
         def attempt() -> Driver:
             closing.join()
@@ -275,9 +298,9 @@ class LiveCamera(CameraBase):
     def _not_back(self, error: Exception) -> None:
         """A camera that answers and cannot be used is told, once; one that is away has been already."""
         log.debug("%s: not back yet: %s", self._address, error)
-        if isinstance(error, PhasedicError) and str(error) != self._why_not:
-            self._why_not = str(error)
-            self._report(f"it is back, but cannot be used: {error}", "error")
+        if isinstance(error, PhasedicError) and error.text != self._why_not:
+            self._why_not = error.text
+            self._report(Message("it is back, but cannot be used: {error}", error), "error")
 
     def _resume(self, driver: Driver) -> None:
         with self._guard:
@@ -285,16 +308,20 @@ class LiveCamera(CameraBase):
                 driver.close()
                 return
             self._driver = driver
-        moved = f" as {driver.name}" if driver.name != self._name else ""
+        moved = Message(" as {name}", driver.name) if driver.name != self._name else ""
         if not self._stall.stalled:
-            self._report(f"opened again{moved}; the frames in between are counted as lost", "info")
+            self._report(
+                Message("opened again{moved}; the frames in between are counted as lost", moved), "info"
+            )
         self._name, self._why_not = driver.name, ""
         self._counter.restart()
         self._stall.restart(self._now())
 
     def _report(self, text: str, level: Level = "warning") -> None:
-        last = f" (last good frame {self._counter.index})" if level == "error" else ""
-        device_event(self._on_event, self._address, f"{self._name}: {text}{last}", level)
+        last = Message(" (last good frame {index})", self._counter.index) if level == "error" else ""
+        device_event(
+            self._on_event, self._address, Message("{name}: {text}{last}", self._name, text, last), level
+        )
 
 
 def _closing(driver: Driver, wait_s: float) -> threading.Thread:
@@ -310,8 +337,10 @@ def _opened(opener: Opener, address: str) -> Driver:
         return opener(None)
     except DeviceFault as fault:
         raise DeviceError(
-            f"{address}: does not open: {fault}. Close other programs that use it, check cable and power, then try"
-            " again"
+            "{address}: does not open: {fault}. Close other programs that use it, check cable and power, then "
+            "try again",
+            address,
+            fault,
         ) from fault
 
 
@@ -320,7 +349,9 @@ def _opened_alike(opener: Opener, before: Driver) -> Driver:
     driver = opener(before)
     try:
         if driver.alike != before.alike:
-            raise DeviceError(f"{driver.name} came back with {driver.alike}, not {before.alike}")
+            raise DeviceError(
+                "{name} came back with {alike}, not {alike2}", driver.name, driver.alike, before.alike
+            )
         driver.start()
     except BaseException:
         driver.close()

@@ -21,6 +21,7 @@ from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.record_mode import Crop, RecordMode
+from acquire.text import Message
 
 log = logging.getLogger(__name__)
 
@@ -28,7 +29,7 @@ log = logging.getLogger(__name__)
 def without_v4l2(address: Address, on_event: EventSink) -> Camera:
     """Refuse a camera by its device where there is no V4L2."""
     raise ConfigError(
-        f"{address.text}: cameras by their device need Linux (V4L2); choose opencv:0, genicam: or files:"
+        "{text}: cameras by their device need Linux (V4L2); choose opencv:0, genicam: or files:", address.text
     )
 
 
@@ -77,7 +78,11 @@ class CameraListing:
 
     def text(self) -> str:
         """Several lines for a person."""
-        stays = f"stays the same when replugged: {self.stable_address}" if self.stable_address else ""
+        stays = (
+            Message("stays the same when replugged: {stable_address}", self.stable_address)
+            if self.stable_address
+            else ""
+        )
         lines = (line for line in (self.trouble, stays, *self.details) if line)
         return "\n      ".join((f"  {self.address}  {self.name}".rstrip(), *lines))
 
@@ -90,7 +95,9 @@ def list_cameras() -> list[CameraListing]:
             found += listed()
         except Exception as error:  # the library of one maker must not hide the cameras of all others
             log.debug("the cameras of %s: cannot be listed", scheme, exc_info=True)
-            found.append(CameraListing(f"{scheme}:", "", f"its cameras cannot be listed: {error}"))
+            found.append(
+                CameraListing(f"{scheme}:", "", Message("its cameras cannot be listed: {error}", error))
+            )
     return found
 
 

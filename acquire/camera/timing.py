@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Literal
 
 from acquire.frame import CameraInfo, CameraSetting
+from acquire.text import Message
 
 StampOf = Literal["start", "end", ""]
 STAMPS: tuple[StampOf, ...] = ("start", "end", "")
@@ -114,9 +115,13 @@ class FramePace:
         if self._told or not said or not fps or len(self._intervals) < self.KEPT:
             return ""
         self._told = abs(fps - said) > 0.1 * said
-        why = "little light? a shorter exposure keeps the rate"
+        why = Message("little light? a shorter exposure keeps the rate")
         return (
-            f"{fps:.3g} frames a second come, not the {said:.3g} of the driver ({why})" if self._told else ""
+            Message(
+                "{fps:.3g} frames a second come, not the {said:.3g} of the driver ({why})", fps, said, why
+            )
+            if self._told
+            else ""
         )
 
 
@@ -220,7 +225,7 @@ class StallWatch:
         """A picture came."""
         if self.stalled:
             self.stalled = False
-            self._report(f"pictures again after {now - self._picture:.1f} s", "info")
+            self._report(Message("pictures again after {now:.1f} s", now - self._picture), "info")
         self._sign = self._picture = now
 
     def waited(self, now: float, pause_s: float) -> float:
@@ -228,6 +233,8 @@ class StallWatch:
         waited = now - self._sign
         if waited > pause_s and not self.stalled:
             self.stalled = True
-            text = f"no picture for {waited:.1f} s; still waiting (trigger, cable, light control?)"
+            text = Message(
+                "no picture for {waited:.1f} s; still waiting (trigger, cable, light control?)", waited
+            )
             self._report(text, "error")
         return waited

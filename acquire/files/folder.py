@@ -8,6 +8,7 @@ from pathlib import Path
 from acquire.addresses import expanded
 from acquire.errors import DataError
 from acquire.files.picture import FOREIGN
+from acquire.text import Message
 
 SUFFIXES = (".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm")
 _SYSTEM = ("thumbs.db", "ehthumbs.db", "desktop.ini")
@@ -26,14 +27,22 @@ def listed(target: str) -> list[Path]:
         there = found = [item for item in map(Path, names) if not item.is_dir() and _is_seen(item)]
     for item in found or there:
         if what := FOREIGN.get(item.suffix.lower()):
-            raise DataError(f"{item}: {what}")
+            raise DataError("{item}: {what}", item, what)
     if found:
         return found
     if not path.is_dir():
-        raise DataError(f"files:{target}: no image there; looked in {path.parent.absolute()}")
+        raise DataError(
+            "files:{target}: no image there; looked in {absolute}", target, path.parent.absolute()
+        )
     others = ", ".join(sorted(item.name for item in there)[:3])
-    only = f"only {others}{' ...' * (len(there) > 3)}" if there else "it is empty"
-    raise DataError(f"{path}: no picture in this folder ({only}); wanted: {', '.join(SUFFIXES)}")
+    only = (
+        Message("only {others}{value}", others, " ..." * (len(there) > 3))
+        if there
+        else Message("it is empty")
+    )
+    raise DataError(
+        "{path}: no picture in this folder ({only}); wanted: {join}", path, only, ", ".join(SUFFIXES)
+    )
 
 
 def _is_seen(path: Path) -> bool:

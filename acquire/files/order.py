@@ -16,9 +16,10 @@ from pathlib import PurePath
 from typing import NamedTuple
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 
 AUTO, BY = "auto", ("auto", "name", "time")
-WAY_OUT = "give --reference NAME, --order time or --order name (in an address: ?order=time)"
+WAY_OUT = Message("give --reference NAME, --order time or --order name (in an address: ?order=time)")
 _REFERENCE = {
     "ref", "reference", "undeformed", "unloaded", "initial", "before",
     "referenz", "unverformt", "unbelastet", "référence", "initiale",
@@ -96,7 +97,7 @@ def in_order(
         if by != AUTO or first:
             return order
         a, b = names[called[0]], names[called[1]]
-        raise ConfigError(f"{a} and {b} are both called reference; {WAY_OUT}")
+        raise ConfigError("{a} and {b} are both called reference; {WAY_OUT}", a, b, WAY_OUT)
     return called + [k for k in order if k not in called]
 
 
@@ -105,8 +106,10 @@ def _by_time(names: Sequence[str], times: Sequence[float]) -> list[int]:
     for a, b in itertools.pairwise(order):
         if times[a] == times[b]:
             raise ConfigError(
-                f"{names[a]} and {names[b]} have the same time, so times give no order; rename them in the order of"
-                " the test"
+                "{names} and {names2} have the same time, so times give no order; rename them in the order of the "
+                "test",
+                names[a],
+                names[b],
             )
     return order
 
@@ -150,7 +153,11 @@ def _decided(
     other = next(order for order in orders if order != orders[0])
     a, b = next((names[i], names[j]) for i, j in zip(orders[0], other, strict=True) if i != j)
     raise ConfigError(
-        f"the names do not say which comes first, {a} or {b}, and the times of the files do not either; {WAY_OUT}"
+        "the names do not say which comes first, {a} or {b}, and the times of the files do not either; "
+        "{WAY_OUT}",
+        a,
+        b,
+        WAY_OUT,
     )
 
 

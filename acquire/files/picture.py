@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import LOG_WARNING, load_cv2, log_settings
 from acquire.errors import DataError
 from acquire.files.tiff import UNREADABLE, tiff_pages
+from acquire.text import Message
 
 MAX_BYTES = 2**31 - 1
 _KINDS = {
@@ -48,10 +49,10 @@ def check_regular(path: Path) -> int:
     try:
         status = path.stat()
     except (OSError, ValueError) as error:
-        raise DataError(f"{path}: cannot be read: {_why(error)}") from error
+        raise DataError("{path}: cannot be read: {why}", path, _why(error)) from error
     if not stat.S_ISREG(status.st_mode):
         kind = _KINDS.get(stat.S_IFMT(status.st_mode), "no file")
-        raise DataError(f"{path}: cannot be read: it is {kind}; give a regular file")
+        raise DataError("{path}: cannot be read: it is {kind}; give a regular file", path, kind)
     return status.st_size
 
 
@@ -66,14 +67,17 @@ def read_bytes(path: Path, most: int = MAX_BYTES) -> bytes:
     size = check_regular(path)
     if size > most:
         raise DataError(
-            f"{path}: {size / 1e6:.0f} MB are more than the {most / 1e6:.0f} MB such a file may have"
+            "{path}: {size:.0f} MB are more than the {most:.0f} MB such a file may have",
+            path,
+            size / 1e6,
+            most / 1e6,
         )
     try:
         # Whatever took the place of the file in the meantime does not make us wait.
         with os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
             return file.read(size)
     except OSError as error:
-        raise DataError(f"{path}: cannot be read: {_why(error)}") from error
+        raise DataError("{path}: cannot be read: {why}", path, _why(error)) from error
 
 
 def _why(error: Exception) -> str:
@@ -111,7 +115,7 @@ def decode(source: Source, page: int = 0) -> Decoded:
         try:
             picture = _decode(cv2, source, page)
         except cv2.error as error:
-            reports.append(str(error))
+            reports.append(error.text)
     damage = next((line for line in reports if _DAMAGE.search(line)), "")
     return Decoded(picture, _BEFORE.sub("", damage).strip()[:200])
 
@@ -180,16 +184,19 @@ def _take_reports(capture: IO[bytes]) -> list[str]:
     return [line for line in lines if _DECODERS.search(line)]
 
 
-_EXPORT = "cannot be read; save it as 16-bit TIFF pictures with the program of the camera"
+_EXPORT = Message("cannot be read; save it as 16-bit TIFF pictures with the program of the camera")
 FOREIGN = {
-    **dict.fromkeys((".mraw", ".cih", ".cihx"), f"a film of a Photron camera {_EXPORT}"),
-    ".cine": f"a film of a Phantom camera {_EXPORT}",
-    ".seq": f"a film of StreamPix {_EXPORT}",
+    **dict.fromkeys((".mraw", ".cih", ".cihx"), Message("a film of a Photron camera {EXPORT}", _EXPORT)),
+    ".cine": Message("a film of a Phantom camera {EXPORT}", _EXPORT),
+    ".seq": Message("a film of StreamPix {EXPORT}", _EXPORT),
     **dict.fromkeys(
         (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2"),
-        "a raw picture cannot be read; develop it as 16-bit TIFF, without sharpening and without noise reduction",
+        Message(
+            "a raw picture cannot be read; develop it as 16-bit TIFF, without sharpening and without noise "
+            "reduction"
+        ),
     ),
-    ".heic": "this picture cannot be read; save it as PNG or TIFF",
+    ".heic": Message("this picture cannot be read; save it as PNG or TIFF"),
 }
 """Endings of files that are not read, and what to do with them."""
 log = logging.getLogger(__name__)
@@ -219,7 +226,7 @@ def picture_source(path: Path) -> Source:
         return read_bytes(path)
     if not is_utf8(path):
         raise DataError(
-            f"{path}: a file of more than 2 GB is read by its name, which must be UTF-8; rename it"
+            "{path}: a file of more than 2 GB is read by its name, which must be UTF-8; rename it", path
         )
     return str(path)
 
@@ -238,10 +245,12 @@ def read_picture_page(path: Path, source: Source, page: int = 0) -> NDArray[Any]
     decoded = decode(source, page) if _complete(path, source) else None
     if decoded is None or decoded.picture is None:
         log.debug("%s: %s", path, decoded.damage if decoded else "ends too early")
-        raise DataError(f"{path}: {_why_not(path, page)}")
+        raise DataError("{path}: {why_not}", path, _why_not(path, page))
     if decoded.damage:
         raise DataError(
-            f"{path}: a damaged image ({decoded.damage}); copy it again or take it out of the list"
+            "{path}: a damaged image ({damage}); copy it again or take it out of the list",
+            path,
+            decoded.damage,
         )
     return decoded.picture
 
@@ -249,10 +258,11 @@ def read_picture_page(path: Path, source: Source, page: int = 0) -> NDArray[Any]
 def _why_not(path: Path, page: int) -> str:
     with suppress(DataError, IndexError):
         if packed := UNREADABLE.get(tiff_pages(path)[page].compression):
-            return (
-                f"compressed with {packed}, which cannot be read; save it with LZW, Deflate or no compression"
+            return Message(
+                "compressed with {packed}, which cannot be read; save it with LZW, Deflate or no compression",
+                packed,
             )
-    return "not an image, or cut off; copy it again or take it out of the list"
+    return Message("not an image, or cut off; copy it again or take it out of the list")
 
 
 def _complete(path: Path, source: Source) -> bool:
@@ -276,11 +286,13 @@ def write_picture(path: Path, picture: NDArray[Any]) -> None:
     except cv2.error:
         well = False
     if not well:
-        raise DataError(f"{path}: no format of pictures has such an ending or samples; choose .png or .tif")
+        raise DataError(
+            "{path}: no format of pictures has such an ending or samples; choose .png or .tif", path
+        )
     try:
         with path.open("xb") as file:
             file.write(content.tobytes())
     except OSError as error:
         raise DataError(
-            f"{path}: cannot be written: {error.strerror}; look at the folder and the disk"
+            "{path}: cannot be written: {strerror}; look at the folder and the disk", path, error.strerror
         ) from error

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 from acquire.errors import DataError
+from acquire.text import Message
 
 SUFFIXES = (".tif", ".tiff")
 _WIDTH, _HEIGHT, _COMPRESSION = 256, 257, 259
 _SIZES = {1: "B", 3: "H", 4: "I", 16: "Q"}  # types of whole numbers
 UNREADABLE = {
-    34925: "LZMA", 50000: "ZSTD", 50001: "WebP", 50002: "JPEG XL", 34887: "LERC", 34712: "JPEG 2000",
+    34925: "LZMA", 50000: "ZSTD", 50001: "WebP", 50002: Message("JPEG XL"), 34887: "LERC", 34712: "JPEG 2000",
     33003: "JPEG 2000", 33005: "JPEG 2000",
 }  # fmt: skip
 """Compressions that OpenCV cannot read."""
@@ -48,10 +49,10 @@ def tiff_pages(path: Path) -> list[Page]:
         with path.open("rb") as file:
             return list(_pages(file, path))
     except OSError as error:
-        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
+        raise DataError("{path}: cannot be read: {strerror}", path, error.strerror) from error
     except struct.error as error:
         raise DataError(
-            f"{path}: a TIFF that is cut off; copy it again or take it out of the list"
+            "{path}: a TIFF that is cut off; copy it again or take it out of the list", path
         ) from error
 
 
@@ -67,7 +68,7 @@ def _pages(file: BinaryIO, path: Path) -> Iterator[Page]:
     seen: set[int] = set()
     while offset:
         if offset in seen:
-            raise DataError(f"{path}: the directories of this TIFF run in a circle; save it anew")
+            raise DataError("{path}: the directories of this TIFF run in a circle; save it anew", path)
         seen.add(offset)
         page, offset = _directory(file, order, offset, big)
         yield page
@@ -88,6 +89,6 @@ def _directory(file: BinaryIO, order: str, offset: int, big: bool) -> tuple[Page
 def _unpack(file: BinaryIO, layout: str, offset: int | None = None) -> tuple[Any, ...]:
     if offset is not None:
         if offset > 2**62:
-            raise struct.error("an offset beyond any file")
+            raise struct.error(Message("an offset beyond any file"))
         file.seek(offset)
     return struct.unpack(layout, file.read(struct.calcsize(layout)))

@@ -30,6 +30,7 @@ from acquire.genicam.library import Aravis, GenicamError, load_aravis
 from acquire.genicam.settings import GenicamSettings, genicam_settings
 from acquire.genicam.setup import set_up
 from acquire.genicam.trigger import SoftwareTrigger
+from acquire.text import Message
 
 log = logging.getLogger(__name__)
 
@@ -114,7 +115,7 @@ class GenicamDriver:
         if self._device.lost.is_set():
             raise GenicamError("the camera no longer answers (cable, power, network?)")
         if self._trigger is not None and self._trigger.refused:
-            raise GenicamError(f"triggers are refused: {self._trigger.refused}")
+            raise GenicamError("triggers are refused: {refused}", self._trigger.refused)
         return None if received is None else self._picture(received, time.monotonic() - received.age_s)
 
     def _take(self, content: memoryview, padding: int) -> NDArray[Any] | None:
@@ -126,8 +127,8 @@ class GenicamDriver:
 
     def _picture(self, received: Received, arrived: float) -> Picture:
         if not received.trouble and received.size != (self.setup.width, self.setup.height):
-            raise GenicamError(f"its pictures are {received.size[0]}x{received.size[1]} now")
-        trouble = received.trouble or ("bytes are missing" if received.taken is None else "")
+            raise GenicamError("its pictures are {size}x{size2} now", received.size[0], received.size[1])
+        trouble = received.trouble or (Message("bytes are missing") if received.taken is None else "")
         if trouble:
             return Picture(None, arrived, received.number, trouble)
         clock, t, remark = self._stamp(received, arrived)
@@ -136,11 +137,11 @@ class GenicamDriver:
     def _stamp(self, received: Received, arrived: float) -> tuple[Clock, float, str]:
         """The camera's stamp on our clock, of a camera that has none the arrival; and what is to be said of it."""
         if received.stamp_ns == 0:
-            remark = "the camera does not stamp its frames: times are those of their arrival"
+            remark = Message("the camera does not stamp its frames: times are those of their arrival")
             told, self._unstamped = self._unstamped, True
             return "host", arrived, "" if told else remark
         stamp = self._clock.stamp(received.stamp_ns * 1e-6, arrived)
-        jumped = "the camera's clock jumped (a restart?); its stamps are tied anew"
+        jumped = Message("the camera's clock jumped (a restart?); its stamps are tied anew")
         return "device", stamp.t, jumped if stamp.jumped else ""
 
     def close(self) -> None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from acquire.genicam.library import Aravis, GenicamError
+from acquire.text import Message
 
 Take = Callable[[memoryview, int], Any]
 
@@ -21,15 +22,15 @@ RANGE_CHECK = 1  # ARV_RANGE_CHECK_POLICY_ENABLE
 NO_ADJUSTMENT = 0  # ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER
 SUCCESS = 0
 STATUS = {
-    -1: "unknown trouble",
+    -1: Message("unknown trouble"),
     1: "cleared",
-    2: "packets were missing until the time was over",
-    3: "packets are missing",
-    4: "a packet has a wrong number",
-    5: "it is larger than agreed",
-    6: "it is not complete",
-    7: "it was aborted",
-    8: "it is no picture",
+    2: Message("packets were missing until the time was over"),
+    3: Message("packets are missing"),
+    4: Message("a packet has a wrong number"),
+    5: Message("it is larger than agreed"),
+    6: Message("it is not complete"),
+    7: Message("it was aborted"),
+    8: Message("it is no picture"),
 }
 
 
@@ -47,7 +48,7 @@ class CameraIdentity:
     serial: str
 
     def __str__(self) -> str:
-        return f"{self.vendor} {self.model} ({self.serial})"
+        return Message("{vendor} {model} ({serial})", self.vendor, self.model, self.serial)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,7 +159,7 @@ class GenicamDevice:
     def _node(self, feature: str) -> int:
         node = self._library.call("arv_device_get_feature", self._device, feature)
         if not node:
-            raise GenicamError(f"there is no feature {feature}")
+            raise GenicamError("there is no feature {feature}", feature)
         return int(node)
 
     def text(self, feature: str) -> str:

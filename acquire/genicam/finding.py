@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from acquire.errors import ConfigError, DeviceError
 from acquire.genicam.library import Aravis
+from acquire.text import Message
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +32,14 @@ class FoundCamera:
     protocol: str
 
     def __str__(self) -> str:
-        return f"{self.vendor} {self.model} ({self.serial}, {self.protocol} {self.place})"
+        return Message(
+            "{vendor} {model} ({serial}, {protocol} {place})",
+            self.vendor,
+            self.model,
+            self.serial,
+            self.protocol,
+            self.place,
+        )
 
 
 _ABOUT = ("id", "vendor", "model", "serial_nbr", "address", "protocol")
@@ -70,12 +78,19 @@ def name_of(library: Aravis, target: str, where: str) -> str:
     exact = [one for one in found if target and target == one.id]
     if len(found) == 1 or exact:
         return (exact or found)[0].id
-    here = "; ".join(f"genicam:{one.id}  {one}" for one in cameras) or "none"
+    here = "; ".join(Message("genicam:{id}  {one}", one.id, one) for one in cameras) or "none"
     if found:
-        raise ConfigError(f"{where}: {len(found)} cameras are meant; give one of them. Cameras here: {here}")
+        raise ConfigError(
+            "{where}: {len} cameras are meant; give one of them. Cameras here: {here}",
+            where,
+            len(found),
+            here,
+        )
     raise DeviceError(
-        f"{where}: no such GigE or USB3 camera answers. Cameras here: {here}. Check cable, power and address "
-        "(docs/machine-vision.md)"
+        "{where}: no such GigE or USB3 camera answers. Cameras here: {here}. Check cable, power and address "
+        "(docs/machine-vision.md)",
+        where,
+        here,
     )
 
 

@@ -105,7 +105,7 @@ def decode(
     needed = rows * (length + padding) - padding
     samples = np.frombuffer(data, np.uint8)
     if samples.size < needed:
-        raise DataError(f"{samples.size} bytes instead of {needed}")
+        raise DataError("{size} bytes instead of {needed}", samples.size, needed)
     return frozen(
         _unpacked_rows(samples[:needed], pixel_format, pixels, length + padding).reshape(height, width)
     )

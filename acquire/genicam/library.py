@@ -14,6 +14,7 @@ from typing import Any
 
 from acquire.camera.live import DeviceFault
 from acquire.errors import DeviceError
+from acquire.text import Message
 
 LIBRARY = "libaravis-0.8.so.0"
 OTHER_VERSIONS = ("aravis-0.10", "aravis-0.9", "aravis-0.6")
@@ -208,9 +209,12 @@ def load_aravis() -> Aravis:
         return Aravis()
     except (OSError, AttributeError) as error:
         others = [name for name in OTHER_VERSIONS if ctypes.util.find_library(name)]
-        there = f"; {', '.join(others)} is here, which it does not work with" if others else ""
+        there = Message("; {join} is here, which it does not work with", ", ".join(others)) if others else ""
         raise DeviceError(
-            f"genicam: cameras need the library Aravis 0.8, which is not there ({error}){there}: {HOW_TO_INSTALL}"
+            "genicam: cameras need the library Aravis 0.8, which is not there ({error}){there}: {HOW_TO_INSTALL}",
+            error,
+            there,
+            HOW_TO_INSTALL,
         ) from error
 
 

@@ -10,6 +10,7 @@ from acquire.genicam.device import GenicamDevice
 from acquire.genicam.finding import FoundCamera, find_cameras
 from acquire.genicam.formats import preferred, readable
 from acquire.genicam.library import Aravis, GenicamError, has_aravis, load_aravis
+from acquire.text import Message
 
 
 def list_cameras() -> list[CameraListing]:
@@ -27,20 +28,22 @@ def _look_at(library: Aravis, found: FoundCamera) -> CameraListing:
             return CameraListing(
                 address=f"genicam:{found.id}" + (f"?format={best}" if best else ""),
                 name=str(found),
-                trouble="" if best else "it has no monochrome format",
+                trouble="" if best else Message("it has no monochrome format"),
                 details=tuple(_details(device)),
             )
     except GenicamError as error:
-        return CameraListing(f"genicam:{found.id}", str(found), f"it does not open: {error}")
+        return CameraListing(f"genicam:{found.id}", str(found), Message("it does not open: {error}", error))
 
 
 def _details(device: GenicamDevice) -> Iterator[str]:
     yield f"format={', '.join(readable(device.choices('PixelFormat')))}"
     size, most = ([of(name) for name in ("Width", "Height")] for of in (device.integer, device.highest))
-    yield f"{size[0]}x{size[1]} of {most[0]}x{most[1]}"
+    yield Message("{size}x{size2} of {most}x{most2}", size[0], size[1], most[0], most[1])
     for what, key in (("frame_rate", "fps"), ("exposure_time", "exposure_us"), ("gain", "gain")):
         if device.ask(f"arv_camera_is_{what}_available"):
             low, high = device.bounds_of(what)
-            yield f"{key}={device.ask(f'arv_camera_get_{what}'):g} ({low:g}..{high:g})"
+            yield Message(
+                "{key}={ask:g} ({low:g}..{high:g})", key, device.ask(f"arv_camera_get_{what}"), low, high
+            )
     if device.has("TriggerSource"):
-        yield f"trigger=no, {', '.join(device.choices('TriggerSource'))}"
+        yield Message("trigger=no, {join}", ", ".join(device.choices("TriggerSource")))

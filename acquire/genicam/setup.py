@@ -15,6 +15,7 @@ from acquire.genicam.device import NO_ADJUSTMENT, GenicamDevice
 from acquire.genicam.formats import FORMATS, MonoFormat, preferred, readable
 from acquire.genicam.library import GenicamError
 from acquire.genicam.settings import KEYS, NO_TRIGGER, GenicamSettings
+from acquire.text import Message
 
 # Set to "Off", so that nothing changes by itself during a test.
 AUTOMATIC = (
@@ -131,18 +132,27 @@ def _put_on_manual(device: GenicamDevice) -> None:
 def _set_feature(device: GenicamDevice, feature: str, value: str, where: str) -> None:
     if not device.has(feature):
         raise ConfigError(
-            f"{where}: this camera has no feature {feature!r}; known settings: {', '.join(KEYS)}"
+            "{where}: this camera has no feature {feature}; known settings: {join}",
+            where,
+            repr(feature),
+            ", ".join(KEYS),
         )
     kind = device.kind(feature)
     if kind == "Enumeration" and value not in device.choices(feature):
         offered = ", ".join(device.choices(feature))
-        raise ConfigError(f"{where}: {feature}={value} is not possible; allowed: {offered}")
+        raise ConfigError(
+            "{where}: {feature}={value} is not possible; allowed: {offered}", where, feature, value, offered
+        )
     try:
         device.set_text(feature, value)
     except GenicamError as error:
-        raise ConfigError(f"{where}: {feature}={value}: the camera refuses it ({error})") from error
+        raise ConfigError(
+            "{where}: {feature}={value}: the camera refuses it ({error})", where, feature, value, error
+        ) from error
     if kind != "Command" and not same_value(got := device.text(feature), value):
-        raise ConfigError(f"{where}: {feature}={value}: the camera makes it {got}; ask for that")
+        raise ConfigError(
+            "{where}: {feature}={value}: the camera makes it {got}; ask for that", where, feature, value, got
+        )
 
 
 def _choose_format(device: GenicamDevice, asked: str | None, where: str) -> MonoFormat:
@@ -150,14 +160,23 @@ def _choose_format(device: GenicamDevice, asked: str | None, where: str) -> Mono
     usable = readable(offered)
     if not usable:
         raise DeviceError(
-            f"{where}: offers {', '.join(offered) or 'nothing'}, none of them grey levels we can read"
+            "{where}: offers {join}, none of them grey levels we can read",
+            where,
+            ", ".join(offered) or "nothing",
         )
     name = preferred(offered) if asked is None else asked
     if name not in usable:
-        raise ConfigError(f"{where}: format={asked} is not possible; the camera offers {', '.join(usable)}")
+        raise ConfigError(
+            "{where}: format={asked} is not possible; the camera offers {join}",
+            where,
+            asked,
+            ", ".join(usable),
+        )
     device.set_text("PixelFormat", name)
     if (got := device.text("PixelFormat")) != name:
-        raise ConfigError(f"{where}: asked for format={name}, the camera gives {got}; ask for that")
+        raise ConfigError(
+            "{where}: asked for format={name}, the camera gives {got}; ask for that", where, name, got
+        )
     return FORMATS[name]
 
 
@@ -181,11 +200,21 @@ def _set_region(device: GenicamDevice, settings: GenicamSettings, where: str) ->
 def _set_whole(device: GenicamDevice, feature: str, key: str, value: int, where: str) -> None:
     low, high, step = device.integer_bounds(feature)
     if not low <= value <= high or (value - low) % max(step, 1):
-        steps = f" in steps of {step}" if step > 1 else ""
-        raise ConfigError(f"{where}: {key}={value} is not possible; allowed: {low} to {high}{steps}")
+        steps = Message(" in steps of {step}", step) if step > 1 else ""
+        raise ConfigError(
+            "{where}: {key}={value} is not possible; allowed: {low} to {high}{steps}",
+            where,
+            key,
+            value,
+            low,
+            high,
+            steps,
+        )
     device.set_integer(feature, value)
     if (got := device.integer(feature)) != value:
-        raise ConfigError(f"{where}: {key}={value}: the camera makes it {got}; ask for that")
+        raise ConfigError(
+            "{where}: {key}={value}: the camera makes it {got}; ask for that", where, key, value, got
+        )
 
 
 def _set_trigger(device: GenicamDevice, settings: GenicamSettings, where: str) -> None:
@@ -196,32 +225,49 @@ def _set_trigger(device: GenicamDevice, settings: GenicamSettings, where: str) -
     offered = device.choices("TriggerSource") if device.has("TriggerSource") else []
     if settings.trigger not in offered:
         raise ConfigError(
-            f"{where}: trigger={settings.trigger} is not possible; allowed: {', '.join([NO_TRIGGER, *offered])}"
+            "{where}: trigger={trigger} is not possible; allowed: {join}",
+            where,
+            settings.trigger,
+            ", ".join([NO_TRIGGER, *offered]),
         )
     if settings.fires_triggers and settings.fps is None:
-        raise ConfigError(f"{where}: trigger=Software needs fps=, the rate at which pictures are triggered")
+        raise ConfigError(
+            "{where}: trigger=Software needs fps=, the rate at which pictures are triggered", where
+        )
     device.ask("arv_camera_set_trigger", settings.trigger)
     got = device.text("TriggerMode"), device.text("TriggerSource")
     if got != ("On", settings.trigger):
-        raise ConfigError(f"{where}: trigger={settings.trigger}: the camera makes it {got[1]}, {got[0]}")
+        raise ConfigError(
+            "{where}: trigger={trigger}: the camera makes it {got}, {got2}",
+            where,
+            settings.trigger,
+            got[1],
+            got[0],
+        )
 
 
 def _set_number(device: GenicamDevice, what: str, key: str, value: float, where: str) -> None:
     if not device.ask(f"arv_camera_is_{what}_available"):
-        raise ConfigError(f"{where}: {key}={value:g}: this camera has no such setting; leave it out")
+        raise ConfigError(
+            "{where}: {key}={value:g}: this camera has no such setting; leave it out", where, key, value
+        )
     try:
         as_number(value, *device.bounds_of(what))
     except NotAllowed as allowed:
-        raise ConfigError(f"{where}: {key}={value:g} is not possible; allowed: {allowed}") from None
+        raise ConfigError(
+            "{where}: {key}={value:g} is not possible; allowed: {allowed}", where, key, value, allowed
+        ) from None
     device.ask(f"arv_camera_set_{what}", value)
     got = device.ask(f"arv_camera_get_{what}")
     if abs(got - value) > 0.01 * abs(value):
-        raise ConfigError(f"{where}: {key}={value:g}: the camera makes it {got:g}; ask for that")
+        raise ConfigError(
+            "{where}: {key}={value:g}: the camera makes it {got:g}; ask for that", where, key, value, got
+        )
 
 
 def _set_packets(device: GenicamDevice, settings: GenicamSettings, where: str) -> None:
     if settings.packet_size is not None and not device.is_gige:
-        raise ConfigError(f"{where}: packet_size= is for GigE cameras; leave it out")
+        raise ConfigError("{where}: packet_size= is for GigE cameras; leave it out", where)
     if not device.is_gige:
         return
     if settings.packet_size is None:
@@ -233,7 +279,10 @@ def _set_packets(device: GenicamDevice, settings: GenicamSettings, where: str) -
     got = device.ask("arv_camera_gv_get_packet_size")
     if got != settings.packet_size:
         raise ConfigError(
-            f"{where}: packet_size={settings.packet_size}: the camera makes it {got}; ask for that"
+            "{where}: packet_size={packet_size}: the camera makes it {got}; ask for that",
+            where,
+            settings.packet_size,
+            got,
         )
 
 
@@ -286,7 +335,9 @@ def _bits(settings: GenicamSettings, pixel_format: MonoFormat, where: str) -> in
     if settings.bits is None:
         return pixel_format.bits
     if not (8 if pixel_format.bits == 8 else 9) <= settings.bits <= pixel_format.bits:
-        raise ConfigError(f"{where}: bits={settings.bits} is not possible with {pixel_format.name}")
+        raise ConfigError(
+            "{where}: bits={bits} is not possible with {name}", where, settings.bits, pixel_format.name
+        )
     return settings.bits
 
 
@@ -313,16 +364,30 @@ def _bounded(device: GenicamDevice, what: str, value: float | None) -> Bounded |
 def _warnings(device: GenicamDevice, settings: GenicamSettings, fps: float | None) -> Iterator[str]:
     automatic = [name for name in AUTOMATIC if device.has(name) and device.text(name) != "Off"]
     if automatic:
-        yield f"the camera goes on changing by itself: {', '.join(automatic)}; grey levels may drift"
+        yield Message(
+            "the camera goes on changing by itself: {join}; grey levels may drift", ", ".join(automatic)
+        )
     if device.has("Gamma") and not same_value(device.text("Gamma"), "1"):
-        yield f"Gamma is {device.text('Gamma')}: grey levels are not proportional to light; give Gamma=1"
+        yield Message(
+            "Gamma is {text}: grey levels are not proportional to light; give Gamma=1", device.text("Gamma")
+        )
     if settings.fps is not None and fps is not None and fps < 0.99 * settings.fps:
-        yield f"the camera gives {fps:g} frames a second, not {settings.fps:g}: exposure, size or line limit it"
+        yield Message(
+            "the camera gives {fps:g} frames a second, not {fps2:g}: exposure, size or line limit it",
+            fps,
+            settings.fps,
+        )
     if device.is_gige and (size := device.ask("arv_camera_gv_get_packet_size")) < SMALL_PACKETS:
         larger = (
-            "larger ones did not pass" if device.has(TEST_PACKET) else "it cannot try larger ones by itself"
+            Message("larger ones did not pass")
+            if device.has(TEST_PACKET)
+            else Message("it cannot try larger ones by itself")
         )
         yield (
-            f"packets of {size} bytes: {larger}; set the MTU of the network card to 9000, then packet_size=8000 "
-            "(docs/machine-vision.md)"
+            Message(
+                "packets of {size} bytes: {larger}; set the MTU of the network card to 9000, then packet_size=8000 "
+                "(docs/machine-vision.md)",
+                size,
+                larger,
+            )
         )

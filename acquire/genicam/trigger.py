@@ -36,7 +36,7 @@ class SoftwareTrigger:
                 self._device.ask("arv_camera_software_trigger")
             except GenicamError as error:
                 if not self._stopped.is_set():
-                    self.refused = str(error)
+                    self.refused = error.text
                 return
             due = max(due + self._period_s, time.monotonic())
 

@@ -26,6 +26,7 @@ import h5py
 
 from acquire.errors import DataError
 from acquire.system import python_command, python_environment
+from acquire.text import Message
 
 PROBE_S = 30.0  # HDF5 retries a bad checksum of an unfinished file for ever
 
@@ -49,10 +50,15 @@ def probe(path: Path, package: str, timeout_s: float | None = None, *, words: Se
             errors="backslashreplace", timeout=timeout_s or PROBE_S, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired as error:
-        raise DataError(f"{path} is damaged: reading it does not come to an end") from error
+        raise DataError("{path} is damaged: reading it does not come to an end", path) from error
     if done.returncode != 0:
         refusal = done.stdout.strip() if done.returncode == DataError.exit_code else ""
-        raise DataError(refusal or f"{path} is damaged: the HDF5 library fails on it ({done.returncode})")
+        raise DataError(
+            refusal
+            or Message(
+                "{path} is damaged: the HDF5 library fails on it ({returncode})", path, done.returncode
+            )
+        )
 
 
 def reason(error: Exception) -> str:
@@ -85,7 +91,9 @@ def open_file(path: Path, mode: str = "r", **options: Any) -> h5py.File:
         if error.errno not in _HELD:
             return h5py.File(path, mode, locking=False, **options)
         raise DataError(
-            f"{path} is locked: another program has it open or writes to it; close it there, or wait, and call again"
+            "{path} is locked: another program has it open or writes to it; close it there, or wait, and call "
+            "again",
+            path,
         ) from error
 
 
@@ -170,18 +178,20 @@ def read_superblock(path: Path) -> Superblock:
         No such file, unreadable, or not HDF5 of this kind.
     """
     if path.exists() and not path.is_file():
-        raise DataError(f"{path} is no regular file; give a file that a run has written")
+        raise DataError("{path} is no regular file; give a file that a run has written", path)
     if not path.is_file():
-        raise DataError(f"{path}: no such file; give a session.h5 that a run has recorded")
+        raise DataError("{path}: no such file; give a session.h5 that a run has recorded", path)
     try:
         with path.open("rb") as file:
             begin = file.read(48)
     except OSError as error:
-        raise DataError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
+        raise DataError(
+            "{path} cannot be read ({strerror}); check its permissions", path, error.strerror
+        ) from error
     if not begin.startswith(SIGNATURE):
-        raise DataError(f"{path} is not an HDF5 file, so not a session; give a session.h5")
+        raise DataError("{path} is not an HDF5 file, so not a session; give a session.h5", path)
     if len(begin) < 48:
-        raise DataError(f"{path} is truncated to {len(begin)} bytes; nothing in it can be read")
+        raise DataError("{path} is truncated to {len} bytes; nothing in it can be read", path, len(begin))
     if begin[8] not in (2, 3) or begin[9] != 8:
         return Superblock(False, 0)
     return Superblock(begin[11] != 0, int.from_bytes(begin[28:36], "little"))
@@ -239,5 +249,8 @@ def check_size(path: Path, block: Superblock) -> None:
     there = path.stat().st_size
     if not block.unfinished and there < block.size:
         raise DataError(
-            f"{path} is truncated: {there} of {block.size} bytes are there; copy it again from where it came"
+            "{path} is truncated: {there} of {size} bytes are there; copy it again from where it came",
+            path,
+            there,
+            block.size,
         )

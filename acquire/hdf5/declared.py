@@ -20,10 +20,16 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from acquire.hdf5.tables import as_text
+from acquire.text import Message
 
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
 _MAX_BYTES = 1 << 31  # of a chunk, and of a column in memory
-_TEXTS = {"S": "a text of fixed length", "text": "a text", "int": "a whole number", "number": "a number"}
+_TEXTS = {
+    "S": Message("a text of fixed length"),
+    "text": "a text",
+    "int": Message("a whole number"),
+    "number": "a number",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +92,13 @@ class Declared:
         """For a person."""
         kind = _TEXTS.get(self.dtype, self.dtype)
         sizes = ", ".join("N" if size is None else str(size) for size in self.shape)
-        return f"{kind} of shape ({sizes})" if self.shape else f"one {kind}" if kind == self.dtype else kind
+        return (
+            Message("{kind} of shape ({sizes})", kind, sizes)
+            if self.shape
+            else Message("one {kind}", kind)
+            if kind == self.dtype
+            else kind
+        )
 
 
 def open_group(parent: h5py.Group, name: str) -> h5py.Group:
@@ -99,7 +111,7 @@ def open_group(parent: h5py.Group, name: str) -> h5py.Group:
     """
     group = _member(parent, name)
     if not isinstance(group, h5py.Group):
-        raise _wrong(parent, name, "is not a group")
+        raise _wrong(parent, name, Message("is not a group"))
     check_links(group)
     return group
 
@@ -108,7 +120,7 @@ def check_links(group: h5py.Group) -> None:
     """Refuse a group in which anything stands in another place, without going there; raises DataError."""
     for name in group:
         if group.id.links.get_info(name.encode(errors="surrogateescape")).type != h5py.h5l.TYPE_HARD:
-            raise _wrong(group, name, "is a link to another place, which is not followed")
+            raise _wrong(group, name, Message("is a link to another place, which is not followed"))
 
 
 def open_dataset(group: h5py.Group, name: str, declared: Declared) -> h5py.Dataset:
@@ -121,16 +133,22 @@ def open_dataset(group: h5py.Group, name: str, declared: Declared) -> h5py.Datas
     """
     dataset = _member(group, name)
     if not isinstance(dataset, h5py.Dataset):
-        raise _wrong(group, name, "is not a dataset")
+        raise _wrong(group, name, Message("is not a dataset"))
     _check_storage(dataset)
     try:
         dtype = dataset.dtype
     except TypeError as error:
-        raise _wrong(group, name, f"is of a type that is not known here ({error})") from error
+        raise _wrong(group, name, Message("is of a type that is not known here ({error})", error)) from error
     if not (declared.takes_type(dtype) and declared.takes_shape(dataset.shape)):
-        raise _wrong(group, name, f"is {dtype} of shape {dataset.shape}; it must be {declared.words()}")
+        raise _wrong(
+            group,
+            name,
+            Message(
+                "is {dtype} of shape {shape}; it must be {words}", dtype, dataset.shape, declared.words()
+            ),
+        )
     if declared.shape[1:] == () and dataset.nbytes > _MAX_BYTES:
-        raise _wrong(group, name, f"is {dataset.nbytes >> 20} MB large; no test is so long")
+        raise _wrong(group, name, Message("is {nbytes} MB large; no test is so long", dataset.nbytes >> 20))
     return dataset
 
 
@@ -141,9 +159,9 @@ def open_datasets(group: h5py.Group, declared: Mapping[str, Declared]) -> dict[s
 
 def _member(group: h5py.Group, name: str) -> Any:
     if not group.id.links.exists(name.encode()):
-        raise _wrong(group, name, "is missing")
+        raise _wrong(group, name, Message("is missing"))
     if group.id.links.get_info(name.encode()).type != h5py.h5l.TYPE_HARD:
-        raise _wrong(group, name, "is a link to another place, which is not followed")
+        raise _wrong(group, name, Message("is a link to another place, which is not followed"))
     return group[name]
 
 
@@ -152,17 +170,23 @@ def _check_storage(dataset: h5py.Dataset) -> None:
     plan = dataset.id.get_create_plist()
     layout = plan.get_layout()
     if layout == h5py.h5d.VIRTUAL or plan.get_external_count():
-        raise _wrong(dataset.parent, dataset.name, "has its values in another file, which is not opened")
+        raise _wrong(
+            dataset.parent, dataset.name, Message("has its values in another file, which is not opened")
+        )
     for k in range(plan.get_nfilters()):
         if (number := plan.get_filter(k)[0]) not in _FILTERS:
             raise _wrong(
-                dataset.parent, dataset.name, f"is stored by filter {number}, which is not known here"
+                dataset.parent,
+                dataset.name,
+                Message("is stored by filter {number}, which is not known here", number),
             )
     if layout == h5py.h5d.CHUNKED:
         size = math.prod(plan.get_chunk()) * dataset.id.get_type().get_size()
         if size > _MAX_BYTES:
             raise _wrong(
-                dataset.parent, dataset.name, f"has pieces of {size >> 20} MB, more than is read at once"
+                dataset.parent,
+                dataset.name,
+                Message("has pieces of {size} MB, more than is read at once", size >> 20),
             )
 
 
@@ -190,7 +214,9 @@ def read_scalar(dataset: h5py.Dataset, declared: Declared) -> Any:
     value = dataset[()]
     if not declared.takes_value(value):
         raise _wrong(
-            dataset.parent, dataset.name, f"is {value}; it must be {declared.low:g} to {declared.high:g}"
+            dataset.parent,
+            dataset.name,
+            Message("is {value}; it must be {low:g} to {high:g}", value, declared.low, declared.high),
         )
     return value
 
@@ -204,21 +230,31 @@ def read_attribute(item: h5py.Group | h5py.Dataset, name: str, declared: Declare
         It is not there, or not as declared.
     """
     if not h5py.h5a.exists(item.id, name.encode()):
-        raise _wrong(item, f"@{name}", "is missing")
+        raise _wrong(item, f"@{name}", Message("is missing"))
     held = item.attrs.get_id(name)
     shape = None if held.get_space().get_simple_extent_type() == h5py.h5s.NULL else held.shape
     if not (declared.takes_type(held.dtype) and declared.takes_shape(shape)):
-        raise _wrong(item, f"@{name}", f"is {held.dtype} of shape {shape}; it must be {declared.words()}")
+        raise _wrong(
+            item,
+            f"@{name}",
+            Message("is {dtype} of shape {shape}; it must be {words}", held.dtype, shape, declared.words()),
+        )
     value = item.attrs[name]
     if not declared.takes_value(value):
-        raise _wrong(item, f"@{name}", f"is {value}; it must be {declared.low:g} to {declared.high:g}")
+        raise _wrong(
+            item,
+            f"@{name}",
+            Message("is {value}; it must be {low:g} to {high:g}", value, declared.low, declared.high),
+        )
     return value
 
 
 def _wrong(group: h5py.Group | h5py.Dataset, name: str, what: str) -> DataError:
     place = name if name.startswith("/") else f"{str(group.name).rstrip('/')}/{name}"
-    words = "".join(c if c.isprintable() else "?" for c in f"{place} {what}")
-    return DataError(f"{group.file.filename}: {words}; this is not a file as phasedic writes it")
+    words = "".join(c if c.isprintable() else "?" for c in Message("{place} {what}", place, what))
+    return DataError(
+        "{filename}: {words}; this is not a file as phasedic writes it", group.file.filename, words
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,9 +306,11 @@ def read_object(text: Any, where: str) -> dict[str, Any]:
     try:
         value = json.loads(as_text(text))
     except (ValueError, RecursionError) as error:
-        raise DataError(f"{where} is not JSON ({error}); the file is damaged, or not of phasedic") from error
+        raise DataError(
+            "{where} is not JSON ({error}); the file is damaged, or not of phasedic", where, error
+        ) from error
     if not isinstance(value, dict):
-        raise DataError(f"{where} is not a JSON object; this is not a file as phasedic writes it")
+        raise DataError("{where} is not a JSON object; this is not a file as phasedic writes it", where)
     return value
 
 
@@ -286,4 +324,9 @@ def check_object(value: Mapping[str, Any], form: Mapping[str, JsonField], where:
     for name, declared in form.items():
         if not declared.takes(value.get(name)):
             shown = repr(value.get(name))[:60]
-            raise DataError(f"{where}: {name!r} is {shown}; this is not a file as phasedic writes it")
+            raise DataError(
+                "{where}: {name} is {shown}; this is not a file as phasedic writes it",
+                where,
+                repr(name),
+                shown,
+            )

@@ -16,6 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from acquire.system import forget_pages, to_disk
+from acquire.text import Message
 
 
 def free_bytes(path: str | os.PathLike[str]) -> int:
@@ -98,7 +99,7 @@ class FileWatch:
         if found.st_size < self._size:
             raise OSError(errno.EIO, f"somebody has cut it to {found.st_size} of {self._size} bytes")
         if not self._path.exists():
-            raise FileNotFoundError(errno.ENOENT, "somebody has renamed it")
+            raise FileNotFoundError(errno.ENOENT, Message("somebody has renamed it"))
 
     def wrote(self) -> None:
         """To be called after a write."""

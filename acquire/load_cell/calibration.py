@@ -126,9 +126,11 @@ def save(calibration: Calibration, path: Path, address: str) -> None:
         with path.open("x", encoding="utf-8") as file:
             file.write("\n".join(lines) + "\n")
     except FileExistsError as error:
-        raise DataError(f"{path} exists already and is not overwritten; choose another name") from error
+        raise DataError("{path} exists already and is not overwritten; choose another name", path) from error
     except OSError as error:
-        raise DataError(f"{path} cannot be written ({error.strerror}); choose another folder") from error
+        raise DataError(
+            "{path} cannot be written ({strerror}); choose another folder", path, error.strerror
+        ) from error
 
 
 def _quoted(text: str) -> str:
@@ -152,9 +154,15 @@ def load(path: str) -> Calibration:
         numbers = [float(content[name]) for name in ("gain", "zero", "residual_N")]
         date = str(content["date"])
     except OSError as error:
-        raise ConfigError(f"calibration={path}: {error.strerror}; name the file of a calibration") from error
+        raise ConfigError(
+            "calibration={path}: {strerror}; name the file of a calibration", path, error.strerror
+        ) from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, ValueError, TypeError) as error:
-        raise ConfigError(f"calibration={path}: not a calibration of this program ({error!r})") from error
+        raise ConfigError(
+            "calibration={path}: not a calibration of this program ({error})", path, repr(error)
+        ) from error
     if not np.isfinite(numbers).all() or numbers[0] == 0:
-        raise ConfigError(f"calibration={path}: gain, zero and residual must be numbers, the gain not zero")
+        raise ConfigError(
+            "calibration={path}: gain, zero and residual must be numbers, the gain not zero", path
+        )
     return Calibration(numbers[0], numbers[1], numbers[2], points, date)

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from acquire.load_cell.contract import LoadCell
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
+from acquire.text import Message
 
 MIN_VALUES = 3  # fewer give no noise
 ROBUST_VALUES = 12  # values from which a few odd ones do not count
@@ -255,58 +256,117 @@ def _last_lines(samples: Sequence[LoadSample]) -> tuple[bytes, ...]:
 
 def _remarks(found: LoadReport, samples: Sequence[LoadSample], digit_N: float) -> list[str]:
     if not samples:
-        return ["nothing came: check cable, port, baud, and whether the device must be asked (mode=poll)"]
+        return [
+            Message("nothing came: check cable, port, baud, and whether the device must be asked (mode=poll)")
+        ]
     if not found.good:
-        return ["lines came, but no value: check protocol, baud, parity and column against the lines above"]
-    remarks = []
+        return [
+            Message(
+                "lines came, but no value: check protocol, baud, parity and column against the lines above"
+            )
+        ]
+    remarks: list[str] = []
     bad = sum(LoadFlag.ERROR in sample.flags for sample in samples)
     beyond = sum(bool(sample.flags & (LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD)) for sample in samples)
     if bad:
-        remarks.append(f"{bad} of {found.samples} lines gave no value: noise on the line, or another grammar")
+        remarks.append(
+            Message(
+                "{bad} of {samples} lines gave no value: noise on the line, or another grammar",
+                bad,
+                found.samples,
+            )
+        )
     old = sum(LoadFlag.STALE in sample.flags and not math.isnan(sample.force) for sample in samples)
     if 2 * old > found.good:
         remarks.append(
-            f"{old} of {found.good} values are of unknown age (STALE): the device should send each line at once, "
-            "or its own time with it (millis=)"
+            Message(
+                "{old} of {good} values are of unknown age (STALE): the device should send each line at once, or its "
+                "own time with it (millis=)",
+                old,
+                found.good,
+            )
         )
     if beyond:
-        remarks.append(f"{beyond} samples in overload or saturated: unload the cell, or check its wiring")
+        remarks.append(
+            Message("{beyond} samples in overload or saturated: unload the cell, or check its wiring", beyond)
+        )
     if found.rate < SLOW_HZ or math.isnan(found.rate):
         remarks.append(
-            f"only {found.rate:.3g} samples a second: the force at a burst is interpolated over long gaps"
+            Message(
+                "only {rate:.3g} samples a second: the force at a burst is interpolated over long gaps",
+                found.rate,
+            )
         )
     remarks += _silences(found)
     if found.moved_N > max(10 * found.noise_N, 5 * digit_N):
         lowest, highest = f"{found.lowest_N:.6g}", f"{found.highest_N:.6g}"
         remarks.append(
-            f"the force ran between {lowest} and {highest} N: leave the load still, or look for a drift"
+            Message(
+                "the force ran between {lowest} and {highest} N: leave the load still, or look for a drift",
+                lowest,
+                highest,
+            )
         )
     if found.unique == 1 and found.good >= STUCK:
-        remarks.append("every value is the same: a frozen display, or far too coarse for this load")
+        remarks.append(Message("every value is the same: a frozen display, or far too coarse for this load"))
     return remarks
 
 
 def _silences(found: LoadReport) -> list[str]:
     usual = 0.25 if math.isnan(found.rate) else max(5 / found.rate, 0.25)
     if found.silent_s > usual:
-        return [f"silence for the last {found.silent_s:.2f} s: the device stopped sending; power, cable?"]
+        return [
+            Message(
+                "silence for the last {silent_s:.2f} s: the device stopped sending; power, cable?",
+                found.silent_s,
+            )
+        ]
     if found.longest_s > usual:
-        return [f"a gap of {found.longest_s:.2f} s: across such gaps the force is not known"]
+        return [
+            Message("a gap of {longest_s:.2f} s: across such gaps the force is not known", found.longest_s)
+        ]
     return []
 
 
 def report_lines(found: LoadReport) -> list[str]:
     """The report for a person."""
-    lines = [f"{found.samples} samples in {found.seconds:.1f} s, {found.good} with a value"]
+    lines: list[str] = [
+        Message(
+            "{samples} samples in {seconds:.1f} s, {good} with a value",
+            found.samples,
+            found.seconds,
+            found.good,
+        )
+    ]
     if found.good:
         lines += [
-            f"rate     {found.rate:.4g} 1/s, jitter {found.jitter_s * 1e3:.2f} ms,"
-            f" longest gap {found.longest_s * 1e3:.0f} ms",
-            f"force    mean {found.mean_text} N, from {found.lowest_N:.6g} to {found.highest_N:.6g} N"
-            + ("" if found.of_capacity is None else f" ({found.of_capacity:.1%} of the capacity)"),
-            f"noise    {found.noise_N:.3g} N (one reading), {found.unique} different values, step {found.step_N:.3g} N",
-            f"moved    {found.moved_N:.3g} N (means of a tenth of the time)",
+            Message(
+                "rate     {rate:.4g} 1/s, jitter {jitter_s:.2f} ms, longest gap {longest_s:.0f} ms",
+                found.rate,
+                found.jitter_s * 1000.0,
+                found.longest_s * 1000.0,
+            ),
+            Message(
+                "force    mean {mean_text} N, from {lowest_N:.6g} to {highest_N:.6g} N",
+                found.mean_text,
+                found.lowest_N,
+                found.highest_N,
+            )
+            + (
+                ""
+                if found.of_capacity is None
+                else Message(" ({of_capacity:.1%} of the capacity)", found.of_capacity)
+            ),
+            Message(
+                "noise    {noise_N:.3g} N (one reading), {unique} different values, step {step_N:.3g} N",
+                found.noise_N,
+                found.unique,
+                found.step_N,
+            ),
+            Message("moved    {moved_N:.3g} N (means of a tenth of the time)", found.moved_N),
         ]
-    lines += [f"flag     {name}: {count}" for name, count in found.flags]
-    lines += [f"line     {line.decode('ascii', 'backslashreplace')!r}" for line in found.lines]
-    return lines + [f"look     {remark}" for remark in found.remarks]
+    lines += [Message("flag     {name}: {count}", name, count) for name, count in found.flags]
+    lines += [
+        Message("line     {decode}", repr(line.decode("ascii", "backslashreplace"))) for line in found.lines
+    ]
+    return lines + [Message("look     {remark}", remark) for remark in found.remarks]

@@ -14,6 +14,7 @@ from acquire.closing import Closing
 from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
 from acquire.load_sample import LoadCellInfo, LoadSample
+from acquire.text import Message
 
 
 @runtime_checkable
@@ -56,7 +57,7 @@ class LoadCell(Protocol):
 
 
 LOAD_CELLS: Registry[LoadCell] = Registry(
-    "load cell",
+    Message("load cell"),
     "phasedic.load_cells",
     {
         "": "acquire.serial_line.cell:open_serial",
@@ -117,5 +118,5 @@ def open_none(address: Address, on_event: EventSink) -> NoLoadCell:
     """
     Options(address).done()
     if address.target:
-        raise ConfigError(f"{address.text}: nothing may follow none:, since it opens no device")
+        raise ConfigError("{text}: nothing may follow none:, since it opens no device", address.text)
     return NoLoadCell()

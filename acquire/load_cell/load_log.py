@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadFlag, LoadSample
+from acquire.text import Message
 
 _BEYOND = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD
 
@@ -140,14 +141,18 @@ class LoadLog:
             after = bisect_left(self._t, t + self.lag_s)
             if after in (0, len(self._t)):
                 return (
-                    "no reading of the load cell came before it" if not after else "no reading came after it"
+                    Message("no reading of the load cell came before it")
+                    if not after
+                    else Message("no reading came after it")
                 )
             gap = self._t[after] - self._t[after - 1]
         if gap <= self._max_gap_s:
-            return "the readings beside it have no value (overload, tare, lines lost)"
-        return (
-            f"the readings of the load cell whose time is known are {gap:.2g} s apart, load.max_gap_s is"
-            f" {self._max_gap_s:g} s; let it send more often, one line at a time, or set load.max_gap_s"
+            return Message("the readings beside it have no value (overload, tare, lines lost)")
+        return Message(
+            "the readings of the load cell whose time is known are {gap:.2g} s apart, load.max_gap_s is "
+            "{max_gap_s:g} s; let it send more often, one line at a time, or set load.max_gap_s",
+            gap,
+            self._max_gap_s,
         )
 
     def _between(self, before: int, after: int, t: float) -> float:

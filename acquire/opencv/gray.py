@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
+from acquire.text import Message
 
 GRAYS = ("luma", "r", "g", "b")
 _PLANE = {"b": 0, "g": 1, "r": 2}  # OpenCV's order
 
-WEBCAM_WARNING = (
-    "grey is the luma of a compressed colour stream: about 220 of 256 levels, clipped at both ends, "
-    "with noise that averaging does not remove; a camera with a raw grey format measures better"
+WEBCAM_WARNING = Message(
+    "grey is the luma of a compressed colour stream: about 220 of 256 levels, clipped at both ends, with "
+    "noise that averaging does not remove; a camera with a raw grey format measures better"
 )
 
 
@@ -39,11 +40,15 @@ def to_gray(picture: NDArray[Any], gray: str | None, source: str) -> NDArray[Any
         Neither 8- nor 16-bit, or an unknown number of channels.
     """
     if picture.dtype not in (np.uint8, np.uint16):
-        raise DataError(f"{source}: samples are {picture.dtype}; save it with 8 or 16 bits a sample")
+        raise DataError(
+            "{source}: samples are {dtype}; save it with 8 or 16 bits a sample", source, picture.dtype
+        )
     if picture.ndim == 2:
         return picture
     if picture.ndim != 3 or picture.shape[2] not in (1, 3, 4):
-        raise DataError(f"{source}: a picture of shape {picture.shape} is neither grey nor colour")
+        raise DataError(
+            "{source}: a picture of shape {shape} is neither grey nor colour", source, picture.shape
+        )
     if picture.shape[2] == 1:
         return picture[:, :, 0].copy()
     return _one_plane(picture, gray, source)
@@ -55,7 +60,7 @@ def _one_plane(picture: NDArray[Any], gray: str | None, source: str) -> NDArray[
         return first.copy()
     if gray is None:
         raise ConfigError(
-            f"{source}: a colour picture; say what is grey: gray=luma, gray=r, gray=g or gray=b"
+            "{source}: a colour picture; say what is grey: gray=luma, gray=r, gray=g or gray=b", source
         )
     if gray in _PLANE:
         return picture[:, :, _PLANE[gray]].copy()

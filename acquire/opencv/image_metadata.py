@@ -38,7 +38,10 @@ def read_stamps(path: Path, images: Sequence[Path]) -> list[float]:
     for number, row in enumerate(rows):
         if math.isnan(_number(row[-1])) or len(row) > 2:
             raise DataError(
-                f"{path}: row {number + 1} of the times is {','.join(row)!r}; wanted: [file name,] s"
+                "{path}: row {number} of the times is {join}; wanted: [file name,] s",
+                path,
+                number + 1,
+                repr(",".join(row)),
             )
     named = bool(rows) and len(rows[0]) == 2
     times = _by_name(path, rows, images) if named else [float(row[-1]) for row in rows]
@@ -50,12 +53,12 @@ def _rows(path: Path) -> list[list[str]]:
     try:
         text = read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise DataError(f"{path}: the times cannot be read: {error}") from error
+        raise DataError("{path}: the times cannot be read: {error}", path, error) from error
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     try:
         return [[cell.strip() for cell in row] for row in csv.reader(lines)]
     except csv.Error as error:
-        raise DataError(f"{path}: not a CSV: {error}") from error
+        raise DataError("{path}: not a CSV: {error}", path, error) from error
 
 
 def _number(text: str) -> float:
@@ -70,16 +73,26 @@ def _by_name(path: Path, rows: list[list[str]], images: Sequence[Path]) -> list[
     by_name = {Path(row[0]).name: float(row[-1]) for row in rows}
     missing = [image.name for image in images if image.name not in by_name]
     if missing:
-        raise DataError(f"{path}: no time for {missing[0]} ({len(missing)} of {len(images)} images lack one)")
+        raise DataError(
+            "{path}: no time for {missing} ({len} of {len2} images lack one)",
+            path,
+            missing[0],
+            len(missing),
+            len(images),
+        )
     return [by_name[image.name] for image in images]
 
 
 def _check(path: Path, times: list[float], images: Sequence[Path]) -> None:
     if len(times) < len(images):
-        raise DataError(f"{path}: {len(times)} times for {len(images)} images; one each is needed")
+        raise DataError(
+            "{path}: {len} times for {len2} images; one each is needed", path, len(times), len(images)
+        )
     for earlier, later in itertools.pairwise(times):
         if later < earlier:
-            raise DataError(f"{path}: the times run backwards ({later:g} s after {earlier:g} s)")
+            raise DataError(
+                "{path}: the times run backwards ({later:g} s after {earlier:g} s)", path, later, earlier
+            )
 
 
 _TAKEN = re.compile(rb"\d{4}:\d\d:\d\d \d\d:\d\d:\d\d(?=\0)")

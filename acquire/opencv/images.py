@@ -40,6 +40,7 @@ from acquire.files.tiff import full_pages, tiff_pages
 from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, to_gray
 from acquire.opencv.image_metadata import read_stamps, taken_times
+from acquire.text import Message
 
 MAX_REPORTED = 20  # pictures that are left out, one by one
 _SAMPLE = 3  # pictures whose format is compared
@@ -170,7 +171,9 @@ class ImageFiles(CameraBase):
                 return
             yield self._frame(index, path, read)
         if self._left_out > MAX_REPORTED:
-            self._report(f"{self._left_out} pictures were left out in all", self._time(index))
+            self._report(
+                Message("{left_out} pictures were left out in all", self._left_out), self._time(index)
+            )
 
     def _pages(self) -> Iterator[tuple[Path, Callable[[], NDArray[Any]]]]:
         for path in self._paths:
@@ -180,7 +183,7 @@ class ImageFiles(CameraBase):
 
     def _read(self, path: Path, source: Callable[[], Source], page: int) -> NDArray[Any]:
         if path.name in self._masks:
-            raise DataError(f"{path} is a mask by its name (--mask {path} uses it)")
+            raise DataError("{path} is a mask by its name (--mask {path} uses it)", path)
         return read_picture_page(path, source(), page)
 
     def _frame(self, index: int, path: Path, read: Callable[[], NDArray[Any]]) -> Frame:
@@ -188,7 +191,7 @@ class ImageFiles(CameraBase):
         try:
             image = self._checked(read(), path)
         except PhasedicError as error:
-            self._leave_out(path, t, str(error))
+            self._leave_out(path, t, error.text)
             black = frozen(np.zeros(self._shape, self._dtype))
             return Frame(black, index, t, "nominal", 0, self._bits, t, damaged=True)
         return Frame(image, index, t, "nominal", 0, self._bits, t, white_level=self._settings.white)
@@ -196,7 +199,7 @@ class ImageFiles(CameraBase):
     def _leave_out(self, path: Path, t: float, why: str) -> None:
         self._left_out += 1
         if self._left_out <= MAX_REPORTED:
-            self._report(f"{why}; this picture is left out", t, file=path.name)
+            self._report(Message("{why}; this picture is left out", why), t, file=path.name)
 
     def _report(self, text: str, t: float, **data: Any) -> None:
         device_event(self._on_event, self.info.address, text, t=t, **data)
@@ -206,15 +209,20 @@ class ImageFiles(CameraBase):
             return index / self._settings.fps
         if index >= len(self._stamps):
             raise DataError(
-                f"{self._settings.stamps}: {len(self._stamps)} times, but there are more pictures"
+                "{stamps}: {len} times, but there are more pictures", self._settings.stamps, len(self._stamps)
             )
         return self._stamps[index]
 
     def _checked(self, picture: NDArray[Any], path: Path) -> NDArray[Any]:
         if picture.shape[:2] != self._shape or picture.dtype != self._dtype:
             raise DataError(
-                f"{path} is {_size(picture.shape)} {picture.dtype}, but {self._usual} is "
-                f"{_size(self._shape)} {self._dtype}; all images of one test must be alike"
+                "{path} is {size} {dtype}, but {usual} is {size2} {dtype2}; all images of one test must be alike",
+                path,
+                _size(picture.shape),
+                picture.dtype,
+                self._usual,
+                _size(self._shape),
+                self._dtype,
             )
         image = to_gray(picture, self._settings.gray, str(path))
         self._check_range(image, path)
@@ -222,10 +230,15 @@ class ImageFiles(CameraBase):
 
     def _check_range(self, image: NDArray[Any], path: Path) -> None:
         if self._bits > 8 * image.itemsize:
-            raise ConfigError(f"{path}: bits={self._bits}, but its samples have {8 * image.itemsize}")
+            raise ConfigError(
+                "{path}: bits={bits}, but its samples have {itemsize}", path, self._bits, 8 * image.itemsize
+            )
         if self._bits < 8 * image.itemsize and image.max() >= 2**self._bits:
             raise DataError(
-                f"{path}: a value of {image.max()} does not fit into bits={self._bits}; give the camera's bits"
+                "{path}: a value of {max} does not fit into bits={bits}; give the camera's bits",
+                path,
+                image.max(),
+                self._bits,
             )
 
     def _steps(self) -> dict[str, Any]:
@@ -238,15 +251,26 @@ class ImageFiles(CameraBase):
         pages, taken = tiff_pages(self._usual), _pages_of(self._usual)
         if len(taken) < len(pages):
             yield (
-                f"{self._usual.name}: {len(taken)} of {len(pages)} pages are taken, the others are smaller (thumbnails)"
+                Message(
+                    "{name}: {len} of {len2} pages are taken, the others are smaller (thumbnails)",
+                    self._usual.name,
+                    len(taken),
+                    len(pages),
+                )
             )
         if any(path.suffix.lower() in LOSSY for path in self._paths):
-            yield "JPEG is lossy: its artefacts (0.6 to 1.7 GL) do not average out; TIFF or PNG measure better"
+            yield Message(
+                "JPEG is lossy: its artefacts (0.6 to 1.7 GL) do not average out; TIFF or PNG measure better"
+            )
         for bits in (10, 12, 14):
             if self._settings.bits is None and first.itemsize == 2 and 2**8 <= first.max() < 2**bits:
                 yield (
-                    f"16-bit files whose largest value is {first.max()}: if the camera has {bits} bits say "
-                    f"bits={bits}, so that clipped pixels are seen"
+                    Message(
+                        "16-bit files whose largest value is {max}: if the camera has {bits} bits say bits={bits}, so "
+                        "that clipped pixels are seen",
+                        first.max(),
+                        bits,
+                    )
                 )
                 return
 
@@ -304,7 +328,8 @@ def picture_times(address: Address) -> dict[str, float]:
     times = {path.name: stamps[k] if stamps else k / settings.fps for k, path in enumerate(paths)}
     if len(times) < len(paths) or any(len(_pages_of(path)) > 1 for path in paths):
         raise ConfigError(
-            f"{address.text}: two pictures share a name, or one has several pages; give times in place of names"
+            "{text}: two pictures share a name, or one has several pages; give times in place of names",
+            address.text,
         )
     return {name: t for name, t in times.items() if name not in ends}
 
@@ -338,7 +363,9 @@ def _settings(address: Address) -> FileSettings:
     options = Options(address)
     gray = options.text("gray")
     if gray is not None and gray not in GRAYS:
-        raise ConfigError(f"{address.text}: gray={gray} is not possible; allowed: {', '.join(GRAYS)}")
+        raise ConfigError(
+            "{text}: gray={gray} is not possible; allowed: {join}", address.text, gray, ", ".join(GRAYS)
+        )
     settings = FileSettings(
         fps=options.number("fps", 1.0, minimum=1e-6, maximum=1e6),
         gray=gray,

@@ -22,6 +22,7 @@ from acquire.files.jpeg import quantisation
 from acquire.files.picture import check_regular, is_utf8
 from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
+from acquire.text import Message
 
 INTRA = {
     "", "mjpg", "jpeg", "mjpa", "mjpb", "avrn", "mjp2", "mj2c", "ffv1", "ffvh", "hfyu", "lags", "magy", "ulrg", "ulra",
@@ -29,7 +30,7 @@ INTRA = {
     "grey", "gray", "y16", "v210", "apcn", "apch", "apcs", "apco", "ap4h", "ap4x", "avdn", "avdh", "cfhd", "dvsd",
 }  # fmt: skip
 """Codecs, by their code in small letters, each of whose pictures stands alone; H.264, VP9 and all others do not."""
-FILM_WARNING = "compressed film: strain may be 10 % low; record MJPG, FFV1 or pictures"
+FILM_WARNING = Message("compressed film: strain may be 10 % low; record MJPG, FFV1 or pictures")
 _AS_JPEG = ("mjpg", "jpeg", "mjpa", "avrn")
 _HEAD = 1 << 20  # bytes, with the tables of the first picture
 _COUNTED = ((0, b"RIFF"), (4, b"ftyp"))  # containers with the number of frames; others have but a duration
@@ -50,16 +51,18 @@ class VideoFile(CameraBase):
         cv2 = load_cv2()
 
         if not path.exists():
-            raise DataError(f"{address}: there is no file {path}")
+            raise DataError("{address}: there is no file {path}", address, path)
         check_regular(path)
         if not is_utf8(path):
-            raise DataError(f"{path}: OpenCV opens a video by its name, which must be UTF-8; rename it")
+            raise DataError("{path}: OpenCV opens a video by its name, which must be UTF-8; rename it", path)
         with path.open("rb") as file:
             self._head = file.read(_HEAD)
         self._address, self._path, self._gray_plane, self._on_event = address, path, gray, on_event
         self._capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
-            raise DataError(f"{path}: not a video that can be read, or cut off; try to play or convert it")
+            raise DataError(
+                "{path}: not a video that can be read, or cut off; try to play or convert it", path
+            )
         self._promised = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
         self._fps = self._capture.get(cv2.CAP_PROP_FPS) or 25.0
         code = _fourcc(int(self._capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF)
@@ -99,7 +102,7 @@ class VideoFile(CameraBase):
     def _grey(self, picture: NDArray[Any], index: int) -> NDArray[Any]:
         image = to_gray(picture, self._gray_plane, str(self._path))
         if image.shape != (self.info.height, self.info.width):
-            raise DataError(f"{self._path}: frame {index} is of another size than the first")
+            raise DataError("{path}: frame {index} is of another size than the first", self._path, index)
         return image
 
     def _count(self) -> int | None:
@@ -115,7 +118,12 @@ class VideoFile(CameraBase):
     def _report_if_short(self, count: int, reached: int) -> None:
         """A warning where the film ends before its duration: ``reached`` of the frames that this would have."""
         if max(count, reached) < self._promised:
-            text = f"{self._path}: ends after {count} of {self._promised} frames; it may be cut off"
+            text = Message(
+                "{path}: ends after {count} of {promised} frames; it may be cut off",
+                self._path,
+                count,
+                self._promised,
+            )
             device_event(self._on_event, self._address, text, missing=self._promised - count)
 
     def _release(self) -> None:

@@ -24,6 +24,7 @@ from acquire.errors import ConfigError, DeviceError
 from acquire.events import EventSink
 from acquire.frame import CameraInfo, Clock, frozen
 from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
+from acquire.text import Message
 
 STALL_S, INSTANT_S = 2.0, 0.005
 
@@ -85,7 +86,7 @@ def _automatics() -> list[tuple[str, int, float]]:
     manual = 1.0 if sys.platform == "linux" else 0.0
     return [
         ("exposure", cv2.CAP_PROP_AUTO_EXPOSURE, manual),
-        ("white balance", cv2.CAP_PROP_AUTO_WB, 0.0),
+        (Message("white balance"), cv2.CAP_PROP_AUTO_WB, 0.0),
         ("focus", cv2.CAP_PROP_AUTOFOCUS, 0.0),
     ]
 
@@ -162,8 +163,9 @@ class OpenCVDriver:
         try:
             if not capture.isOpened():
                 raise DeviceError(
-                    f"{address}: no camera opens there; see what `phasedic devices` lists, and whether another"
-                    " program holds it"
+                    "{address}: no camera opens there; see what `phasedic devices` lists, and whether another program "
+                    "holds it",
+                    address,
                 )
             self._set(capture)
             self.info = self._describe(capture)
@@ -190,8 +192,11 @@ class OpenCVDriver:
             got = capture.get(properties[name])
             if abs(got - value) > 0.01 * abs(value):
                 raise ConfigError(
-                    f"{self.name}: asked for {name}={value:g}, the driver gives {got:g}; "
-                    f"ask for that, or leave {name} out"
+                    "{name}: asked for {name2}={value:g}, the driver gives {got:g}; ask for that, or leave {name2} out",
+                    self.name,
+                    name,
+                    value,
+                    got,
                 )
 
     def _describe(self, capture: Capture) -> CameraInfo:
@@ -201,7 +206,9 @@ class OpenCVDriver:
         began = self._now()
         well, picture = capture.read()
         if not well:
-            raise DeviceError(f"{self.name}: opens but gives no picture: {_verdict(self._now() - began)}")
+            raise DeviceError(
+                "{name}: opens but gives no picture: {verdict}", self.name, _verdict(self._now() - began)
+            )
         stamp = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000
         self._clock: Clock = "device" if abs(self._now() - stamp) < 1 else "host"
         height, width = self._gray(picture).shape
@@ -210,11 +217,16 @@ class OpenCVDriver:
         warnings = [WEBCAM_WARNING]
         if self._automatic:
             warnings.append(
-                f"OpenCV does not switch off, or does not tell: automatic {', '.join(self._automatic)}; grey levels "
-                "and sharpness may drift: set them by hand in the camera's own program"
+                Message(
+                    "OpenCV does not switch off, or does not tell: automatic {join}; grey levels and sharpness may "
+                    "drift: set them by hand in the camera's own program",
+                    ", ".join(self._automatic),
+                )
             )
         if self._clock == "host":
-            warnings.append("OpenCV tells neither stamps nor losses here: times are those of this program")
+            warnings.append(
+                Message("OpenCV tells neither stamps nor losses here: times are those of this program")
+            )
         return CameraInfo(
             address=self.name,
             name=f"OpenCV camera {self.name}",
@@ -251,7 +263,13 @@ class OpenCVDriver:
             raise DeviceFault(_verdict(shot.took))
         image, t = self._gray(shot.picture), shot.stamp if self._clock == "device" else shot.returned
         if image.shape != (self.info.height, self.info.width):
-            return Picture(None, t, None, f"it is of {image.shape[1]}x{image.shape[0]} px", self._clock)
+            return Picture(
+                None,
+                t,
+                None,
+                Message("it is of {shape}x{shape2} px", image.shape[1], image.shape[0]),
+                self._clock,
+            )
         return Picture(frozen(image), t, None, "", self._clock, arrived=shot.returned)
 
     def close(self) -> None:
@@ -266,8 +284,8 @@ class OpenCVDriver:
 def _verdict(took_s: float) -> str:
     """Words for a failed read that took so long: one that failed at once waited for nothing."""
     if took_s < INSTANT_S:
-        return "the device is gone or dead (its reads fail at once)"
-    return f"no picture within {took_s:.1f} s"
+        return Message("the device is gone or dead (its reads fail at once)")
+    return Message("no picture within {took_s:.1f} s", took_s)
 
 
 def open_opencv(address: Address, on_event: EventSink) -> LiveCamera:
@@ -279,7 +297,7 @@ def open_opencv(address: Address, on_event: EventSink) -> LiveCamera:
         See ``acquire.camera.open_camera``.
     """
     if not address.target.isdecimal():
-        raise ConfigError(f"{address.text}: give the number of the camera, as in opencv:0")
+        raise ConfigError("{text}: give the number of the camera, as in opencv:0", address.text)
     options = Options(address)
     settings = OpenCVSettings(
         width=options.number("width", minimum=1),

@@ -19,6 +19,7 @@ from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
 from acquire.protocols.buffers import Line, LineParser, bad, number
 from acquire.protocols.units import is_unit
+from acquire.text import Message
 
 _LINE = re.compile(
     rb"(?:@?[0-9]{2},?)?(ST|US|OL|UL|TL|QT)(?:,(GS|NT|TR|LO|OK|HI))?,"
@@ -83,5 +84,5 @@ PROTOCOL = Protocol(
         "tare": b"T\r\n",
         "zero": b"Z\r\n",
     },
-    undetected="no check digit: a changed digit reads as another value",
+    undetected=Message("no check digit: a changed digit reads as another value"),
 )

@@ -25,6 +25,7 @@ from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
 from acquire.protocols.buffers import Line, LineParser, bad, number
 from acquire.protocols.units import is_unit
+from acquire.text import Message
 
 SATURATED = {8388607.0: LoadFlag.OVERLOAD, -8388608.0: LoadFlag.UNDERLOAD}  # of a 24-bit converter
 
@@ -196,7 +197,7 @@ def make_parser(options: Options) -> Parser:
         ),
     )
     if settings.column is not None and settings.column == settings.millis:
-        raise ConfigError(f"{options.address.text}: column and millis must differ")
+        raise ConfigError("{text}: column and millis must differ", options.address.text)
     return AsciiParser(settings)
 
 
@@ -206,5 +207,5 @@ PROTOCOL = Protocol(
     make_parser=make_parser,
     baud=9600,
     flags_overload=False,
-    undetected="no check digit: a lost or changed digit reads as another value",
+    undetected=Message("no check digit: a lost or changed digit reads as another value"),
 )

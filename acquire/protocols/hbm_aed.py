@@ -17,6 +17,7 @@ from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
 from acquire.protocols.buffers import Line, LineParser, bad, number
+from acquire.text import Message
 
 NOMINAL_COUNTS = 1_000_000
 OVERFLOW, STANDSTILL = 0b0111, 0b1000
@@ -63,7 +64,7 @@ def make_parser(options: Options) -> Parser:
     nominal = options.number("nominal", minimum=1e-12)
     decimals = options.integer("decimals", minimum=0, maximum=8)
     if nominal is not None and decimals is not None:
-        raise ConfigError(f"{options.address.text}: give nominal or decimals, not both")
+        raise ConfigError("{text}: give nominal or decimals, not both", options.address.text)
     if nominal is not None:
         return HbmAedParser(nominal / NOMINAL_COUNTS)
     return HbmAedParser(10.0 ** -(decimals or 0))
@@ -88,5 +89,5 @@ PROTOCOL = Protocol(
     rates={
         rate: b"ICR%d;MSV?0;" % icr for icr, rate in enumerate((100.0, 50.0, 25.0, 12.0, 6.0, 3.0, 2.0, 1.0))
     },
-    undetected="no check digit; without the status of COF9 no overflow: say capacity=",
+    undetected=Message("no check digit; without the status of COF9 no overflow: say capacity="),
 )

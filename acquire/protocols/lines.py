@@ -25,6 +25,7 @@ from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
 from acquire.protocols.buffers import Line, LineBuffer, LineParser, bad, number
+from acquire.text import Message
 
 STATES = {"overload": LoadFlag.OVERLOAD, "underload": LoadFlag.UNDERLOAD, "error": LoadFlag.ERROR}
 ENDS = {"line": b"\r\n", "cr": b"\r", "lf": b"\n", "etx": b"\x03"}
@@ -117,7 +118,7 @@ def make_parser(options: Options) -> Parser:
     try:
         return parser_from(rules)
     except ConfigError as error:
-        raise ConfigError(f"{options.address.text}: {error}") from error
+        raise ConfigError("{text}: {error}", options.address.text, error) from error
 
 
 def load_preset(name: str) -> dict[str, Any]:
@@ -132,15 +133,19 @@ def load_preset(name: str) -> dict[str, Any]:
         return dict(known[name])
     if not name.endswith(".toml"):
         raise ConfigError(
-            f"no preset is called {name!r}; there are: {', '.join(known)}, or give a .toml file"
+            "no preset is called {name}; there are: {join}, or give a .toml file",
+            repr(name),
+            ", ".join(known),
         )
     try:
         rules = tomllib.loads(Path(name).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ConfigError(f"preset {name}: {error}") from error
+        raise ConfigError("preset {name}: {error}", name, error) from error
     unknown = set(rules) - set(KEYS)
     if unknown:
-        raise ConfigError(f"preset {name}: unknown key {min(unknown)!r}; known: {', '.join(KEYS)}")
+        raise ConfigError(
+            "preset {name}: unknown key {min}; known: {join}", name, repr(min(unknown)), ", ".join(KEYS)
+        )
     return rules
 
 
@@ -156,7 +161,7 @@ def parser_from(preset: Mapping[str, Any]) -> RuledParser:
         raise ConfigError("protocol=lines needs pattern= or preset=")
     ends = ENDS.get(str(preset.get("ends", "line")))
     if ends is None:
-        raise ConfigError(f"ends={preset['ends']} is not possible; allowed: {', '.join(ENDS)}")
+        raise ConfigError("ends={preset} is not possible; allowed: {join}", preset["ends"], ", ".join(ENDS))
     rules = LineRules(
         pattern=_pattern(str(preset["pattern"])),
         states=tuple((word, flag) for key, flag in STATES.items() for word in _words(preset, key)),
@@ -174,9 +179,9 @@ def _pattern(text: str) -> re.Pattern[bytes]:
     try:
         pattern = re.compile(text.encode())
     except re.error as error:
-        raise ConfigError(f"pattern={text} is no regular expression: {error}") from error
+        raise ConfigError("pattern={text} is no regular expression: {error}", text, error) from error
     if "value" not in pattern.groupindex:
-        raise ConfigError(f"pattern={text} names no value; write (?P<value>...) around the number")
+        raise ConfigError("pattern={text} names no value; write (?P<value>...) around the number", text)
     return pattern
 
 
@@ -187,7 +192,7 @@ def _words(rules: Mapping[str, Any], key: str) -> tuple[bytes, ...]:
 def _scale(value: Any) -> float:
     scale = number(str(value))
     if math.isnan(scale) or scale == 0:
-        raise ConfigError(f"scale={value} is not possible; allowed: a number other than zero")
+        raise ConfigError("scale={value} is not possible; allowed: a number other than zero", value)
     return scale
 
 
@@ -200,5 +205,5 @@ PROTOCOL = Protocol(
     name="lines",
     summary="any other lines, by a regular expression or a preset",
     make_parser=make_parser,
-    undetected="whatever the pattern lets pass",
+    undetected=Message("whatever the pattern lets pass"),
 )

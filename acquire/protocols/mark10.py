@@ -11,6 +11,7 @@ from __future__ import annotations
 from acquire.addresses import Options
 from acquire.protocols.base import Parser, Protocol
 from acquire.protocols.lines import parser_from
+from acquire.text import Message
 
 PATTERN = r"(?i) *(?P<value>[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?: *(?P<unit>lbF|ozF|kgF|gF|kN|mN|N))? *"
 RATES = (2, 5, 10, 25, 50, 125, 250)
@@ -39,5 +40,5 @@ PROTOCOL = Protocol(
         "identify": b"LIST\r",
     },
     rates={float(rate): b"AOUT%d\r" % rate for rate in RATES},
-    undetected="an overload has no mark on the line: say capacity=; no check digit",
+    undetected=Message("an overload has no mark on the line: say capacity=; no check digit"),
 )

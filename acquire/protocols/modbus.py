@@ -16,6 +16,7 @@ from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
 from acquire.protocols.buffers import HeldBytes
 from acquire.protocols.modbus_profile import TYPES, FlagBit, Profile, load_profile
+from acquire.text import Message
 
 LIMIT = 256  # longest frame of Modbus RTU
 EXCEPTION_BYTES, ECHO_BYTES = 5, 8
@@ -122,10 +123,12 @@ def make_parser(options: Options) -> Parser:
     name = options.text("profile")
     scale = options.number("scale", 1.0)
     if name is None:
-        raise ConfigError(f"{options.address.text}: protocol=modbus needs profile=, for example laumas-tlb")
+        raise ConfigError(
+            "{text}: protocol=modbus needs profile=, for example laumas-tlb", options.address.text
+        )
     if scale == 0:
         raise ConfigError(
-            f"{options.address.text}: scale=0 is not possible; allowed: a number other than zero"
+            "{text}: scale=0 is not possible; allowed: a number other than zero", options.address.text
         )
     return ModbusParser(load_profile(name), scale)
 
@@ -137,6 +140,6 @@ PROTOCOL = Protocol(
     mode="poll",
     unit_on_line=False,
     flags_overload=False,
-    undetected="a wrong register map (type, word order, scale): compare the display",
+    undetected=Message("a wrong register map (type, word order, scale): compare the display"),
     silence_s=0.05,
 )

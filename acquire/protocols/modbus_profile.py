@@ -89,12 +89,14 @@ def load_profile(name: str) -> Profile:
         return profile_from(known[name], name)
     if not name.endswith(".toml"):
         raise ConfigError(
-            f"no profile is called {name!r}; there are: {', '.join(known)}, or give a .toml file"
+            "no profile is called {name}; there are: {join}, or give a .toml file",
+            repr(name),
+            ", ".join(known),
         )
     try:
         table = tomllib.loads(Path(name).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ConfigError(f"profile {name}: {error}") from error
+        raise ConfigError("profile {name}: {error}", name, error) from error
     return profile_from(table, name)
 
 
@@ -122,14 +124,17 @@ def profile_from(table: Mapping[str, Any], name: str) -> Profile:
             commands={key: _command(command, key) for key, command in table.get("commands", {}).items()},
         )
     except KeyError as error:
-        raise ConfigError(f"profile {name}: the key {error} is missing") from error
+        raise ConfigError("profile {name}: the key {error} is missing", name, error) from error
     except (TypeError, AttributeError) as error:
-        raise ConfigError(f"profile {name}: a table is expected where a plain value stands") from error
+        raise ConfigError("profile {name}: a table is expected where a plain value stands", name) from error
     except ConfigError as error:
-        raise ConfigError(f"profile {name}: {error}") from error
+        raise ConfigError("profile {name}: {error}", name, error) from error
     if profile.count > MAX_REGISTERS:
         raise ConfigError(
-            f"profile {name}: registers span {profile.count}; one query reads at most {MAX_REGISTERS}"
+            "profile {name}: registers span {count}; one query reads at most {MAX_REGISTERS}",
+            name,
+            profile.count,
+            MAX_REGISTERS,
         )
     return profile
 
@@ -138,7 +143,7 @@ def _bit(table: Mapping[str, Any], flag: LoadFlag, where: str) -> FlagBit:
     _known_keys(table, ("register", "mask", "set"), f"{where}.")
     when_set = table.get("set", True)
     if not isinstance(when_set, bool):
-        raise ConfigError(f"{where}.set must be true or false")
+        raise ConfigError("{where}.set must be true or false", where)
     return FlagBit(
         flag,
         _whole(table["register"], 0, 65535, f"{where}.register"),
@@ -150,7 +155,7 @@ def _bit(table: Mapping[str, Any], flag: LoadFlag, where: str) -> FlagBit:
 def _command(table: Mapping[str, Any], name: str) -> tuple[int, int]:
     _known_keys(table, ("register", "value"), f"commands.{name}.")
     if name not in ("tare", "zero"):
-        raise ConfigError(f"commands.{name}: there are tare and zero")
+        raise ConfigError("commands.{name}: there are tare and zero", name)
     return (
         _whole(table["register"], 0, 65535, f"commands.{name}.register"),
         _whole(table["value"], 0, 65535, f"commands.{name}.value"),
@@ -160,17 +165,21 @@ def _command(table: Mapping[str, Any], name: str) -> tuple[int, int]:
 def _known_keys(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
     unknown = set(table.keys()) - set(known)
     if unknown:
-        raise ConfigError(f"unknown key {where}{min(unknown)}; known: {', '.join(known)}")
+        raise ConfigError("unknown key {where}{min}; known: {join}", where, min(unknown), ", ".join(known))
 
 
 def _whole(value: Any, low: int, high: int, where: str) -> int:
     try:
         return as_integer(value, low, high)
     except NotAllowed as allowed:
-        raise ConfigError(f"{where} = {value!r} is not possible; allowed: {allowed}") from None
+        raise ConfigError(
+            "{where} = {value} is not possible; allowed: {allowed}", where, repr(value), allowed
+        ) from None
 
 
 def _one_of(value: Any, allowed: tuple[str, ...], where: str) -> str:
     if value not in allowed:
-        raise ConfigError(f"{where} = {value!r} is not possible; allowed: {', '.join(allowed)}")
+        raise ConfigError(
+            "{where} = {value} is not possible; allowed: {join}", where, repr(value), ", ".join(allowed)
+        )
     return str(value)

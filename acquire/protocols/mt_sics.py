@@ -16,6 +16,7 @@ from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
 from acquire.protocols.buffers import Line, LineParser, bad, number
 from acquire.protocols.units import is_unit
+from acquire.text import Message
 
 _VALUE = re.compile(rb"S ([SD]) +([-+]? *[0-9]+(?:\.[0-9]*)?) ([A-Za-z]{1,4}) *")
 _STATUS = {
@@ -63,5 +64,5 @@ PROTOCOL = Protocol(
         "zero": b"ZI\r\n",
         "identify": b"I4\r\n",
     },
-    undetected="no check digit: a changed digit reads as another value",
+    undetected=Message("no check digit: a changed digit reads as another value"),
 )

@@ -16,6 +16,7 @@ from acquire.addresses import Options
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
 from acquire.protocols.buffers import HeldBytes, number
+from acquire.text import Message
 
 LENGTH = 7
 LIMIT = 64  # bytes kept of a babble without silence
@@ -63,6 +64,6 @@ PROTOCOL = Protocol(
     unit_on_line=False,
     flags_overload=False,
     commands={"poll": b"9", "single": b"9"},
-    undetected="no check digit, no overload mark: say capacity=",
+    undetected=Message("no check digit, no overload mark: say capacity="),
     silence_s=0.05,
 )

@@ -59,15 +59,17 @@ def newtons_per(unit: str, mass_reads_force: bool = False) -> float:
     name = unit.lower()
     if name in DOUBTFUL and unit.startswith("M"):
         raise ConfigError(
-            f"{unit} may be milli or mega; compare the display, and say gain= in newtons for one of it"
+            "{unit} may be milli or mega; compare the display, and say gain= in newtons for one of it", unit
         )
     if name in FORCES:
         return FORCES[name]
     if name not in MASSES:
-        raise ConfigError(f"unit {unit!r} is not known; known: {', '.join(UNITS)}")
+        raise ConfigError("unit {unit} is not known; known: {join}", repr(unit), ", ".join(UNITS))
     if not mass_reads_force:
         raise ConfigError(
-            f"{unit} is a unit of mass; say mass_reads_force=yes if the display shows the force as a mass"
-            f" (1 {unit} is then {MASSES[name] * G0:g} N)"
+            "{unit} is a unit of mass; say mass_reads_force=yes if the display shows the force as a mass (1 "
+            "{unit} is then {MASSES:g} N)",
+            unit,
+            MASSES[name] * G0,
         )
     return MASSES[name] * G0

@@ -21,6 +21,7 @@ from acquire.errors import ConfigError, DataError, DeviceError
 from acquire.events import EventSink
 from acquire.frame import CameraInfo
 from acquire.genicam.formats import FORMATS, decode, preferred, readable
+from acquire.text import Message
 
 # Set before all others, where the camera has them: nothing changes by itself, grey levels are proportional to light,
 # and the largest picture is possible.
@@ -115,20 +116,40 @@ class PylonDriver:
         for key in [*(asked.keys() - FEATURES.keys()), *(key for key in FEATURES if key in asked)]:
             self._set(key, asked[key])
         if (got := self._camera.PixelFormat.ToString()) not in FORMATS:
-            raise ConfigError(f"{self._address}: format={got} is no grey levels; the camera offers {offered}")
+            raise ConfigError(
+                "{address}: format={got} is no grey levels; the camera offers {offered}",
+                self._address,
+                got,
+                offered,
+            )
 
     def _set(self, key: str, value: str) -> None:
         node = self._node(*FEATURES.get(key, (key,)))
         if node is None:
             raise ConfigError(
-                f"{self._address}: this camera has no {key}; known settings: {', '.join(FEATURES)}"
+                "{address}: this camera has no {key}; known settings: {join}",
+                self._address,
+                key,
+                ", ".join(FEATURES),
             )
         try:
             node.FromString(value)
         except self._genicam.GenericException as error:
-            raise ConfigError(f"{self._address}: {key}={value} is not possible; {_allowed(node)}") from error
+            raise ConfigError(
+                "{address}: {key}={value} is not possible; {allowed}",
+                self._address,
+                key,
+                value,
+                _allowed(node),
+            ) from error
         if not same_value(got := node.ToString(), value):
-            raise ConfigError(f"{self._address}: {key}={value}: the camera makes it {got}; ask for that")
+            raise ConfigError(
+                "{address}: {key}={value}: the camera makes it {got}; ask for that",
+                self._address,
+                key,
+                value,
+                got,
+            )
 
     def _describe(self) -> CameraInfo:
         camera, device = self._camera, self._camera.GetDeviceInfo()
@@ -184,7 +205,7 @@ class PylonDriver:
             size = self.info.width, self.info.height
             image = decode(result.GetBuffer(), self._format, *size, result.PaddingX)
         except DataError as error:
-            return Picture(None, now, number, str(error), "host")
+            return Picture(None, now, number, error.text, "host")
         return Picture(image, now, number, "", "host")
 
     def close(self) -> None:
@@ -213,15 +234,24 @@ def _only(address: Address) -> str:
     if len(found) != 1:
         listed = "; ".join(f"{one.address}  {one.name}" for one in here) or "none"
         raise (ConfigError if found else DeviceError)(
-            f"{address.text}: {len(found)} cameras are meant; give a serial number. Cameras here: {listed}"
+            Message(
+                "{text}: {len} cameras are meant; give a serial number. Cameras here: {listed}",
+                address.text,
+                len(found),
+                listed,
+            )
         )
     return found[0].removeprefix("pylon:")
 
 
 def _allowed(node: Any) -> str:
     if hasattr(node, "Symbolics"):
-        return f"allowed: {', '.join(node.Symbolics)}"
-    return f"allowed: {node.Min:g} to {node.Max:g}" if hasattr(node, "Min") else "the camera refuses it"
+        return Message("allowed: {join}", ", ".join(node.Symbolics))
+    return (
+        Message("allowed: {Min:g} to {Max:g}", node.Min, node.Max)
+        if hasattr(node, "Min")
+        else Message("the camera refuses it")
+    )
 
 
 def _bounded(node: Any) -> Bounded | None:

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from acquire.errors import DeviceError
+from acquire.text import Message
 
 CONNECT_S = 3.0
 WRITE_S = 0.5
@@ -112,7 +113,7 @@ class TcpPort:
             return b""
         data = self._socket.recv(limit)
         if not data:
-            raise ConnectionError("the other side closed the connection")
+            raise ConnectionError(Message("the other side closed the connection"))
         return data
 
     def write(self, data: bytes, /) -> object:
@@ -120,7 +121,7 @@ class TcpPort:
         while data:
             _, ready, _ = select.select([], [self._socket], [], WRITE_S)
             if not ready:
-                raise TimeoutError("the other side takes no commands")
+                raise TimeoutError(Message("the other side takes no commands"))
             data = data[self._socket.send(data) :]
         return None
 
@@ -268,12 +269,14 @@ class Rfc2217Port(TcpPort):
         try:
             super().write(self._telnet.begin())
             self._until(
-                lambda: self._telnet.willing, "speaks no RFC 2217; use socket:// for a plain connection"
+                lambda: self._telnet.willing,
+                Message("speaks no RFC 2217; use socket:// for a plain connection"),
             )
             super().write(line)
             wanted = {BAUD, SIZE, PARITY, STOP}
             self._until(
-                lambda: wanted <= self._telnet.answered, "does not answer to the settings of the line"
+                lambda: wanted <= self._telnet.answered,
+                Message("does not answer to the settings of the line"),
             )
         except BaseException:
             self.close()
@@ -283,7 +286,7 @@ class Rfc2217Port(TcpPort):
         until = time.monotonic() + CONNECT_S
         while not done():
             if time.monotonic() > until:
-                raise DeviceError(f"the other side {words}")
+                raise DeviceError("the other side {words}", words)
             self._take(4096, 0.05)
 
     def _take(self, limit: int, seconds: float) -> bytes:

@@ -26,6 +26,7 @@ from acquire.serial_line.link import FloodGuard, Link, LinkContext, LoadWatch, O
 from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling
 from acquire.serial_line.settings import SerialSettings, describe, read_settings
+from acquire.text import Message
 
 log = logging.getLogger(__name__)
 
@@ -108,16 +109,27 @@ class SerialCell(Closing):
                     self._check(reading)
                     return
         if self._settings.wait_s > 0:
-            what = f"{seen} lines came, none of them a reading of {self._settings.protocol.name}"
-            text = f"no reading within {self._settings.wait_s:g} s: {what if seen else 'nothing came'}"
-            self._report("warning", f"{text}; check protocol, baud and cable ('phasedic identify' listens)")
+            what = Message(
+                "{seen} lines came, none of them a reading of {name}", seen, self._settings.protocol.name
+            )
+            text = Message(
+                "no reading within {wait_s:g} s: {what}",
+                self._settings.wait_s,
+                what if seen else "nothing came",
+            )
+            self._report(
+                "warning",
+                Message("{text}; check protocol, baud and cable ('phasedic identify' listens)", text),
+            )
 
     def _check(self, reading: Reading) -> None:
         try:
             self._scaling.check_unit(reading.unit or self._settings.unit or "")
         except ConfigError as error:
             shown = reading.raw.decode("ascii", "backslashreplace")
-            raise ConfigError(f"{self._settings.address}: {error} (a line: {shown!r})") from error
+            raise ConfigError(
+                "{address}: {error} (a line: {shown})", self._settings.address, error, repr(shown)
+            ) from error
 
     # -- the stream ------------------------------------------------------------------------
 
@@ -161,11 +173,25 @@ class SerialCell(Closing):
         jitter = self._device.jitter_s
         if not math.isnan(jitter):
             drift = self._device.drift
-            known = "" if math.isnan(drift) else f", drift {drift * 1e6:.0f} us/s against this machine"
-            self._report("info", f"device clock: arrivals {jitter * 1e3:.1f} ms late on average (rms){known}")
+            known = (
+                ""
+                if math.isnan(drift)
+                else Message(", drift {drift:.0f} us/s against this machine", drift * 1e6)
+            )
+            self._report(
+                "info",
+                Message(
+                    "device clock: arrivals {jitter:.1f} ms late on average (rms){known}",
+                    jitter * 1000.0,
+                    known,
+                ),
+            )
         if self._skipped:
             self._report(
-                "warning", f"{self._skipped} bytes were skipped, since lines came faster than they are read"
+                "warning",
+                Message(
+                    "{skipped} bytes were skipped, since lines came faster than they are read", self._skipped
+                ),
             )
 
     def _pass(self) -> list[LoadSample]:
@@ -258,7 +284,7 @@ class SerialCell(Closing):
             t, late = stamp.t, stamp.doubtful
             if stamp.jumped:
                 self._report(
-                    "warning", "the device's own clock jumped (a restart?); its stamps are tied anew"
+                    "warning", Message("the device's own clock jumped (a restart?); its stamps are tied anew")
                 )
         self._last_t = max(t, self._last_t)
         return self._scaling.sample(reading, self._last_t, LoadFlag.STALE if late else LoadFlag.NONE)
@@ -299,7 +325,7 @@ class SerialCell(Closing):
         zero = self._scaling.zero
         why_not = zero.why_not(self._clock())
         if why_not and not force:
-            self._refuse(f"not tared: {why_not}; hold the load still, or force the tare")
+            self._refuse(Message("not tared: {why_not}; hold the load still, or force the tare", why_not))
             return False
         load, data = zero.load(), {"forced": bool(why_not), "undo": False}
         wanted = self._settings.tare
@@ -307,14 +333,14 @@ class SerialCell(Closing):
         if can and self._command("tare"):
             self._taring_until = self._clock() + TARE_S
             step = zero.moved_in_device()
-            text = f"tare sent to the device under {load:.6g} N"
+            text = Message("tare sent to the device under {load:.6g} N", load)
             self._event(EventKind.TARE, "info", text, offset_N=None, step_N=_known(step), **data)
             return True
         if math.isnan(load):
-            self._refuse("nothing to tare: there was no valid sample yet")
+            self._refuse(Message("nothing to tare: there was no valid sample yet"))
             return False
         step = zero.take()
-        text = f"tared: {load:.6g} N is zero now"
+        text = Message("tared: {load:.6g} N is zero now", load)
         self._event(EventKind.TARE, "info", text, offset_N=zero.offset, step_N=step, **data)
         return True
 
@@ -322,9 +348,9 @@ class SerialCell(Closing):
         zero = self._scaling.zero
         step = zero.undo()
         if step is None:
-            self._refuse("there is no tare to undo")
+            self._refuse(Message("there is no tare to undo"))
             return False
-        text = f"the last tare is undone: forces rise by {-step:.6g} N"
+        text = Message("the last tare is undone: forces rise by {step:.6g} N", -step)
         data = {"offset_N": zero.offset, "step_N": step, "forced": False, "undo": True}
         self._event(EventKind.TARE, "info", text, **data)
         return True

@@ -11,9 +11,10 @@ import math
 from collections.abc import Callable
 
 from acquire.protocols.base import Parser
+from acquire.text import Message
 
 LIMIT = 1024  # bytes held
-DOUBT = "if the adapter echoes, the values are wrong: let the poll end with a line end"
+DOUBT = Message("if the adapter echoes, the values are wrong: let the poll end with a line end")
 
 
 class Echo:
@@ -68,10 +69,17 @@ class Echo:
         raw, bare = self._values(self._held), self._values(rest)
         self.known = any(bare) and not (all(raw) and len(raw) == len(bare))
         if self.known:
-            self._tell("info", "the adapter sends back what is sent to it (an echo): it is taken out")
+            self._tell(
+                "info", Message("the adapter sends back what is sent to it (an echo): it is taken out")
+            )
         elif any(bare):
             self._tell(
-                "warning", f"answers begin with the poll itself, {self._sent!r}, and are taken whole: {DOUBT}"
+                "warning",
+                Message(
+                    "answers begin with the poll itself, {sent}, and are taken whole: {DOUBT}",
+                    repr(self._sent),
+                    DOUBT,
+                ),
             )
         return any(bare) or (bool(bare) and all(raw))
 

@@ -19,6 +19,7 @@ from acquire.protocols.base import Parser, Protocol, Reading, find_protocol
 from acquire.protocols.units import is_mass
 from acquire.serial_line.byte_ports import Port
 from acquire.serial_line.ports import PORT_ERRORS, LineSettings, open_port
+from acquire.text import Message
 
 SPEEDS = (9600, 115200, 57600, 19200, 2400, 4800, 38400, 1200)
 LISTEN_S = 1.5
@@ -89,7 +90,9 @@ def record_bytes(
     try:
         return _collect(port, seconds, clock)
     except PORT_ERRORS as error:
-        raise DeviceError(f"{line.url}: lost while listening ({error}); check the cable") from error
+        raise DeviceError(
+            "{url}: lost while listening ({error}); check the cable", line.url, error
+        ) from error
     finally:
         port.close()
 
@@ -168,7 +171,7 @@ def _reads(good: list[Reading]) -> str:
     if not good:
         return ""
     shown = good[-1].raw.decode("ascii", "backslashreplace").strip()
-    return f"{shown!r} is read as {good[-1].value:.9g}: compare the display"
+    return Message("{shown} is read as {value:.9g}: compare the display", repr(shown), good[-1].value)
 
 
 def _parser(protocol: Protocol, device: str, settings: str) -> Parser:
@@ -183,10 +186,12 @@ def _understood(reading: Reading) -> bool:
 def _remark(readings: list[Reading]) -> str:
     units = {reading.unit for reading in readings if reading.unit}
     if not units:
-        return "the line names no unit: add unit=N, or the one on the display"
+        return Message("the line names no unit: add unit=N, or the one on the display")
     masses = sorted(unit for unit in units if is_mass(unit))
     if masses:
-        return f"the line says {masses[0]}: add mass_reads_force=yes if that stands for a force"
+        return Message(
+            "the line says {masses}: add mass_reads_force=yes if that stands for a force", masses[0]
+        )
     return ""
 
 
@@ -215,7 +220,9 @@ def ask(question: Question, opener: Opener = open_port, clock: Clock = time.mono
         port.write(question.data)
         received = _collect(port, 0.7, clock).removeprefix(question.data)  # an adapter may echo
     except PORT_ERRORS as error:
-        raise DeviceError(f"{question.line.url}: lost while asking ({error}); check the cable") from error
+        raise DeviceError(
+            "{url}: lost while asking ({error}); check the cable", question.line.url, error
+        ) from error
     finally:
         port.close()
     return _answer(question, received)

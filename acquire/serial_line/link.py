@@ -20,6 +20,7 @@ from acquire.opening_thread import Opening
 from acquire.serial_line.byte_ports import Port
 from acquire.serial_line.echo import Echo
 from acquire.serial_line.ports import PORT_ERRORS, LineSettings, find_again, identity_of
+from acquire.text import Message
 
 log = logging.getLogger(__name__)
 
@@ -110,7 +111,7 @@ class Link:
         if not first.done(OPEN_S):
             first.abandon()
             raise DeviceError(
-                f"{line.url}: does not open within {OPEN_S:g} s; check the device and its cable"
+                "{url}: does not open within {OPEN_S:g} s; check the device and its cable", line.url, OPEN_S
             )
         self._url, port = first.take()
         self._port: Port | None = port
@@ -148,7 +149,9 @@ class Link:
         if self._short < 2 or self._clock() - self._since >= STEADY_S:
             self._missed = False
             self._report(
-                "info", "connected again" + ("" if self._url == self._line.url else f" as {self._url}")
+                "info",
+                Message("connected again")
+                + ("" if self._url == self._line.url else Message(" as {url}", self._url)),
             )
 
     def write(self, data: bytes, *, polls: bool = False) -> bool:
@@ -177,12 +180,19 @@ class Link:
         delay = min(RETRY_S * 2 ** (self._short - 1), SELDOM_S)
         self._next_try = now + delay
         if self._short == 1:
-            self._report("error", f"lost ({error}); {self._last_words()}; trying to reach it again")
+            self._report(
+                "error",
+                Message("lost ({error}); {last_words}; trying to reach it again", error, self._last_words()),
+            )
         elif self._short == 2:
             self._report(
                 "error",
-                f"lost again at once ({error}): the other side hangs up; phasedic tries again ever less often "
-                f"(up to every {SELDOM_S:g} s), with an event when it stays",
+                Message(
+                    "lost again at once ({error}): the other side hangs up; phasedic tries again ever less often "
+                    "(up to every {SELDOM_S:g} s), with an event when it stays",
+                    error,
+                    SELDOM_S,
+                ),
             )
         self._missed = True
 
@@ -273,11 +283,16 @@ class LoadWatch:
         if good:
             self._last_good, self._since, self._bad_reported = good[-1], now, False
             if self._silent:
-                self._report("info", "readings come again")
+                self._report("info", Message("readings come again"))
             self._silent = False
         elif not self._silent and now - self._since > self._timeout_s:
             self._silent = True
-            self._report("warning", f"no reading for {self._timeout_s:g} s; {self.last_words(now)}")
+            self._report(
+                "warning",
+                Message(
+                    "no reading for {timeout_s:g} s; {last_words}", self._timeout_s, self.last_words(now)
+                ),
+            )
 
     def _count_bad(self, samples: Sequence[LoadSample], any_good: bool) -> None:
         self._bad = 0 if any_good else self._bad + sum(LoadFlag.ERROR in s.flags for s in samples)
@@ -285,15 +300,15 @@ class LoadWatch:
             return
         self._bad_reported = True
         shown = samples[-1].raw[:60].decode("ascii", "backslashreplace")
-        text = f"{self._bad} lines in a row give no reading, the last one {shown!r}"
-        self._report("warning", f"{text}; check protocol, baud, column and decimal")
+        text = Message("{bad} lines in a row give no reading, the last one {shown}", self._bad, repr(shown))
+        self._report("warning", Message("{text}; check protocol, baud, column and decimal", text))
 
     def last_words(self, now: float) -> str:
         """Of the last good sample: its force and age."""
         good = self._last_good
         if good is None:
-            return "there was no good sample before"
-        return f"last good sample {good.force:.6g} N, {now - good.t:.1f} s ago"
+            return Message("there was no good sample before")
+        return Message("last good sample {force:.6g} N, {now:.1f} s ago", good.force, now - good.t)
 
 
 class FloodGuard:
@@ -334,8 +349,11 @@ class FloodGuard:
             rate = self._lines / (now - self._begun)
             self._report(
                 "warning",
-                f"lines come faster than they are read ({rate:.0f}/s); what waits is skipped and flagged STALE: "
-                "have the device send fewer",
+                Message(
+                    "lines come faster than they are read ({rate:.0f}/s); what waits is skipped and flagged STALE: "
+                    "have the device send fewer",
+                    rate,
+                ),
             )
         self._reported = now
         return True

@@ -13,6 +13,7 @@ from urllib.parse import parse_qsl, urlsplit
 from acquire.errors import ConfigError, DeviceError
 from acquire.serial_line.byte_ports import WRITE_S, Port, Rfc2217Port, TcpPort, TtyPort, line_settings
 from acquire.system import TERMINAL_ERRORS, group_of
+from acquire.text import Message
 
 LINE_ERRORS: tuple[type[Exception], ...] = (OSError, *TERMINAL_ERRORS)
 PORT_ERRORS: tuple[type[Exception], ...] = (*LINE_ERRORS, TypeError, ValueError)
@@ -42,7 +43,7 @@ class PortInfo:
     def text(self) -> str:
         """One line for a person."""
         words = [word for word in (self.description, self.identity) if word and word != "n/a"]
-        denied = "" if self.accessible else "  (this user may not open it: see docs/load-cells.md)"
+        denied = "" if self.accessible else Message("  (this user may not open it: see docs/load-cells.md)")
         return f"  {self.device}  {'  '.join(words)}{denied}".rstrip()
 
 
@@ -81,7 +82,11 @@ def find_again(device: str, identity: str) -> str:
 def ports_line() -> str:
     """The ports there are, in one sentence."""
     ports = [port.text().strip() for port in list_serial_ports()]
-    return "serial ports here: " + ", ".join(ports) if ports else "this machine has no serial port now"
+    return (
+        Message("serial ports here: ") + ", ".join(ports)
+        if ports
+        else Message("this machine has no serial port now")
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +126,7 @@ def check_present(url: str) -> None:
         Lists the ports there are.
     """
     if url.startswith("/dev/") and not Path(url).exists():
-        raise DeviceError(f"{url}: there is no such port; {ports_line()}")
+        raise DeviceError("{url}: there is no such port; {ports_line}", url, ports_line())
 
 
 def open_port(line: LineSettings) -> Port:
@@ -140,7 +145,7 @@ def open_port(line: LineSettings) -> Port:
     except LINE_ERRORS as error:
         raise DeviceError(_why(line.url, error)) from error
     except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise ConfigError(f"{line.url}: {error}") from error
+        raise ConfigError("{url}: {error}", line.url, error) from error
 
 
 def _by_pyserial(line: LineSettings) -> Port:
@@ -169,7 +174,7 @@ def _rfc2217(line: LineSettings) -> Port:
     try:
         return Rfc2217Port(*_host_and_port(line.url), commands, line.read_timeout_s)
     except DeviceError as error:
-        raise DeviceError(f"{line.url}: {error}") from error
+        raise DeviceError("{url}: {error}", line.url, error) from error
 
 
 _NETWORK: Mapping[str, Callable[[LineSettings], Port]] = {"socket": _socket, "rfc2217": _rfc2217}
@@ -189,14 +194,20 @@ def _host_and_port(url: str) -> tuple[str, int]:
 def _why(url: str, error: Exception) -> str:
     code = getattr(error, "errno", None)
     if code == errno.EACCES:
-        return (
-            f"{url}: this user may not open it; add yourself to the group that owns it"
-            f" (sudo usermod -aG {group_of(Path(url)) or 'dialout'} $USER), then log in again"
+        return Message(
+            "{url}: this user may not open it; add yourself to the group that owns it (sudo usermod -aG "
+            "{group_of} $USER), then log in again",
+            url,
+            group_of(Path(url)) or "dialout",
         )
     if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in str(error):
-        return f"{url}: another program has it open (a serial monitor?); close that one"
+        return Message("{url}: another program has it open (a serial monitor?); close that one", url)
     if url.partition("://")[0] in _NETWORK:
-        return f"{url}: nobody answers there ({error}); check address, cable and power of the converter"
+        return Message(
+            "{url}: nobody answers there ({error}); check address, cable and power of the converter",
+            url,
+            error,
+        )
     if "://" not in url and not Path(url).exists():
-        return f"{url}: there is no such port; {ports_line()}"
-    return f"{url}: cannot be opened ({error}); {ports_line()}"
+        return Message("{url}: there is no such port; {ports_line}", url, ports_line())
+    return Message("{url}: cannot be opened ({error}); {ports_line}", url, error, ports_line())

@@ -14,6 +14,7 @@ from acquire.load_sample import LoadFlag, LoadSample
 from acquire.protocols.base import Reading
 from acquire.protocols.units import newtons_per
 from acquire.serial_line.settings import SerialSettings
+from acquire.text import Message
 
 WINDOW_S, MAX_WINDOW_S = 0.5, 3.0  # of the samples that a tare looks at; of a slow device
 KEPT = 4096  # samples
@@ -46,16 +47,24 @@ class TareZero:
         window = self._window_s()
         recent = [seen for seen in self._seen if seen[0] >= now - window]
         if not recent:
-            return f"no valid sample in the last {window:.1f} s"
+            return Message("no valid sample in the last {window:.1f} s", window)
         unfit = [why for _, gross, why in recent if why and (math.isnan(gross) or why == recent[-1][2])]
         if unfit:
-            return f"{len(unfit)} of the {len(recent)} samples of the last {window:.1f} s are {unfit[-1]}"
+            return Message(
+                "{len} of the {len2} samples of the last {window:.1f} s are {unfit}",
+                len(unfit),
+                len(recent),
+                window,
+                unfit[-1],
+            )
         found = self._judge(recent)
         if found.n < 3:
-            return f"only {found.n} samples in the last {window:.1f} s"
+            return Message("only {n} samples in the last {window:.1f} s", found.n, window)
         if not found.still:
             moved = max(abs(found.moved_N), found.range_N)
-            return f"the load is not still: it moved by {moved:.4g} N in the last {window:.1f} s"
+            return Message(
+                "the load is not still: it moved by {moved:.4g} N in the last {window:.1f} s", moved, window
+            )
         return ""
 
     def _window_s(self) -> float:
@@ -176,9 +185,9 @@ class Scaling:
     def _see(self, t: float, force: float, flags: LoadFlag) -> None:
         """What a tare may rest on; late readings and lines that are none do not count either way."""
         if flags & BEYOND:
-            self.zero.saw(t, math.nan, "in overload")
+            self.zero.saw(t, math.nan, Message("in overload"))
         elif not math.isnan(force) and LoadFlag.STALE not in flags:
-            unfit = "unstable, as the device says" if LoadFlag.UNSTABLE in flags else ""
+            unfit = Message("unstable, as the device says") if LoadFlag.UNSTABLE in flags else ""
             self.zero.saw(t, force + self.zero.offset, unfit)
 
     def _newtons(self, unit: str) -> float | None:
@@ -189,7 +198,10 @@ class Scaling:
             self._units[unit] = self._learn(unit)
         if self._last_unit not in (None, unit):
             self._report(
-                "warning", f"the unit on the line changed from {self._last_unit} to {unit or 'none'}"
+                "warning",
+                Message(
+                    "the unit on the line changed from {last_unit} to {unit}", self._last_unit, unit or "none"
+                ),
             )
         self._last_unit = unit
         return self._units[unit]
@@ -198,7 +210,7 @@ class Scaling:
         try:
             return self.check_unit(unit)
         except ConfigError as error:
-            self._report("error", f"no force from now on: {error}")
+            self._report("error", Message("no force from now on: {error}", error))
             return None
 
     def check_unit(self, unit: str) -> float:
@@ -219,9 +231,9 @@ class Scaling:
         alarm = bool(flags & (BEYOND | LoadFlag.OUT_OF_RANGE))
         if alarm and not self._alarm:
             words = ", ".join(str(flag.name).lower().replace("_", " ") for flag in flags)
-            self._report("error", f"load alarm: {words}; {_last(self._last_force)}")
+            self._report("error", Message("load alarm: {words}; {last}", words, _last(self._last_force)))
         elif self._alarm and not alarm and not math.isnan(force):
-            self._report("info", "the load is within its range again")
+            self._report("info", Message("the load is within its range again"))
         if alarm or not math.isnan(force):
             self._alarm = alarm
 
@@ -231,4 +243,8 @@ class Scaling:
 
 
 def _last(force: float) -> str:
-    return "no valid sample before" if math.isnan(force) else f"last valid sample {force:.6g} N"
+    return (
+        Message("no valid sample before")
+        if math.isnan(force)
+        else Message("last valid sample {force:.6g} N", force)
+    )

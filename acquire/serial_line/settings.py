@@ -13,6 +13,7 @@ from acquire.load_sample import LoadCellInfo
 from acquire.protocols.base import PROTOCOLS, Mode, Parser, Protocol, find_protocol
 from acquire.protocols.units import newtons_per
 from acquire.serial_line.ports import LineSettings
+from acquire.text import Message
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +88,7 @@ def read_settings(address: Address) -> SerialSettings:
         newtons_per(settings.unit, settings.mass_reads_force)
     elif not protocol.unit_on_line:
         raise ConfigError(
-            f"{address.text}: {protocol.name} sends no unit; say the one on the display, unit=N"
+            "{text}: {name} sends no unit; say the one on the display, unit=N", address.text, protocol.name
         )
     return settings
 
@@ -141,7 +142,7 @@ def _commands(
         commands["start"] = protocol.rates[min(at_least) if at_least else max(protocol.rates)]
     if mode == "poll" and "poll" not in commands:
         raise ConfigError(
-            f"{options.address.text}: {protocol.name} has no command to poll with; use mode=listen"
+            "{text}: {name} has no command to poll with; use mode=listen", options.address.text, protocol.name
         )
     return commands
 
@@ -154,9 +155,9 @@ def _calibration(options: Options) -> Calibration | None:
 def _sign(options: Options, default: int, calibration: Calibration | None) -> int:
     sign = options.text("sign")
     if sign is not None and calibration is not None:
-        raise ConfigError(f"{options.address.text}: leave out sign=, the calibration carries it")
+        raise ConfigError("{text}: leave out sign=, the calibration carries it", options.address.text)
     if sign not in (None, "1", "+1", "-1"):
-        raise ConfigError(f"{options.address.text}: sign={sign} is not possible; allowed: 1 or -1")
+        raise ConfigError("{text}: sign={sign} is not possible; allowed: 1 or -1", options.address.text, sign)
     return int(sign) if sign else default
 
 
@@ -171,8 +172,10 @@ def _line(options: Options, protocol: Protocol) -> LineSettings:
         options.done()
     elif "://" not in url:
         raise ConfigError(
-            f"{address.text}: no load cell has the scheme {address.scheme}:; give /dev/ttyUSB0, a pyserial URL"
-            " such as socket://host:port, sim:, session:run.h5 or none:"
+            "{text}: no load cell has the scheme {scheme}:; give /dev/ttyUSB0, a pyserial URL such as "
+            "socket://host:port, sim:, session:run.h5 or none:",
+            address.text,
+            address.scheme,
         )
     rest = options.rest()
     if rest:
@@ -199,7 +202,9 @@ def describe(settings: SerialSettings, usb: str) -> LoadCellInfo:
         capacity_N=s.capacity_N,
         settings={
             "port": line.url,
-            "line": f"{line.baud} {line.bytesize}{line.parity}{line.stopbits:g}",
+            "line": Message(
+                "{baud} {bytesize}{parity}{stopbits:g}", line.baud, line.bytesize, line.parity, line.stopbits
+            ),
             "mode": s.mode,
             "unit": s.unit,
             "gain": s.gain,

@@ -15,6 +15,7 @@ from acquire.events import EventSink, device_event
 from acquire.frame import CameraInfo, Frame
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.session.reader import Session
+from acquire.text import Message
 
 
 class _SessionDevice(Closing):
@@ -68,7 +69,7 @@ class SessionLoadCell(_SessionDevice):
 
     def tare(self, *, force: bool = False) -> None:
         """Refused in an event: what is recorded is not changed."""
-        text = "a recorded load cannot be tared; the tares of the recording are in it"
+        text = Message("a recorded load cannot be tared; the tares of the recording are in it")
         device_event(self._on_event, self.info.address, text, tared=False)
 
 
@@ -95,14 +96,14 @@ def open_session_load(address: Address, on_event: EventSink) -> SessionLoadCell:
     session = _open(address, on_event)
     if session.load_cell is None:
         session.close()
-        raise DataError(f"{address.text}: recorded without a load cell; use --load none:")
+        raise DataError("{text}: recorded without a load cell; use --load none:", address.text)
     return SessionLoadCell(address.text, session, session.load_cell, on_event)
 
 
 def _open(address: Address, on_event: EventSink) -> Session:
     Options(address).done()
     if not address.target:
-        raise ConfigError(f"{address.text}: name the file, for example session:run.h5")
+        raise ConfigError("{text}: name the file, for example session:run.h5", address.text)
     session = Session.open(address.target)
     if session.recovered:
         device_event(on_event, address.text, session.recovered)

@@ -42,12 +42,13 @@ from acquire.record_mode import RecordMode
 from acquire.session import layout, stored
 from acquire.session.bursts import burst_from
 from acquire.session.stored import DAMAGE, Rows, events_from, read_column, read_rows
+from acquire.text import Message
 
 TEXT = Declared("S")
 _STABLE = {code: word for word, code in layout.STABLE.items()}
-UNFINISHED = (
-    "was not closed by its writer (killed, or still recording); everything complete in it is read."
-    " 'phasedic recover' makes a clean copy"
+UNFINISHED = Message(
+    "was not closed by its writer (killed, or still recording); everything complete in it is read. "
+    "'phasedic recover' makes a clean copy"
 )
 
 
@@ -83,11 +84,11 @@ class SessionPart(Closing):
             self._read()
         except DAMAGE as error:
             self.file.close()
-            what = "its description cannot be read"
+            what = Message("its description cannot be read")
             raise damaged(self.path, what, error, self._advice or NOTHING) from error
         except PhasedicError as error:
             self.file.close()
-            raise DataError(str(error)) from error
+            raise DataError(error.text) from error
 
     def _read(self) -> None:
         _check_format(self.path, self.file)
@@ -95,14 +96,17 @@ class SessionPart(Closing):
         check_links(self.file)
         entry = self.entry = open_group(self.file, "entry")
         texts = {name: self._text(entry, name) for name in stored.TEXTS}
-        self.config = stored.config_from(texts["config"], f"{self.path}: config")
+        self.config = stored.config_from(texts["config"], Message("{path}: config", self.path))
         self.metadata, self.versions = (
-            read_object(texts[name], f"{self.path}: {name}") for name in ("metadata", "versions")
+            read_object(texts[name], Message("{path}: {name}", self.path, name))
+            for name in ("metadata", "versions")
         )
         instrument = open_group(entry, "instrument")
         camera, cell = (self._text(open_group(instrument, n), "description") for n in ("camera", "load_cell"))
-        self.camera: CameraInfo = stored.camera_from(camera, f"{self.path}: the camera")
-        self.load_cell: LoadCellInfo | None = stored.load_from(cell, f"{self.path}: the load cell")
+        self.camera: CameraInfo = stored.camera_from(camera, Message("{path}: the camera", self.path))
+        self.load_cell: LoadCellInfo | None = stored.load_from(
+            cell, Message("{path}: the load cell", self.path)
+        )
         self.mode = _mode({name: read_attribute(entry, name, what) for name, what in stored.ENTRY.items()})
         set_id = as_text(root["set_id"])
         self.set_id, self.part = "" if set_id == layout.NO_SET else set_id, int(root["part"])
@@ -149,8 +153,11 @@ class SessionPart(Closing):
             if self._whole and np.any(wrong := np.diff(numbers) <= 0):
                 row = int(np.argmax(wrong)) + 1
                 raise DataError(
-                    f"{self.path}: the sequence numbers of {name} do not increase at row {row}; the file is damaged:"
-                    " 'phasedic recover' copies what can be read"
+                    "{path}: the sequence numbers of {name} do not increase at row {row}; the file is damaged: "
+                    "'phasedic recover' copies what can be read",
+                    self.path,
+                    name,
+                    row,
                 )
 
     def _troubles_of_the_load(self) -> tuple[str, ...]:
@@ -174,7 +181,7 @@ class SessionPart(Closing):
             Its bytes are damaged.
         """
         row = {name: column[number].item() for name, column in self.columns.items()}
-        with _reading(self.path, f"frame {number} cannot be read", self._advice):
+        with _reading(self.path, Message("frame {number} cannot be read", number), self._advice):
             image = self._pictures[int(self._frames.places[number])]
             if self._salvage and not image.any():  # the checksum of zeros is zero
                 raise ValueError("all bytes are zero")
@@ -198,14 +205,14 @@ class SessionPart(Closing):
         DataError
             Its bytes are damaged.
         """
-        with _reading(self.path, f"burst {number} cannot be read", self._advice):
+        with _reading(self.path, Message("burst {number} cannot be read", number), self._advice):
             place = int(self._bursts.places[number])
             row = {name: column[number].item() for name, column in self.bursts.items()}
             return burst_from(self._sums[place], self._clipped[place], row, self.camera.bits)
 
     def load_samples(self) -> list[LoadSample]:
         """All load samples with their raw lines."""
-        with _reading(self.path, "the load samples cannot be read", self._advice):
+        with _reading(self.path, Message("the load samples cannot be read"), self._advice):
             samples = self._samples()
             lines = self._raw_lines(samples)
         columns = [samples.columns[name].tolist() for name in _SAMPLE]
@@ -237,13 +244,13 @@ class SessionPart(Closing):
 
     def events(self) -> list[Event]:
         """All events."""
-        with _reading(self.path, "the events cannot be read", self._advice):
+        with _reading(self.path, Message("the events cannot be read"), self._advice):
             rows = read_column(self._events, whole=self._whole)
             return events_from(rows, str(self.path), whole=self._whole)
 
     def clock_pairs(self) -> list[ClockPair]:
         """The pairs of clock readings."""
-        with _reading(self.path, "the clock readings cannot be read", self._advice):
+        with _reading(self.path, Message("the clock readings cannot be read"), self._advice):
             columns = read_rows(self._groups["clock"], layout.CLOCK_COLUMNS, whole=self._whole).columns
             return [
                 ClockPair.from_iso(float(t), utc.decode())
@@ -252,8 +259,8 @@ class SessionPart(Closing):
 
     def frame_counts(self) -> dict[str, Any] | None:
         """The final counts; None where the writer did not come to its end."""
-        with _reading(self.path, "the ledger cannot be read", self._advice):
-            return stored.ledger_from(self._frame_counts[0], f"{self.path}: the ledger")
+        with _reading(self.path, Message("the ledger cannot be read"), self._advice):
+            return stored.ledger_from(self._frame_counts[0], Message("{path}: the ledger", self.path))
 
     def walk_pictures(self) -> None:
         """Go through the index of all pictures, without reading them.
@@ -263,7 +270,7 @@ class SessionPart(Closing):
         DataError
             It is damaged.
         """
-        with _reading(self.path, "the index of the pictures cannot be read", self._advice):
+        with _reading(self.path, Message("the index of the pictures cannot be read"), self._advice):
             for pictures in (self._images, self._sums, self._clipped):
                 pictures.id.get_num_chunks()
 
@@ -289,14 +296,14 @@ class _reading:
             raise damaged(self._path, self._what, error, self._advice) from error
 
 
-ADVICE = "; the file is damaged: 'phasedic recover' saves what can be read"
-NOTHING = "; the file is damaged, and nothing of it can be saved"
+ADVICE = Message("; the file is damaged: 'phasedic recover' saves what can be read")
+NOTHING = Message("; the file is damaged, and nothing of it can be saved")
 
 
 def damaged(path: Path, what: str, error: BaseException, advice: str = ADVICE) -> DataError:
     """The error of a file whose bytes are not what they were."""
     reason = " ".join(str(error).split())[:160]
-    return DataError(f"{path}: {what} ({reason}){advice}")
+    return DataError("{path}: {what} ({reason}){advice}", path, what, reason, advice)
 
 
 def _open_file(path: Path, probed: bool, salvage: bool) -> tuple[h5py.File, str | None]:
@@ -307,17 +314,17 @@ def _open_file(path: Path, probed: bool, salvage: bool) -> tuple[h5py.File, str 
         try:
             check_size(path, block)
         except DataError as error:
-            raise DataError(f"{error}, or save what is there with 'phasedic recover'") from None
+            raise DataError("{error}, or save what is there with 'phasedic recover'", error) from None
     if (block.unfinished or is_cut) and not probed:
         probe(path, "acquire.session", words=["salvage"] if salvage else [])
     try:
         if is_cut:
-            return h5py.File(
-                PaddedFile(path, block.size), "r"
-            ), f"is truncated: {there} of {block.size} bytes are there"
+            return h5py.File(PaddedFile(path, block.size), "r"), Message(
+                "is truncated: {there} of {size} bytes are there", there, block.size
+            )
         return open_file(path, swmr=block.unfinished), UNFINISHED if block.unfinished else None
     except (OSError, RuntimeError) as error:
-        raise damaged(path, "it cannot be opened", error, NOTHING if salvage else ADVICE) from error
+        raise damaged(path, Message("it cannot be opened"), error, NOTHING if salvage else ADVICE) from error
 
 
 def _check_format(path: Path, file: h5py.File) -> None:
@@ -325,12 +332,14 @@ def _check_format(path: Path, file: h5py.File) -> None:
         not h5py.h5a.exists(file.id, b"format")
         or as_text(read_attribute(file, "format", TEXT)) != layout.FORMAT
     ):
-        raise DataError(f"{path} is an HDF5 file, but not a session of this program")
+        raise DataError("{path} is an HDF5 file, but not a session of this program", path)
     version = int(read_attribute(file, "format_version", stored.ROOT["format_version"]))
     if version > layout.FORMAT_VERSION:
         raise DataError(
-            f"{path} has format version {version}, this program reads up to {layout.FORMAT_VERSION};"
-            " update phasedic"
+            "{path} has format version {version}, this program reads up to {FORMAT_VERSION}; update phasedic",
+            path,
+            version,
+            layout.FORMAT_VERSION,
         )
 
 

@@ -33,6 +33,7 @@ from acquire.record_mode import RecordMode
 from acquire.session.layout import SessionInfo
 from acquire.session.part import SessionPart
 from acquire.session.writer import SessionWriter
+from acquire.text import Message
 
 _NUMBERED = re.compile(r"^(?P<stem>.+)\.(?P<number>\d{3,})$")
 
@@ -164,8 +165,10 @@ class Session(Closing):
         self._parts = parts
         first = parts[0]
         self.path: Path = first.path
-        words = [f"{part.path} {part.recovered}" for part in parts if part.recovered]
-        words += [f"{part.path}: {trouble}" for part in parts for trouble in part.troubles]
+        words = [Message("{path} {recovered}", part.path, part.recovered) for part in parts if part.recovered]
+        words += [
+            Message("{path}: {trouble}", part.path, trouble) for part in parts for trouble in part.troubles
+        ]
         self.recovered: str | None = "; ".join([*words, missing] if missing else words) or None
         self.camera: CameraInfo = first.camera
         self.load_cell: LoadCellInfo | None = first.load_cell
@@ -246,7 +249,9 @@ class Session(Closing):
 
     def _locate(self, lengths: list[int], number: int, what: str) -> tuple[SessionPart, int]:
         if not 0 <= number < sum(lengths):
-            raise DataError(f"{self.path}: no {what} {number}; there are {sum(lengths)}, from 0")
+            raise DataError(
+                "{path}: no {what} {number}; there are {sum}, from 0", self.path, what, number, sum(lengths)
+            )
         starts = [0, *accumulate(lengths)]
         at = bisect_right(starts, number) - 1
         return self._parts[at], number - starts[at]
@@ -295,7 +300,7 @@ def _whole_set(opened: SessionPart) -> tuple[list[SessionPart], str | None]:
             missing.append(path.name)
     if not missing:
         return parts, None
-    return parts, f"files of this session are missing or unreadable: {', '.join(missing)}"
+    return parts, Message("files of this session are missing or unreadable: {join}", ", ".join(missing))
 
 
 def _last_part(first: Path) -> int:

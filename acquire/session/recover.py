@@ -14,10 +14,10 @@ from acquire.addresses import session_file
 from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.events import Event, EventKind, Level
-from acquire.printable import counted
 from acquire.session.layout import SessionInfo
 from acquire.session.part import SessionPart
 from acquire.session.writer import SessionWriter
+from acquire.text.printable import counted
 
 Item = TypeVar("Item")
 
@@ -139,7 +139,7 @@ def _try(read: Callable[[], Item], unreadable: list[str]) -> Item | None:
     try:
         return read()
     except DataError as error:
-        unreadable.append(str(error))
+        unreadable.append(error.text)
         return None
 
 

@@ -25,6 +25,7 @@ from acquire.hdf5 import (
 )
 from acquire.load_sample import LoadCellInfo
 from acquire.session import layout
+from acquire.text import Message
 
 ROOT = {
     "format_version": Declared("int", (), 1),
@@ -95,7 +96,12 @@ def camera_from(text: Any, where: str) -> CameraInfo:
     """The camera whose description stands in ``text``; raises DataError where it is none."""
     values = _described(text, CAMERA_FIELDS, where)
     if values["width"] * values["height"] > layout.MAX_PIXELS:
-        raise DataError(f"{where}: pictures of {values['width']} x {values['height']} px are beyond sense")
+        raise DataError(
+            "{where}: pictures of {values} x {values2} px are beyond sense",
+            where,
+            values["width"],
+            values["height"],
+        )
     return CameraInfo(**values)
 
 
@@ -198,11 +204,14 @@ def read_rows(
     lengths = [_stored_rows(item, whole) for item in (*held.values(), *pictures)]
     n = min(lengths)
     extents = {len(item) for item in (*held.values(), *pictures)}
-    where = f"{group.file.filename}: {group.name}"
+    where = Message("{filename}: {name}", group.file.filename, group.name)
     if whole and {*lengths, *extents} != {n}:
         raise DataError(
-            f"{where} has {n} to {max(extents)} rows, not one number of them in all its columns; the file is"
-            " damaged: 'phasedic recover' saves the rows that are whole"
+            "{where} has {n} to {max} rows, not one number of them in all its columns; the file is damaged: "
+            "'phasedic recover' saves the rows that are whole",
+            where,
+            n,
+            max(extents),
         )
     table = {name: read_column(item, n, columns[name].missing, whole=whole) for name, item in held.items()}
     outside = {name: what.outside(table[name]) for name, what in declared.items()}
@@ -217,29 +226,47 @@ def _beyond(where: str, table: Any, outside: Any, declared: Mapping[str, Declare
     name = next(name for name, rows in outside.items() if rows.any())
     row = int(np.argmax(outside[name]))
     low, high = declared[name].low, declared[name].high
-    return (
-        f"{where}/{name} is {table[name][row]} in row {row}, beyond {low:g} to {high:g}; the file is damaged:"
-        " 'phasedic recover' saves the other rows"
+    return Message(
+        "{where}/{name} is {table} in row {row}, beyond {low:g} to {high:g}; the file is damaged: 'phasedic "
+        "recover' saves the other rows",
+        where,
+        name,
+        table[name][row],
+        row,
+        low,
+        high,
     )
 
 
 def _chosen(table: dict[str, NDArray[Any]], good: NDArray[np.bool_], what: str, whole: bool) -> Rows:
     troubles = []
     if not whole and len(good) and not good.any():
-        troubles.append(f"none of {len(good)} {what} has a time, so all are left out")
+        troubles.append(Message("none of {len} {what} has a time, so all are left out", len(good), what))
     if not whole:  # the last rows may not be written yet
         good = good[: len(good) - int(np.argmax(good[::-1]))] if good.any() else good[:0]
     places = np.flatnonzero(good)
     columns = {name: column[places] for name, column in table.items()}
     if left_out := len(good) - len(places):
         troubles.append(
-            f"{left_out} of {len(good)} {what} have no time, or values beyond sense, and are left out"
+            Message(
+                "{left_out} of {len} {what} have no time, or values beyond sense, and are left out",
+                left_out,
+                len(good),
+                what,
+            )
         )
         _count_as_lost(columns, table, good)
     steps = np.diff(columns["monotonic_s"])
     if backwards := int(np.count_nonzero(steps < 0)):
         first = int(np.argmax(steps < 0))
-        troubles.append(f"the times of {what} run backwards at {backwards} places, first after row {first}")
+        troubles.append(
+            Message(
+                "the times of {what} run backwards at {backwards} places, first after row {first}",
+                what,
+                backwards,
+                first,
+            )
+        )
     return Rows(columns, places, tuple(troubles))
 
 
@@ -274,7 +301,7 @@ def events_from(rows: NDArray[np.bytes_], where: str, *, whole: bool) -> list[Ev
     events = []
     for number, text in enumerate(texts):
         try:
-            events.append(_event_from(bytes(text), f"{where}: event {number}"))
+            events.append(_event_from(bytes(text), Message("{where}: event {number}", where, number)))
         except DataError:
             if whole:
                 raise

@@ -41,6 +41,7 @@ from acquire.load_sample import LoadSample
 from acquire.session import layout
 from acquire.session.bursts import BurstTable
 from acquire.session.layout import SessionInfo
+from acquire.text import Message
 
 log = logging.getLogger(__name__)
 
@@ -149,9 +150,15 @@ class SessionWriter(Closing):
         image = self._mode.cut(frame.image)
         if image.shape != expected or image.dtype != self._images.dtype:
             raise DataError(
-                f"{self.path}: frame {frame.index} is {image.shape} {image.dtype}, but the camera"
-                f" {self._camera.name} was described as {expected} {self._images.dtype};"
-                " start a new session for another picture format"
+                "{path}: frame {index} is {shape} {dtype}, but the camera {name} was described as {expected} "
+                "{dtype2}; start a new session for another picture format",
+                self.path,
+                frame.index,
+                image.shape,
+                image.dtype,
+                self._camera.name,
+                expected,
+                self._images.dtype,
             )
         return image
 
@@ -279,7 +286,7 @@ class SessionWriter(Closing):
 
     def _open_file(self) -> h5py.File:
         if self._file is None:
-            raise DataError(f"{self.path}: the session is closed; start a new one to record on")
+            raise DataError("{path}: the session is closed; start a new one to record on", self.path)
         return self._file
 
     @contextmanager
@@ -298,7 +305,11 @@ class SessionWriter(Closing):
                     self._bring(file)
             # Datasets may now differ in length; going on would put rows beside the wrong frames.
             self._abandon()
-            words = f"{self.path}: {reason(error)}; start a new test, and keep other programs from its folder"
+            words = Message(
+                "{path}: {reason}; start a new test, and keep other programs from its folder",
+                self.path,
+                reason(error),
+            )
             raise DataError(words if self.is_gone else _write_failure(self.path, error)) from error
 
     def _watch_file(self) -> None:
@@ -316,10 +327,12 @@ def _create(path: Path, declare: Callable[[h5py.File], object]) -> h5py.File:
     try:
         return create_file(path, declare)
     except FileExistsError as error:
-        raise DataError(f"{path} exists already and is not overwritten; choose another name") from error
+        raise DataError("{path} exists already and is not overwritten; choose another name", path) from error
     except OSError as error:
         raise DataError(
-            f"{path} cannot be created ({reason(error)}); choose a folder that exists, is writable and has room"
+            "{path} cannot be created ({reason}); choose a folder that exists, is writable and has room",
+            path,
+            reason(error),
         ) from error
 
 
@@ -349,11 +362,18 @@ def _frame_row(frame: Frame, start: float) -> dict[str, Any]:
 
 
 def _write_failure(path: Path, error: Exception) -> str:
-    kept = "everything complete so far stays readable"
+    kept = Message("everything complete so far stays readable")
     try:
         free = free_bytes(path)
     except OSError:
-        return f"{path}: its disk is gone ({reason(error)}); check the disk and cable; {kept}"
+        return Message(
+            "{path}: its disk is gone ({reason}); check the disk and cable; {kept}", path, reason(error), kept
+        )
     if free < 16 << 20:
-        return f"{path}: disk full ({free} bytes free); free some space and start a new session; {kept}"
-    return f"{path}: writing failed ({reason(error)}); check the disk; {kept}"
+        return Message(
+            "{path}: disk full ({free} bytes free); free some space and start a new session; {kept}",
+            path,
+            free,
+            kept,
+        )
+    return Message("{path}: writing failed ({reason}); check the disk; {kept}", path, reason(error), kept)

@@ -17,6 +17,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+from acquire.text import Message
+
 u8, u32, s32, u64 = c.c_uint8, c.c_uint32, c.c_int32, c.c_uint64
 
 
@@ -283,7 +285,7 @@ SOURCE_MASK, SOURCE_START_OF_EXPOSURE = 0x70000, 0x10000
 QUANTIZATION_FULL = 1
 
 
-_LINUX_ONLY = "cameras by their device need Linux"
+_LINUX_ONLY = Message("cameras by their device need Linux")
 
 
 class Kernel:

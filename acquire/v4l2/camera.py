@@ -22,6 +22,7 @@ from acquire.camera.timing import StampOf, longest_pause_s
 from acquire.errors import ConfigError, DataError, DeviceError
 from acquire.events import EventSink
 from acquire.frame import CameraInfo
+from acquire.text import Message
 from acquire.v4l2.api import Kernel
 from acquire.v4l2.controls import ControlWishes
 from acquire.v4l2.device import Identity, Mode, NotACamera, Stamp, V4L2Device
@@ -125,7 +126,7 @@ class V4L2Driver:
                 raise OSError(errno.EIO, "wakes without giving a picture") from None
             return None
         self._wakes = 0
-        trouble = "the driver marks it" * stamp.damaged
+        trouble = Message("the driver marks it") * stamp.damaged
         if not stamp.monotonic:
             return Picture(image, self._kernel.now(), stamp.sequence, trouble, "host")
         return Picture(image, stamp.time, stamp.sequence, trouble, "device", stamp_of(stamp))
@@ -166,7 +167,9 @@ class V4L2Opener:
         try:
             driver = self._open(self._address.target)
         except NotACamera as error:
-            raise DeviceError(f"{self._address.target}: {error}; {cameras_here(self._kernel)}") from error
+            raise DeviceError(
+                "{target}: {error}; {cameras_here}", self._address.target, error, cameras_here(self._kernel)
+            ) from error
         except OSError as error:
             raise DeviceError(why_not_open(self._address.target, error, self._kernel)) from error
         there = identities(self._kernel, self._kernel.nodes()).values()
@@ -234,5 +237,5 @@ def _whole(address: Address, key: str, value: str) -> int:
         return int(value, 0)
     except ValueError as error:
         raise ConfigError(
-            f"{address.text}: {key}={value} is not possible; controls take whole numbers"
+            "{text}: {key}={value} is not possible; controls take whole numbers", address.text, key, value
         ) from error

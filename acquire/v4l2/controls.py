@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 from acquire.errors import ConfigError
 from acquire.frame import CameraSetting
+from acquire.text import Message
 from acquire.v4l2 import api
 from acquire.v4l2.device import V4L2Device
 
@@ -87,9 +88,9 @@ class Control:
     def allowed(self) -> str:
         """What it may be set to, in words."""
         if self.menu:
-            return ", ".join(f"{value} ({words})" for value, words in self.menu.items())
-        step = f" in steps of {self.step}" if self.step > 1 else ""
-        return f"{self.minimum} to {self.maximum}{step}"
+            return ", ".join(Message("{value} ({words})", value, words) for value, words in self.menu.items())
+        step = Message(" in steps of {step}", self.step) if self.step > 1 else ""
+        return Message("{minimum} to {maximum}{step}", self.minimum, self.maximum, step)
 
     def shown(self) -> int | str:
         """The value as it is stored: the words of a menu, else the number."""
@@ -215,10 +216,12 @@ def _put_on_manual(device: V4L2Device) -> None:
 
 
 def _asked(controls: Mapping[int, Control], wishes: ControlWishes, where: str) -> list[tuple[int, int, str]]:
-    asked = []
+    asked: list[tuple[int, int, str]] = []
     if wishes.exposure_us is not None:
-        _need(controls, EXPOSURE_100US, "an exposure in microseconds", where)
-        asked.append((EXPOSURE_100US, max(1, round(wishes.exposure_us / 100)), " (in units of 100 us)"))
+        _need(controls, EXPOSURE_100US, Message("an exposure in microseconds"), where)
+        asked.append(
+            (EXPOSURE_100US, max(1, round(wishes.exposure_us / 100)), Message(" (in units of 100 us)"))
+        )
     if wishes.gain is not None:
         number = GAIN if GAIN in controls else ANALOGUE_GAIN
         _need(controls, number, "a gain", where)
@@ -226,31 +229,45 @@ def _asked(controls: Mapping[int, Control], wishes: ControlWishes, where: str) -
     by_name = {control.name: control for control in controls.values()}
     for name, value in wishes.named.items():
         if name not in by_name:
-            raise ConfigError(f"{where}: unknown setting {name!r}; {_known(controls)}")
+            raise ConfigError("{where}: unknown setting {name}; {known}", where, repr(name), _known(controls))
         asked.append((by_name[name].id, value, ""))
     return asked
 
 
 def _need(controls: Mapping[int, Control], number: int, what: str, where: str) -> None:
     if number not in controls:
-        raise ConfigError(f"{where}: this camera has no control for {what}; {_known(controls)}")
+        raise ConfigError(
+            "{where}: this camera has no control for {what}; {known}", where, what, _known(controls)
+        )
 
 
 def _known(controls: Mapping[int, Control]) -> str:
     names = ", ".join(sorted(control.name for control in controls.values())) or "none"
-    return f"known: {', '.join(SETTINGS)}; controls of this camera: {names}"
+    return Message("known: {join}; controls of this camera: {names}", ", ".join(SETTINGS), names)
 
 
 def _set(device: V4L2Device, control: Control, value: int, unit: str, where: str) -> None:
     if control.inactive:
         raise ConfigError(
-            f"{where}: {control.name} is held by an automatic control of the camera; "
-            "leave out manual=no, or switch that one off by its name"
+            "{where}: {name} is held by an automatic control of the camera; leave out manual=no, or switch that "
+            "one off by its name",
+            where,
+            control.name,
         )
     got = write_control(device, control.id, value)
     if got != value:
-        became = "the driver refuses it" if got is None else f"the driver makes it {got}"
-        raise ConfigError(f"{where}: {control.name}={value}{unit}: {became}; allowed: {control.allowed()}")
+        became = (
+            Message("the driver refuses it") if got is None else Message("the driver makes it {got}", got)
+        )
+        raise ConfigError(
+            "{where}: {name}={value}{unit}: {became}; allowed: {allowed}",
+            where,
+            control.name,
+            value,
+            unit,
+            became,
+            control.allowed(),
+        )
 
 
 def still_automatic(controls: Mapping[int, Control]) -> list[str]:

@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from acquire.errors import Spoken
+from acquire.text import Message
 from acquire.v4l2 import api
 from acquire.v4l2.api import Kernel, try_ioctl
 
@@ -30,7 +32,7 @@ class Identity:
     bus: str
 
     def __str__(self) -> str:
-        return f"{self.card} ({self.driver}, {self.bus})"
+        return Message("{card} ({driver}, {bus})", self.card, self.driver, self.bus)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +53,13 @@ class SizeRange:
     def __str__(self) -> str:
         if self.width[0] == self.width[1] and self.height[0] == self.height[1]:
             return f"{self.width[0]}x{self.height[0]}"
-        return f"{self.width[0]}x{self.height[0]} to {self.width[1]}x{self.height[1]}"
+        return Message(
+            "{width}x{height} to {width2}x{height2}",
+            self.width[0],
+            self.height[0],
+            self.width[1],
+            self.height[1],
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +98,7 @@ class Stamp:
     damaged: bool
 
 
-class NotACamera(Exception):
+class NotACamera(Spoken):
     """The node captures no video, or only in a way that is not supported; the text has the reason."""
 
 
@@ -139,7 +147,9 @@ class V4L2Device:
         if not caps & api.CAP_CAPTURE:
             many = caps & api.CAP_CAPTURE_MPLANE
             raise NotACamera(
-                "multiplanar capture is not supported; use opencv:" if many else "it captures no video"
+                Message("multiplanar capture is not supported; use opencv:")
+                if many
+                else Message("it captures no video")
             )
         if not caps & api.CAP_STREAMING:
             raise NotACamera("it cannot stream into memory")

@@ -9,6 +9,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import replace
 from pathlib import Path
 
+from acquire.text import Message
 from acquire.v4l2.api import Kernel
 from acquire.v4l2.device import Identity, NotACamera, V4L2Device
 
@@ -54,35 +55,43 @@ def find_again(
 
 
 _FAULTS = {
-    errno.ENODEV: "the camera was unplugged or its driver is gone",
-    errno.ENXIO: "the camera was unplugged or its driver is gone",
-    errno.EIO: "the driver reports a fatal error of the stream",
-    errno.EPROTO: "the driver reports a fatal error of the stream (USB protocol)",
-    errno.ENOSPC: "not enough USB bandwidth",
-    errno.ETIMEDOUT: "the camera has stalled",
+    errno.ENODEV: Message("the camera was unplugged or its driver is gone"),
+    errno.ENXIO: Message("the camera was unplugged or its driver is gone"),
+    errno.EIO: Message("the driver reports a fatal error of the stream"),
+    errno.EPROTO: Message("the driver reports a fatal error of the stream (USB protocol)"),
+    errno.ENOSPC: Message("not enough USB bandwidth"),
+    errno.ETIMEDOUT: Message("the camera has stalled"),
 }
 
 
 def fault_in_words(error: OSError) -> str:
     """What a failed request means, for a person."""
     words = _FAULTS.get(error.errno or 0, "a request to the camera failed")
-    return f"{words} ({error.strerror or error})"
+    return Message("{words} ({strerror})", words, error.strerror or error)
 
 
 def why_not_open(path: str, error: OSError, kernel: Kernel) -> str:
     """Why a camera cannot be opened, and what to do."""
     if error.errno == errno.ENOENT:
-        return f"{path}: there is no such device; {cameras_here(kernel)}"
+        return Message("{path}: there is no such device; {cameras_here}", path, cameras_here(kernel))
     if error.errno in (errno.EACCES, errno.EPERM):
-        return (
-            f"{path}: no permission; add yourself to the group that owns it "
-            "(sudo usermod -aG video $USER, then log in again; docs/cameras.md)"
+        return Message(
+            "{path}: no permission; add yourself to the group that owns it (sudo usermod -aG video $USER, then "
+            "log in again; docs/cameras.md)",
+            path,
         )
     if error.errno == errno.EBUSY:
-        return f"{path}: another program holds the camera{_holders(path)}; close it and try again"
+        return Message(
+            "{path}: another program holds the camera{holders}; close it and try again", path, _holders(path)
+        )
     if error.errno == errno.ENOSPC:
-        return f"{path}: not enough USB bandwidth; ask for a smaller picture or rate, or use another USB controller"
-    return f"{path}: {fault_in_words(error)}; unplug it, plug it in again and try once more"
+        return Message(
+            "{path}: not enough USB bandwidth; ask for a smaller picture or rate, or use another USB controller",
+            path,
+        )
+    return Message(
+        "{path}: {fault_in_words}; unplug it, plug it in again and try once more", path, fault_in_words(error)
+    )
 
 
 def _holders(path: str) -> str:
@@ -92,12 +101,17 @@ def _holders(path: str) -> str:
     for process in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
             if any(os.path.realpath(fd) == real for fd in (process / "fd").iterdir()):
-                found.append(f"{(process / 'comm').read_text().strip()}, PID {process.name}")
+                found.append(
+                    Message("{strip}, PID {name}", (process / "comm").read_text().strip(), process.name)
+                )
     others = [words for words in found if not words.endswith(f" {os.getpid()}")]
     return f" ({'; '.join(others)})" if others else ""
 
 
 def cameras_here(kernel: Kernel) -> str:
     """All cameras there are, for messages."""
-    found = [f"{node} ({identity.card})" for node, identity in identities(kernel, kernel.nodes()).items()]
-    return "cameras here: " + (", ".join(found) or "none") + "; see phasedic devices"
+    found = [
+        Message("{node} ({card})", node, identity.card)
+        for node, identity in identities(kernel, kernel.nodes()).items()
+    ]
+    return Message("cameras here: ") + (", ".join(found) or "none") + Message("; see phasedic devices")

@@ -14,22 +14,23 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
 from acquire.frame import frozen
+from acquire.text import Message
 
 Kind = Literal["grey", "luma", "bayer", "jpeg"]
 Plane = Literal["raw", "r", "g", "b"]
 PLANES: tuple[Plane, ...] = ("raw", "r", "g", "b")
 
-LUMA_WARNING = (
-    "luma of a colour stream, limited to 16..235 of 255: black and white levels are clipped unseen below 255; "
-    "a raw grey format measures better"
+LUMA_WARNING = Message(
+    "luma of a colour stream, limited to 16..235 of 255: black and white levels are clipped unseen below "
+    "255; a raw grey format measures better"
 )
-BAYER_WARNING = (
-    "raw mosaic of a colour sensor: neighbouring pixels see different colours, which adds a pattern that does "
-    "not move; use plane=g (half the size), a monochrome camera, or white light on a grey pattern"
+BAYER_WARNING = Message(
+    "raw mosaic of a colour sensor: neighbouring pixels see different colours, which adds a pattern that "
+    "does not move; use plane=g (half the size), a monochrome camera, or white light on a grey pattern"
 )
-JPEG_WARNING = (
-    "compressed pictures: artefacts of 0.6 to 1.7 GL rms that no averaging removes, and displacements biased "
-    "by them; ask for a raw format if the camera has one"
+JPEG_WARNING = Message(
+    "compressed pictures: artefacts of 0.6 to 1.7 GL rms that no averaging removes, and displacements "
+    "biased by them; ask for a raw format if the camera has one"
 )
 
 
@@ -147,7 +148,7 @@ def decode(
     needed = row * (height - 1) + width * pixel_format.bytes_per_pixel
     samples = np.frombuffer(data, np.uint8)
     if samples.size < needed:
-        raise DataError(f"{samples.size} bytes instead of {needed}")
+        raise DataError("{size} bytes instead of {needed}", samples.size, needed)
     rows = np.lib.stride_tricks.as_strided(
         samples, (height, width * pixel_format.bytes_per_pixel), (row, 1), writeable=False
     )
@@ -171,7 +172,7 @@ def _decode_jpeg(data: Any, width: int, height: int) -> NDArray[Any]:
     try:
         picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE)
     except cv2.error as error:
-        raise DataError(f"not a JPEG picture: {error}") from error
+        raise DataError("not a JPEG picture: {error}", error) from error
     if picture is None or picture.shape != (height, width):
         raise DataError("not a JPEG picture of the agreed size")
     gray: NDArray[Any] = picture
@@ -181,9 +182,9 @@ def _decode_jpeg(data: Any, width: int, height: int) -> NDArray[Any]:
 def warning_of(pixel_format: PixelFormat, *, full_range: bool = False, plane: Plane = "raw") -> str | None:
     """What a person should know before measuring with this format; None: nothing."""
     if pixel_format.kind == "luma" and not full_range:
-        return f"{pixel_format.fourcc}: {LUMA_WARNING}"
+        return Message("{fourcc}: {LUMA_WARNING}", pixel_format.fourcc, LUMA_WARNING)
     if pixel_format.kind == "bayer" and plane == "raw":
-        return f"{pixel_format.fourcc}: {BAYER_WARNING}"
+        return Message("{fourcc}: {BAYER_WARNING}", pixel_format.fourcc, BAYER_WARNING)
     if pixel_format.kind == "jpeg":
-        return f"{pixel_format.fourcc}: {JPEG_WARNING}"
+        return Message("{fourcc}: {JPEG_WARNING}", pixel_format.fourcc, JPEG_WARNING)
     return None

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from acquire.camera import CameraListing
+from acquire.text import Message
 from acquire.v4l2.api import Kernel
 from acquire.v4l2.controls import Control, list_controls, still_automatic
 from acquire.v4l2.device import NotACamera, V4L2Device
@@ -23,7 +24,14 @@ OPENCV_NUMBERS = range(4)
 
 def _control_words(control: Control) -> str:
     held = ", held" if control.inactive else ""
-    return f"{control.name}={control.value} ({control.minimum}..{control.maximum}{held})"
+    return Message(
+        "{name}={value} ({minimum}..{maximum}{held})",
+        control.name,
+        control.value,
+        control.minimum,
+        control.maximum,
+        held,
+    )
 
 
 def list_cameras(kernel: Kernel | None = None) -> list[CameraListing]:
@@ -58,39 +66,43 @@ def _listing(node: str, device: V4L2Device) -> CameraListing:
 def _details(device: V4L2Device) -> Iterator[str]:
     inputs = device.inputs()
     if len(inputs) > 1:
-        yield "inputs: " + ", ".join(f"input={k} ({name})" for k, name in enumerate(inputs))
+        yield "inputs: " + ", ".join(Message("input={k} ({name})", k, name) for k, name in enumerate(inputs))
     for offer in device.formats():
-        yield f"format={offer.fourcc:5} {_remark(offer.fourcc) or offer.description}"
+        yield Message(
+            "format={fourcc} {remark}", f"{offer.fourcc:5}", _remark(offer.fourcc) or offer.description
+        )
         yield from (f"    {mode}" for mode in _modes(device, offer.fourcc))
     controls = [control for control in list_controls(device).values() if control.writable]
     if controls:
         yield "controls: " + ", ".join(_control_words(control) for control in controls)
     automatic = still_automatic({control.id: control for control in controls})
     if automatic:
-        yield f"automatic now, put on manual when opened: {', '.join(automatic)}"
+        yield Message("automatic now, put on manual when opened: {join}", ", ".join(automatic))
 
 
 def _modes(device: V4L2Device, fourcc: str) -> tuple[str, ...]:
     modes = []
     for size in device.sizes(fourcc):
         rates = device.rates(fourcc, size.width[1], size.height[1])
-        modes.append(f"{size}" + (f" at {', '.join(f'{rate:g}' for rate in rates)} 1/s" if rates else ""))
+        modes.append(
+            f"{size}" + (Message(" at {join} 1/s", ", ".join(f"{rate:g}" for rate in rates)) if rates else "")
+        )
     return tuple(modes)
 
 
 _REMARKS = {
     "grey": "",
-    "luma": "luma of colour, 220 levels; use a grey format if there is one",
-    "bayer": "raw mosaic of colours; plane=g takes the green pixels",
-    "jpeg": "compressed, only on request: its artefacts do not average out",
+    "luma": Message("luma of colour, 220 levels; use a grey format if there is one"),
+    "bayer": Message("raw mosaic of colours; plane=g takes the green pixels"),
+    "jpeg": Message("compressed, only on request: its artefacts do not average out"),
 }
 
 
 def _remark(fourcc: str) -> str:
     if fourcc not in FORMATS:
-        return "not readable here"
+        return Message("not readable here")
     pixel_format = FORMATS[fourcc]
-    return _REMARKS[pixel_format.kind] or f"raw grey levels, {pixel_format.bits} bits"
+    return _REMARKS[pixel_format.kind] or Message("raw grey levels, {bits} bits", pixel_format.bits)
 
 
 def _stable(node: str) -> str:
@@ -107,6 +119,6 @@ def _opencv_cameras() -> list[CameraListing]:
     for number in OPENCV_NUMBERS:
         opened = capture(number)
         if opened.isOpened():
-            found.append(CameraListing(f"opencv:{number}", "camera known to OpenCV"))
+            found.append(CameraListing(f"opencv:{number}", Message("camera known to OpenCV")))
         opened.release()
     return found

@@ -7,6 +7,7 @@ from typing import Any
 
 from acquire.errors import ConfigError, DeviceError
 from acquire.frame import CameraSetting
+from acquire.text import Message
 from acquire.v4l2 import api
 from acquire.v4l2.controls import (
     Control,
@@ -111,8 +112,10 @@ def set_up(device: V4L2Device, settings: V4L2Settings, where: str) -> Setup:
 def _choose_input(device: V4L2Device, index: int, where: str) -> None:
     names = device.inputs()
     if not 0 <= index < len(names):
-        offered = ", ".join(f"{k} ({name})" for k, name in enumerate(names)) or "none"
-        raise ConfigError(f"{where}: input={index} is not there; the camera has: {offered}")
+        offered = ", ".join(Message("{k} ({name})", k, name) for k, name in enumerate(names)) or "none"
+        raise ConfigError(
+            "{where}: input={index} is not there; the camera has: {offered}", where, index, offered
+        )
     device.select_input(index)
 
 
@@ -122,13 +125,18 @@ def _choose_format(device: V4L2Device, asked: str | None, where: str) -> str:
     if asked is None:
         best = preferred(offered)
         if best is None:
-            hint = "; format=MJPG takes the compressed pictures, with a warning" * bool(usable)
+            hint = Message("; format=MJPG takes the compressed pictures, with a warning") * bool(usable)
             raise DeviceError(
-                f"{where}: offers {_list(offered)}, none of them raw grey levels we can read{hint}"
+                "{where}: offers {list}, none of them raw grey levels we can read{hint}",
+                where,
+                _list(offered),
+                hint,
             )
         return best
     if asked not in usable:
-        raise ConfigError(f"{where}: format={asked} is not possible; the camera offers {_list(usable)}")
+        raise ConfigError(
+            "{where}: format={asked} is not possible; the camera offers {list}", where, asked, _list(usable)
+        )
     return asked
 
 
@@ -143,17 +151,31 @@ def _set_format(device: V4L2Device, fourcc: str, settings: V4L2Settings, where: 
     got = device.mode()
     if got.field in api.FIELDS_APART:
         raise ConfigError(
-            f"{where}: gives interlaced fields one by one ({api.FIELDS_APART[got.field]}), not pictures; choose a "
-            "progressive input (input=) or mode of the source"
+            "{where}: gives interlaced fields one by one ({FIELDS_APART}), not pictures; choose a progressive "
+            "input (input=) or mode of the source",
+            where,
+            api.FIELDS_APART[got.field],
         )
     if got.fourcc != fourcc:
-        raise ConfigError(f"{where}: asked for format={fourcc}, the driver gives {got.fourcc}; ask for that")
+        raise ConfigError(
+            "{where}: asked for format={fourcc}, the driver gives {fourcc2}; ask for that",
+            where,
+            fourcc,
+            got.fourcc,
+        )
     asked = (settings.width or got.width, settings.height or got.height)
     if (got.width, got.height) != asked:
         sizes = _list([str(size) for size in device.sizes(fourcc)])
         raise ConfigError(
-            f"{where}: asked for {asked[0]}x{asked[1]}, the driver gives {got.width}x{got.height}; "
-            f"{fourcc} is offered in {sizes}"
+            "{where}: asked for {asked}x{asked2}, the driver gives {width}x{height}; {fourcc} is offered in "
+            "{sizes}",
+            where,
+            asked[0],
+            asked[1],
+            got.width,
+            got.height,
+            fourcc,
+            sizes,
         )
 
 
@@ -162,10 +184,17 @@ def _set_fps(device: V4L2Device, fourcc: str, fps: float, where: str) -> None:
     mode = device.mode()
     if mode.fps is None or abs(mode.fps - fps) > 0.01 * fps:
         rates = _list([f"{rate:g}" for rate in device.rates(fourcc, mode.width, mode.height)])
-        given = "no frame rate at all" if mode.fps is None else f"{mode.fps:g}"
+        given = Message("no frame rate at all") if mode.fps is None else f"{mode.fps:g}"
         raise ConfigError(
-            f"{where}: asked for fps={fps:g}, the driver gives {given}; "
-            f"{fourcc} {mode.width}x{mode.height} is offered at {rates} 1/s"
+            "{where}: asked for fps={fps:g}, the driver gives {given}; {fourcc} {width}x{height} is offered at "
+            "{rates} 1/s",
+            where,
+            fps,
+            given,
+            fourcc,
+            mode.width,
+            mode.height,
+            rates,
         )
 
 
@@ -176,12 +205,16 @@ def _in_force(device: V4L2Device, settings: V4L2Settings, controls: dict[int, Co
     warnings = [warning_of(pixel_format, full_range=mode.full_range, plane=settings.plane)]
     if automatic:
         warnings.append(
-            f"the camera goes on changing by itself: {', '.join(automatic)}; grey levels may drift"
+            Message(
+                "the camera goes on changing by itself: {join}; grey levels may drift", ", ".join(automatic)
+            )
         )
     if mode.field in api.FIELDS_WOVEN:
         warnings.append(
-            "interlaced: odd and even rows are of two moments, and what moves is torn between them; choose a "
-            "progressive input (input=) or mode of the source"
+            Message(
+                "interlaced: odd and even rows are of two moments, and what moves is torn between them; choose a "
+                "progressive input (input=) or mode of the source"
+            )
         )
     return Setup(
         mode=mode,

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
 from analysis.evaluate.curve import Loading, UncertainValue, first_crossing, noise, reading
 from analysis.evaluate.figure import Figure
 
@@ -163,7 +164,7 @@ def chord(loading: Loading, line: FittedLine, beyond: float = 0.0) -> Figure:
     )
     rise, run = s1.value - s0.value, e1.value - e0.value
     if not (rise > 0 and run > 0):
-        return Figure.none("the two ends of the interval do not differ")
+        return Figure.none(Message("the two ends of the interval do not differ"))
     share = math.hypot(math.hypot(e0.sigma, e1.sigma) / run, math.hypot(s0.sigma, s1.sigma) / rise)
     return Figure.about(rise / run, rise / run * math.hypot(share, beyond))
 
@@ -178,12 +179,16 @@ def poisson(loading: Loading, line: FittedLine) -> Figure:
     n = int(known.sum())
     if n < MIN_POINTS:
         return Figure.none(
-            f"the transverse strain is known at {n} points of the elastic part, {MIN_POINTS} are needed"
+            Message(
+                "the transverse strain is known at {n} points of the elastic part, {MIN_POINTS} are needed",
+                n,
+                MIN_POINTS,
+            )
         )
     ds, dt = stress[known] - stress[known].mean(), across[known] - across[known].mean()
     sss = float(ds @ ds) - (n - 1) * loading.noise_stress**2
     if not sss > 0:
-        return Figure.none("the stress does not rise above its noise in the elastic part")
+        return Figure.none(Message("the stress does not rise above its noise in the elastic part"))
     slope = -float(ds @ dt) / sss
     rest = dt + slope * ds
     sigma = math.sqrt(float(rest @ rest) / (n - 2) / sss)
@@ -201,16 +206,23 @@ def poisson_between(loading: Loading, low: float, high: float) -> Figure:
     n, reached = int(used.sum()), float(np.nanmax(along))
     if n < MIN_POINTS:
         return Figure.none(
-            f"{n} points between the strains {100 * low:g} and {100 * high:g} %, {MIN_POINTS} are needed"
-            f" (the strain reaches {100 * reached:.2g} %)"
+            Message(
+                "{n} points between the strains {low:g} and {high:g} %, {MIN_POINTS} are needed (the strain reaches "
+                "{reached:.2g} %)",
+                n,
+                100 * low,
+                100 * high,
+                MIN_POINTS,
+                100 * reached,
+            )
         )
     x, y = along[used] - along[used].mean(), across[used] - across[used].mean()
     sxx = float(x @ x) - (n - 1) * noise(loading.elastic) ** 2
     if not sxx > 0:
-        return Figure.none("the strain does not rise above its noise there")
+        return Figure.none(Message("the strain does not rise above its noise there"))
     slope = float(x @ y) / sxx
     rest = y - slope * x
-    words = f"strains {100 * low:g} to {100 * min(high, reached):.3g} %"
+    words = Message("strains {low:g} to {min:.3g} %", 100 * low, 100 * min(high, reached))
     return Figure.about(-slope, math.sqrt(float(rest @ rest) / (n - 2) / sxx), n - 2, words)
 
 
@@ -227,7 +239,7 @@ def not_uniform(loading: Loading, line: FittedLine) -> str:
     share = float(
         np.nanmedian(uneven * noise_free) / np.nanmedian(np.abs(loading.elastic[half] - line.strain0))
     )
-    return f"the strain varies by {share:.0%} over the region" if share > _UNEVEN_SHARE else ""
+    return Message("the strain varies by {share:.0%} over the region", share) if share > _UNEVEN_SHARE else ""
 
 
 def principal_direction(exx: Floats, eyy: Floats, exy: Floats) -> Figure:
@@ -244,12 +256,14 @@ def principal_direction(exx: Floats, eyy: Floats, exy: Floats) -> Figure:
     known = np.isfinite(exx) & np.isfinite(eyy) & np.isfinite(exy)
     n = int(known.sum())
     if n < MIN_POINTS:
-        return Figure.none(f"strains are known at {n} instants, {MIN_POINTS} are needed")
+        return Figure.none(
+            Message("strains are known at {n} instants, {MIN_POINTS} are needed", n, MIN_POINTS)
+        )
     cloud = np.stack([exx[known] - eyy[known], 2 * exy[known]])
     moved = cloud - cloud.mean(axis=1, keepdims=True)
     away = np.hypot(cloud[0] - cloud[0, 0], cloud[1] - cloud[1, 0])
     if away.max() <= _CLEAR * math.hypot(noise(cloud[0]), noise(cloud[1])):
-        return Figure.none("the strains hardly change")
+        return Figure.none(Message("the strains hardly change"))
     xx, xy, yy = float(moved[0] @ moved[0]), float(moved[0] @ moved[1]), float(moved[1] @ moved[1])
     turn = 0.5 * math.atan2(2 * xy, xx - yy)
     line = np.array([math.cos(turn), math.sin(turn)])

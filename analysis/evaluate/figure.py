@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from acquire.text import Message
+
 CONFIDENCE = 0.95
 """Of all intervals here; they hold the scatter of strain and force, and that of E the stated limits of error."""
 
-AT_LEAST = "at least"
+AT_LEAST = Message("at least")
 """Qualifier of a bound: what lies above it was not seen."""
 
 

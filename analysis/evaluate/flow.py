@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from acquire.text import Message
 from analysis.evaluate.curve import Floats, Loading
 from analysis.evaluate.elastic import MIN_POINTS, FittedLine
 from analysis.evaluate.figure import Figure, quantile
@@ -82,7 +83,9 @@ def anisotropy(loading: Loading, line: FittedLine, nu: Figure) -> Figure:
         return Figure.none(_few(int(np.count_nonzero(used)), low, min(high, reached)))
     slope, sigma, n = _slope(part.along[used], part.across[used])
     if not -1 < slope < 0:
-        return Figure.none("the width does not shrink as the length grows: is the load along the axis?")
+        return Figure.none(
+            Message("the width does not shrink as the length grows: is the load along the axis?")
+        )
     share, _, _ = _slope(part.along[used], part.elastic[used])
     sigma_nu = (nu.high - nu.low) / 2 / quantile()
     # nu is made with E, so E changes the elastic strain of the length alone; for another nu this is more than enough.
@@ -179,12 +182,16 @@ def _slope(x: Floats, y: Floats) -> tuple[float, float, int]:
 
 
 def _over(low: float, high: float) -> str:
-    return f"plastic strains {100 * low:.3g} to {100 * high:.3g} %"
+    return Message("plastic strains {low:.3g} to {high:.3g} %", 100 * low, 100 * high)
 
 
 def _short(reached: float, needed: float) -> str:
-    return f"the plastic strain reaches {100 * max(reached, 0.0):.2g} %, {100 * needed:g} % is needed"
+    return Message(
+        "the plastic strain reaches {max:.2g} %, {needed:g} % is needed",
+        100 * max(reached, 0.0),
+        100 * needed,
+    )
 
 
 def _few(n: int, low: float, high: float) -> str:
-    return f"{n} points over {_over(low, high)}, {MIN_POINTS} are needed"
+    return Message("{n} points over {over}, {MIN_POINTS} are needed", n, _over(low, high), MIN_POINTS)

@@ -13,19 +13,22 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from acquire.text import Message
 from analysis.evaluate.curve import Curve, Floats, broken_at, noise, smoothed
 
 Kind = Literal["tensile", "compression", "cyclic", "relaxation", "creep"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 _NAMES = {
-    "tensile": "a tensile test",
-    "compression": "a test in compression",
-    "cyclic": "a cyclic test",
-    "relaxation": "a hold of strain (relaxation)",
-    "creep": "a hold of stress (creep)",
+    "tensile": Message("a tensile test"),
+    "compression": Message("a test in compression"),
+    "cyclic": Message("a cyclic test"),
+    "relaxation": Message("a hold of strain (relaxation)"),
+    "creep": Message("a hold of stress (creep)"),
 }
 
-_NEGATIVE = ": the force is negative; where the specimen is pulled its sign is wrong (--load-sign -1)"
+_NEGATIVE = Message(
+    ": the force is negative; where the specimen is pulled its sign is wrong (--load-sign -1)"
+)
 _FEWEST = 8  # points that a course is judged by
 _SURE = 6.0  # standard deviations of the noise
 _REVERSAL = 0.2  # of the range of the stress: a smaller fall and rise is none
@@ -66,7 +69,9 @@ class KindOfTest:
         if given == "auto":
             return cls(found, _NAMES[found] + how, None if found == "tensile" else end)
         kind = next(one for one in KINDS if one == given)
-        return cls(kind, f"{_NAMES[kind]}, as given", end if kind == found != "tensile" else None)
+        return cls(
+            kind, Message("{NAMES}, as given", _NAMES[kind]), end if kind == found != "tensile" else None
+        )
 
     @property
     def why(self) -> str:
@@ -74,7 +79,7 @@ class KindOfTest:
         return (
             ""
             if self.kind == "tensile"
-            else f"this is {self.words}; [specimen] test = 'tensile' if it is none"
+            else Message("this is {words}; [specimen] test = 'tensile' if it is none", self.words)
         )
 
     def first_rise(self, curve: Curve) -> Curve:
@@ -101,12 +106,12 @@ def _found(curve: Curve) -> tuple[Kind, str, int | None]:
     turns = reversals(stress, max(_REVERSAL * float(np.ptp(stress)), _SURE * sigma))
     peaks = [k for k in turns if stress[k] > 0 and stress[k] >= stress[turns].mean()]
     if peaks and _is_cyclic(strain, stress, turns, peaks[0]):
-        return "cyclic", f", whose stress turns round {len(turns)} times", int(known[peaks[0]])
+        return "cyclic", Message(", whose stress turns round {len} times", len(turns)), int(known[peaks[0]])
     held = _hold(t, strain, stress)
     if held is None:
         return "tensile", "", None
     kind, since = held
-    return kind, f" from {t[since]:.4g} s on", int(known[since])
+    return kind, Message(" from {t:.4g} s on", t[since]), int(known[since])
 
 
 def _noise(curve: Curve) -> float:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from acquire.text import Message
 from analysis.evaluate.curve import Floats, Loading, first_crossing
 from analysis.evaluate.elastic import FittedLine
 from analysis.evaluate.figure import Figure
@@ -19,7 +20,7 @@ def strain_rate(loading: Loading, first: int, last: int, bands: tuple[Band, ...]
     """The slope of strain over time, held against the bands of a standard."""
     t, strain = (loading.t - loading.idle)[first:last], loading.strain[first:last]
     if len(t) < 3 or np.ptp(t) == 0:
-        return Figure.none(f"{len(t)} points of that part are known")
+        return Figure.none(Message("{len} points of that part are known", len(t)))
     dt, de = t - t.mean(), strain - strain.mean()
     stt = float(dt @ dt)
     slope = float(dt @ de) / stt
@@ -52,10 +53,16 @@ def _against(rate: float, parts: list[float], bands: tuple[Band, ...]) -> str:
     inside = [band for band in bands if band.low <= rate <= band.high]
     if inside:
         kept = all(inside[0].low <= one <= inside[0].high for one in parts)
-        tenths = "" if kept else f" on average, its tenths at {min(parts):.2g} to {max(parts):.2g} 1/s"
-        return f"within {inside[0].name}{tenths}"
-    allowed = ", ".join(f"{band.name} {band.low:.2g} to {band.high:.2g} 1/s" for band in bands)
-    return f"outside the standard ({allowed})"
+        tenths = (
+            ""
+            if kept
+            else Message(" on average, its tenths at {min:.2g} to {max:.2g} 1/s", min(parts), max(parts))
+        )
+        return Message("within {name}{tenths}", inside[0].name, tenths)
+    allowed = ", ".join(
+        Message("{name} {low:.2g} to {high:.2g} 1/s", band.name, band.low, band.high) for band in bands
+    )
+    return Message("outside the standard ({allowed})", allowed)
 
 
 def seconds_of(loading: Loading, standard: Standard) -> Figure:
@@ -66,5 +73,10 @@ def seconds_of(loading: Loading, standard: Standard) -> Figure:
     wanted, words = standard.seconds_to_break, ""
     if wanted and loading.broke:
         inside = wanted[0] <= value <= wanted[1]
-        words = f"{'within' if inside else 'outside'} {wanted[0]:g} to {wanted[1]:g} s of the standard"
+        words = Message(
+            "{value} {wanted:g} to {wanted2:g} s of the standard",
+            "within" if inside else "outside",
+            wanted[0],
+            wanted[1],
+        )
     return Figure(value, value - step, value + step, words)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from acquire.text import Message
 from analysis.evaluate.curve import Curve, Loading, first_crossing, noise, reading
 from analysis.evaluate.elastic import (
     FILM,
@@ -113,8 +114,10 @@ def _of_film(figures: TensileFigures, limit: float | None) -> TensileFigures:
 def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:
     loading, strength = Loading.of(curve), tensile_strength(curve)
     if loading.n < MIN_POINTS or loading.stress[loading.top] <= 0:
-        words = (
-            f"strain and a tensile stress are known together at {loading.n} points, {MIN_POINTS} are needed"
+        words = Message(
+            "strain and a tensile stress are known together at {n} points, {MIN_POINTS} are needed",
+            loading.n,
+            MIN_POINTS,
         )
         return replace(_nothing(words, options), Rm=strength)
     if not strength.known:
@@ -134,7 +137,7 @@ class _Elastic:
 
 def _elastic(loading: Loading, options: TensileOptions) -> _Elastic | str:
     """The elastic line and what its interval hangs on, found in turns until they agree; or why there is none."""
-    limit, zero = 0.5 * float(loading.stress[loading.top]), StrainZero(0.0, "as measured")
+    limit, zero = 0.5 * float(loading.stress[loading.top]), StrainZero(0.0, Message("as measured"))
     found: _Elastic | None = None
     for _ in range(_ROUNDS):
         first, last, words = _interval(loading, options.standard, limit, zero.strain)
@@ -142,12 +145,17 @@ def _elastic(loading: Loading, options: TensileOptions) -> _Elastic | str:
             break
         line = line_through(loading, first, last)
         if line is None:
-            return f"{last - first} points {words}, and {MIN_POINTS} that rise are needed"
+            return Message(
+                "{last} points {words}, and {MIN_POINTS} that rise are needed",
+                last - first,
+                words,
+                MIN_POINTS,
+            )
         zero = _zero(loading, options, line)
         found = _Elastic(line, yield_point(loading, line), zero)
         known = [f for f in (found.flow.upper, proof_strength(loading, line, 0.002)) if f.known]
         limit = known[0].value if known else float(loading.stress[loading.top])
-    return found or "no points"
+    return found or Message("no points")
 
 
 def _interval(loading: Loading, standard: Standard, limit: float, zero: float) -> tuple[int, int, str]:
@@ -156,25 +164,32 @@ def _interval(loading: Loading, standard: Standard, limit: float, zero: float) -
     low, high = rule.low, rule.high
     if rule.by == "yield":
         first, last = between(loading.level[: loading.top + 1], low * limit, high * limit)
-        return first, last, f"between {100 * low:g} % and {100 * high:g} % of the yield strength"
+        return (
+            first,
+            last,
+            Message("between {low:g} % and {high:g} % of the yield strength", 100 * low, 100 * high),
+        )
     if standard.brittle and course[-1] < standard.brittle[0]:
         low, high = (share * float(course[-1]) for share in standard.brittle[1:])
-    return *between(course, low, high), f"between the strains {100 * low:.3g} % and {100 * high:.3g} %"
+    return *between(course, low, high), Message(
+        "between the strains {low:.3g} % and {high:.3g} %", 100 * low, 100 * high
+    )
 
 
 def _zero(loading: Loading, options: TensileOptions, line: FittedLine) -> StrainZero:
     if options.zero == "toe":
-        return StrainZero(line.strain0, "where the elastic line has no stress (toe compensation)")
+        return StrainZero(line.strain0, Message("where the elastic line has no stress (toe compensation)"))
     if options.zero == "raw":
-        return StrainZero(0.0, "as measured")
+        return StrainZero(0.0, Message("as measured"))
     at = first_crossing(loading.level, options.preload)
     if math.isnan(at):
         return StrainZero(
-            float(loading.strain[0]), "the first value; the preload was there from the beginning or never"
+            float(loading.strain[0]),
+            Message("the first value; the preload was there from the beginning or never"),
         )
     k = int(at)
     value = reading(loading.strain, at, k - MIN_POINTS, k + MIN_POINTS, loading.noise_strain).value
-    return StrainZero(value, "where the stress first reached the preload")
+    return StrainZero(value, Message("where the stress first reached the preload"))
 
 
 def _with_line(
@@ -227,7 +242,7 @@ def _poisson(loading: Loading, line: FittedLine, standard: Standard) -> Figure:
 
 
 def _without_flow(figures: TensileFigures) -> TensileFigures:
-    none = Figure.none(f"not a figure of {figures.standard}")
+    none = Figure.none(Message("not a figure of {standard}", figures.standard))
     return replace(
         figures, Rp01=none, Rp02=none, Rp1=none, ReH=none, ReL=none, Ag=none, A=none, r=none, n=none
     )
@@ -235,7 +250,7 @@ def _without_flow(figures: TensileFigures) -> TensileFigures:
 
 def _without_line(loading: Loading, options: TensileOptions, why: str) -> TensileFigures:
     zero = 0.0 if options.zero != "preload" else float(loading.strain[0])
-    how = "as measured" if options.zero != "preload" else "the first value"
+    how = Message("as measured") if options.zero != "preload" else Message("the first value")
     return replace(
         _nothing(f"no elastic line: {why}", options),
         Agt=_from_zero(strain_at_top(loading), zero),
@@ -248,7 +263,7 @@ def _without_line(loading: Loading, options: TensileOptions, why: str) -> Tensil
 def _nothing(why: str, options: TensileOptions) -> TensileFigures:
     texts: dict[str, Any] = {
         "span": None,
-        "zero": StrainZero(0.0, "as measured"),
+        "zero": StrainZero(0.0, Message("as measured")),
         "standard": options.standard.name,
         "r2": math.nan,
         "strain": "",

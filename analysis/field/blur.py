@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
 from analysis.field.strain_field import StrainField
 from analysis.field.uncertainty import Floats, fixed_sum, variance_of_sum
 
@@ -27,7 +28,12 @@ class Blur(NamedTuple):
         """In words, "less sharp by 0.41 ± 0.02 px"; empty where it is not known."""
         if not math.isfinite(self.px):
             return ""
-        return f"{'less sharp' if self.px >= 0 else 'sharper'} by {abs(self.px):.2f} ± {self.sigma:.2f} px"
+        return Message(
+            "{value} by {abs:.2f} ± {sigma:.2f} px",
+            "less sharp" if self.px >= 0 else "sharper",
+            abs(self.px),
+            self.sigma,
+        )
 
 
 def mean_blur(field: StrainField) -> Blur:

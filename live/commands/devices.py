@@ -14,8 +14,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic devices``."""
     from acquire.camera import list_cameras
-    from acquire.printable import printable
     from acquire.serial_line.ports import list_serial_ports
+    from acquire.text.printable import printable
     from analysis import threads
 
     cameras, ports = list_cameras(), list_serial_ports()

@@ -11,7 +11,7 @@ from pathlib import Path
 from acquire.addresses import parse_address
 from acquire.errors import DeviceError
 from acquire.files.picture import write_picture
-from acquire.printable import printable
+from acquire.text.printable import printable
 from live.commands.exit_codes import LOSS
 from live.commands.options import (
     PICTURES,

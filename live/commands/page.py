@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import PhasedicError
-from acquire.printable import brief
+from acquire.text.printable import brief
 from live.commands.attended import open_page
 from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.init import find_devices

@@ -118,7 +118,7 @@ def write_report(folder: Path, screen: Screen) -> str:
         screen.print(f"  {folder / 'report.html'}")
     except PhasedicError as error:
         screen.print(f"warning: no report was made: {error}")
-        return str(error)
+        return error.text
     return ""
 
 

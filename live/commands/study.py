@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.errors import ConfigError
-from acquire.printable import counted
+from acquire.text.printable import counted
 from live.commands.options import (
     add_config_file,
     add_help_all,

@@ -75,7 +75,9 @@ def _of_file(first: Config, name: str, overrides: Mapping[str, Any]) -> Config:
     own = load_config(Path(name), of_all)
     if not own.camera.address or other_cameras(own):
         raise ConfigError(
-            f"{name}: give camera.address, and no camera.back or camera.beside: this is the file of a further camera"
+            "{name}: give camera.address, and no camera.back or camera.beside: this is the file of a further "
+            "camera",
+            name,
         )
     return _joined(first, own)
 

@@ -48,7 +48,7 @@ def make_gauge(name: str, table: GaugeTable, axis: str) -> Gauge:
     try:
         return GAUGE_KINDS[table.get("kind", DEFAULT_KIND)].of(name, table, axis)
     except ValueError as error:
-        raise ConfigError(f"gauges.{name}: {error}") from None
+        raise ConfigError("gauges.{name}: {error}", name, error) from None
 
 
 def gauges_for(tables: Mapping[str, GaugeTable], axis: str, grid: ZoiGrid) -> tuple[Gauge, ...]:
@@ -69,9 +69,13 @@ def _check_zois(gauge: Gauge, grid: ZoiGrid) -> None:
     if all(mask.any() for mask in gauge.zois(grid)):
         return
     raise ConfigError(
-        f"gauges.{gauge.name}: no ZOI is there; the centres of ZOIs reach from {grid.x[0]:g}, {grid.y[0]:g} to"
-        f" {grid.x[-1]:g}, {grid.y[-1]:g} px, and a mask may leave some out;"
-        " move or widen the gauge, or take it out of the configuration"
+        "gauges.{name}: no ZOI is there; the centres of ZOIs reach from {x:g}, {y:g} to {x2:g}, {y2:g} px, "
+        "and a mask may leave some out; move or widen the gauge, or take it out of the configuration",
+        gauge.name,
+        grid.x[0],
+        grid.y[0],
+        grid.x[-1],
+        grid.y[-1],
     )
 
 

@@ -20,6 +20,7 @@ from typing import Any, TypeVar
 from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
+from acquire.text import Message
 from live.config.channels import channel_names
 from live.config.gauges import DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_checks
 from live.config.sections import (
@@ -42,8 +43,9 @@ from live.config.values import AUTO, Check, Option, in_px
 Section = TypeVar("Section")
 MAX_BYTES = 10**6  # of a configuration file
 _REMOVED_KEYS = {
-    ("measure", "shorten_bursts"): "a burst keeps its length; leave it out, and take a smaller measure.burst"
-    " where the picture moves",
+    ("measure", "shorten_bursts"): Message(
+        "a burst keeps its length; leave it out, and take a smaller measure.burst where the picture moves"
+    ),
 }
 """Keys of earlier versions, with advice: left out of a stored configuration, refused in a new one."""
 
@@ -106,7 +108,9 @@ def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
     ConfigError
         Missing or malformed file, unknown key, wrong type, impossible value.
     """
-    return _overlaid({} if path is None else _read_toml(path), overrides, str(path or "command line"))
+    return _overlaid(
+        {} if path is None else _read_toml(path), overrides, str(path or Message("command line"))
+    )
 
 
 def from_dict(stored: Mapping[str, Any], overrides: Mapping[str, Any], where: str) -> Config:
@@ -138,7 +142,7 @@ def lens_in(path: Path) -> dict[str, Any]:
     """The section [lens] of a file; raises ConfigError."""
     table = _plain_toml(path).get("lens")
     if not isinstance(table, Mapping):
-        raise ConfigError(f"{path}: has no section [lens]; phasedic lens makes one")
+        raise ConfigError("{path}: has no section [lens]; phasedic lens makes one", path)
     return dict(table)
 
 
@@ -174,15 +178,15 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 def _plain_toml(path: Path) -> dict[str, Any]:
     if not path.exists():
-        raise ConfigError(f"{path}: there is no such configuration file")
+        raise ConfigError("{path}: there is no such configuration file", path)
     try:
         return tomllib.loads(read_bytes(path, MAX_BYTES).decode("utf-8-sig"))
     except (DataError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read ({error}); give a text file in TOML") from None
+        raise ConfigError("{path}: cannot be read ({error}); give a text file in TOML", path, error) from None
     except RecursionError:
-        raise ConfigError(f"{path}: not valid TOML: too many brackets within brackets") from None
+        raise ConfigError("{path}: not valid TOML: too many brackets within brackets", path) from None
     except ValueError as error:  # of TOML, and a number with thousands of digits
-        raise ConfigError(f"{path}: not valid TOML: {error}") from None
+        raise ConfigError("{path}: not valid TOML: {error}", path, error) from None
 
 
 def _build(tree: Mapping[str, Any], where: str) -> Config:
@@ -191,11 +195,13 @@ def _build(tree: Mapping[str, Any], where: str) -> Config:
     px_per_mm = _px_per_mm(tree, where)
     for name, content in tree.items():
         if name not in known:
-            raise ConfigError(f"{where}: unknown section [{name}]{_suggestion(name, known)}")
+            raise ConfigError(
+                "{where}: unknown section [{name}]{suggestion}", where, name, _suggestion(name, known)
+            )
         if name == "alarm":
             parts[name] = _alarms(content, where)
         elif not isinstance(content, Mapping):
-            raise ConfigError(f"{where}: {name} must be a section, [{name}] with keys below it")
+            raise ConfigError("{where}: {name} must be a section, [{name}] with keys below it", where, name)
         elif name == "metadata":
             parts[name] = dict(content)
         elif name == "gauges":
@@ -234,14 +240,31 @@ def _accepted(
     values = {}
     for key, value in content.items():
         if (name, key) in _REMOVED_KEYS:
-            raise ConfigError(f"{where}: {name}.{key} is withdrawn: {_REMOVED_KEYS[name, key]}")
+            raise ConfigError(
+                "{where}: {name}.{key} is withdrawn: {REMOVED_KEYS}",
+                where,
+                name,
+                key,
+                _REMOVED_KEYS[name, key],
+            )
         if key not in checks:
-            raise ConfigError(f"{where}: unknown key {name}.{key}{_suggestion(key, list(checks))}")
+            raise ConfigError(
+                "{where}: unknown key {name}.{key}{suggestion}",
+                where,
+                name,
+                key,
+                _suggestion(key, list(checks)),
+            )
         try:
             values[key] = checks[key].accept(in_px(value, checks[key], px_per_mm))
         except NotAllowed as allowed:
             raise ConfigError(
-                f"{where}: {name}.{key} = {_short_repr(value)} is not possible; allowed: {allowed}"
+                "{where}: {name}.{key} = {short_repr} is not possible; allowed: {allowed}",
+                where,
+                name,
+                key,
+                _short_repr(value),
+                allowed,
             ) from None
     return values
 
@@ -249,9 +272,11 @@ def _accepted(
 def _named_table(dotted: str, table: Any, where: str) -> Mapping[str, Any]:
     """The table ``section.NAME``; raises ConfigError for an impossible name."""
     if not NAME_PATTERN.fullmatch(dotted.partition(".")[2]):
-        raise ConfigError(f"{where}: {dotted}: a name has up to 32 letters, digits and _, a letter first")
+        raise ConfigError(
+            "{where}: {dotted}: a name has up to 32 letters, digits and _, a letter first", where, dotted
+        )
     if not isinstance(table, Mapping):
-        raise ConfigError(f"{where}: {dotted} must be a table, [{dotted}] with keys below it")
+        raise ConfigError("{where}: {dotted} must be a table, [{dotted}] with keys below it", where, dotted)
     return table
 
 
@@ -259,7 +284,7 @@ def _plate(name: str, table: Any, where: str, px_per_mm: float | None) -> PlateC
     dotted = f"plate.{name}"
     plate = _section(PlateConfig, dotted, _named_table(dotted, table, where), where, px_per_mm)
     if plate.box is None:
-        raise ConfigError(f"{where}: {dotted}: give box = [x, y, width, height] in px")
+        raise ConfigError("{where}: {dotted}: give box = [x, y, width, height] in px", where, dotted)
     return plate
 
 
@@ -273,15 +298,16 @@ def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:
     if isinstance(content, Mapping):  # by number, as stored in files
         content = list(content.values())
     if not isinstance(content, list | tuple) or not all(isinstance(table, Mapping) for table in content):
-        raise ConfigError(f"{where}: alarm must be tables, [[alarm]] with keys below it")
+        raise ConfigError("{where}: alarm must be tables, [[alarm]] with keys below it", where)
     alarms = tuple(
-        _section(AlarmConfig, f"alarm {number}", table, where) for number, table in enumerate(content, 1)
+        _section(AlarmConfig, Message("alarm {number}", number), table, where)
+        for number, table in enumerate(content, 1)
     )
     for number, alarm in enumerate(alarms, 1):
         if (alarm.above is None) is (alarm.below is None):
-            raise ConfigError(f"{where}: alarm {number}: give one of above and below")
+            raise ConfigError("{where}: alarm {number}: give one of above and below", where, number)
         if alarm.end_on_unknown and not alarm.end:
-            raise ConfigError(f"{where}: alarm {number}: end_on_unknown needs end = true")
+            raise ConfigError("{where}: alarm {number}: end_on_unknown needs end = true", where, number)
     return alarms
 
 
@@ -290,11 +316,18 @@ def _check_channels(config: Config, where: str) -> None:
     gauges = dict.fromkeys((*config.gauges, *placed))
     measured, known = channel_names(gauges), channel_names(gauges, system=True)
     used = [("strain_out", channel, measured) for channel in config.strain_out.channels or ()]
-    used += [(f"alarm {number}", alarm.channel, known) for number, alarm in enumerate(config.alarm, 1)]
+    used += [
+        (Message("alarm {number}", number), alarm.channel, known)
+        for number, alarm in enumerate(config.alarm, 1)
+    ]
     for whose, channel, names in used:
         if channel not in names:
             raise ConfigError(
-                f"{where}: {whose}: unknown channel {channel!r}{_suggestion(channel, list(names))}"
+                "{where}: {whose}: unknown channel {channel}{suggestion}",
+                where,
+                whose,
+                repr(channel),
+                _suggestion(channel, list(names)),
             )
 
 
@@ -305,17 +338,17 @@ def _check_metadata(metadata: Mapping[str, Any], where: str) -> None:
             or value in (math.inf, -math.inf)
             or value != value
         ):
-            raise ConfigError(f"{where}: metadata.{key} must be a text or a number, in one line")
+            raise ConfigError("{where}: metadata.{key} must be a text or a number, in one line", where, key)
 
 
 def _short_repr(value: Any) -> str:
     try:
         return reprlib.repr(value)
     except ValueError:  # thousands of digits
-        return "this number"
+        return Message("this number")
 
 
 def _suggestion(word: str, known: list[str]) -> str:
     near = difflib.get_close_matches(word, known, 1)
-    meant = f" (did you mean {near[0]}?)" if near else ""
-    return f"{meant}; known: {', '.join(known)}"
+    meant = Message(" (did you mean {near}?)", near[0]) if near else ""
+    return Message("{meant}; known: {join}", meant, ", ".join(known))

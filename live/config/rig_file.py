@@ -30,7 +30,7 @@ def new_rig(path: Path, text: str, changes: Mapping[str, Any] | None = None) -> 
         The file exists (nothing is overwritten) or cannot be written, or the text is not a configuration.
     """
     if path.exists() or path.is_symlink():
-        raise ConfigError(f"{path} exists; nothing is overwritten, choose another name")
+        raise ConfigError("{path} exists; nothing is overwritten, choose another name", path)
     return _write_checked(path, _changed(_parsed(text, path), changes or {}, path))
 
 
@@ -57,7 +57,9 @@ def _changed(document: TOMLDocument, changes: Mapping[str, Any], path: Path) -> 
     for dotted, value in changes.items():
         section, _, key = dotted.partition(".")
         if not key:
-            raise ConfigError(f"{path}: {dotted}: a change names a section and a key, as measure.zoi")
+            raise ConfigError(
+                "{path}: {dotted}: a change names a section and a key, as measure.zoi", path, dotted
+            )
         _change(document, section, key, value, path)
     return document.as_string()
 
@@ -68,7 +70,7 @@ def _read(path: Path) -> TOMLDocument:
     try:
         return _parsed(read_bytes(path, MAX_BYTES).decode("utf-8-sig"), path)
     except (DataError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read ({error}); give a text file in TOML") from None
+        raise ConfigError("{path}: cannot be read ({error}); give a text file in TOML", path, error) from None
 
 
 def _parsed(text: str, path: Path) -> TOMLDocument:
@@ -78,9 +80,9 @@ def _parsed(text: str, path: Path) -> TOMLDocument:
     try:
         return tomlkit.parse(text)
     except RecursionError:
-        raise ConfigError(f"{path}: not valid TOML: too many brackets within brackets") from None
+        raise ConfigError("{path}: not valid TOML: too many brackets within brackets", path) from None
     except (TOMLKitError, ValueError) as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}") from None
+        raise ConfigError("{path}: not valid TOML: {error}", path, error) from None
 
 
 def _change(document: TOMLDocument, section: str, key: str, value: Any, path: Path) -> None:
@@ -92,7 +94,9 @@ def _change(document: TOMLDocument, section: str, key: str, value: Any, path: Pa
         document.add(section, tomlkit.table(is_super_table=section in ("gauges", "plate")))
     table: Any = document[section]
     if not isinstance(table, Mapping):
-        raise ConfigError(f"{path}: {section} must be a section, [{section}] with keys below it")
+        raise ConfigError(
+            "{path}: {section} must be a section, [{section}] with keys below it", path, section
+        )
     if value is None:
         table.pop(key, None)  # type: ignore[attr-defined]
     else:
@@ -120,7 +124,9 @@ def _write_checked(path: Path, text: str) -> Config:
             shutil.copy2(path, path.with_name(f"{path.name}.bak"))
         part.replace(path)
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be written ({error.strerror}); choose another place") from None
+        raise ConfigError(
+            "{path}: cannot be written ({strerror}); choose another place", path, error.strerror
+        ) from None
     finally:
         part.unlink(missing_ok=True)
     return config
@@ -130,4 +136,4 @@ def _checked(part: Path, path: Path) -> Config:
     try:
         return load_config(part, {})
     except ConfigError as error:
-        raise ConfigError(str(error).replace(str(part), str(path))) from None
+        raise ConfigError(error.text.replace(str(part), str(path))) from None

@@ -14,6 +14,7 @@ from typing import Any
 from acquire.bounds import NotAllowed, as_integer, as_number
 from acquire.errors import ConfigError
 from acquire.record_mode import RECORD_MODES, RecordMode
+from acquire.text import Message
 from live.config.listen_address import ListenAddress
 
 
@@ -93,10 +94,10 @@ def length(check: Check, *, whole: bool = False) -> Check:
         try:
             return check.read(word)
         except ValueError as error:
-            kind = {int: "a whole number of px", float: "a number of px"}.get(check.read)  # type: ignore[call-overload]
+            kind = {int: Message("a whole number of px"), float: Message("a number of px")}.get(check.read)  # type: ignore[call-overload]
             raise ValueError(f"give {kind}, or mm as 6mm" if kind else str(error)) from None
 
-    return Check(check.accept, read, "whole px" if whole else "px")
+    return Check(check.accept, read, Message("whole px") if whole else "px")
 
 
 def in_px(value: Any, check: Check, px_per_mm: float | None) -> Any:
@@ -120,7 +121,7 @@ def choice(*allowed: str) -> Check:
 
     def accept(value: Any) -> str:
         if value not in allowed:
-            raise NotAllowed("one of " + ", ".join(repr(word) for word in allowed))
+            raise NotAllowed(Message("one of ") + ", ".join(repr(word) for word in allowed))
         return str(value)
 
     return Check(accept, words=allowed)
@@ -181,7 +182,7 @@ def _region(value: Any) -> tuple[int, int, int, int] | str:
     try:
         return _box(value)
     except NotAllowed as allowed:
-        raise NotAllowed(f"{allowed}; or {' or '.join(map(repr, REGIONS))}") from None
+        raise NotAllowed("{allowed}; or {join}", allowed, " or ".join(map(repr, REGIONS))) from None
 
 
 def _read_region(word: str) -> list[int] | str:
@@ -241,7 +242,7 @@ def _covariance(value: Any) -> tuple[tuple[float, ...], ...]:
     if len(rows) != LENS_PARAMETERS or any(
         not isinstance(row, list | tuple) or len(row) != LENS_PARAMETERS for row in rows
     ):
-        raise NotAllowed(f"{LENS_PARAMETERS} rows of {LENS_PARAMETERS} numbers")
+        raise NotAllowed("{LENS_PARAMETERS} rows of {LENS_PARAMETERS} numbers", LENS_PARAMETERS)
     found = tuple(tuple(as_number(one, -1e18, 1e18) for one in row) for row in rows)
     for i, row in enumerate(found):
         for j, one in enumerate(row[:i]):
@@ -264,7 +265,9 @@ def _names(value: Any) -> tuple[str, ...]:
 def _addresses(value: Any) -> tuple[str, ...]:
     given = [value] if isinstance(value, str) else value
     if not isinstance(given, list | tuple) or len(given) > MAX_BESIDE:
-        raise NotAllowed(f"an address or a rig file in quotes, or up to {MAX_BESIDE} of them in brackets")
+        raise NotAllowed(
+            "an address or a rig file in quotes, or up to {MAX_BESIDE} of them in brackets", MAX_BESIDE
+        )
     return tuple(_text(one) for one in given)
 
 

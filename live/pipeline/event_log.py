@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from acquire.events import Event, EventKind, EventSink, Level
-from acquire.printable import brief
+from acquire.text.printable import brief
 
 log = logging.getLogger(__name__)
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from acquire.events import Event, EventKind, EventSink, Level
+from acquire.text import Message
 from analysis.field import Blur
 from analysis.field.picture_error import LIMIT, PictureError
 from analysis.optics import alike, keystones
@@ -68,10 +69,11 @@ class PartsGuard:
         if not step.n_valid or bool(step.apart) == self._apart:
             return
         self._apart = bool(step.apart)
-        text = "the region is whole again"
+        text = Message("the region is whole again")
         if self._apart:
-            text = (
-                f"{step.apart}: it has no strain from here on; gauges within a part have, and the extension"
+            text = Message(
+                "{apart}: it has no strain from here on; gauges within a part have, and the extension",
+                step.apart,
             )
         level: Level = "warning" if self._apart else "info"
         self._on_event(Event(step.t, EventKind.MEASUREMENT, "region", text, level, {"parts": step.n_parts}))
@@ -101,9 +103,12 @@ class StrainGuard:
         strained = max(abs(float(np.nanmedian(values))) for values in (field.du_dx, field.dv_dy))
         if turned > MAX_ROTATION or strained > MAX_STRAIN:
             self._warned = True
-            text = (
-                f"turned by {math.degrees(turned):.1f} degrees, strained by {strained:.1%}: small strains are off by"
-                f" about {(turned**2 + strained**2) / 2 * 1e6:.0f} µm/m; measure with --strain engineering"
+            text = Message(
+                "turned by {degrees:.1f} degrees, strained by {strained:.1%}: small strains are off by about "
+                "{turned:.0f} µm/m; measure with --strain engineering",
+                math.degrees(turned),
+                strained,
+                (turned**2 + strained**2) / 2 * 1e6,
             )
             data = {"rotation": turned, "strain": strained}
             self._on_event(Event(step.t, EventKind.MEASUREMENT, "strain", text, "warning", data))
@@ -145,11 +150,17 @@ class DilatationGuard:
             self._on_event(Event(step.t, EventKind.MEASUREMENT, "strain", text, "warning", data))
 
     def _text(self, false: float, nu: float) -> str:
-        way = "towards" if false > 0 else "away from"
-        far = "" if self._stand_off_mm is None else f" by {abs(false) * self._stand_off_mm:.2f} mm"
-        return (
-            f"the strains along and across do not fit nu = {nu:g}: {false * 1e6:+.0f} µm/m in both is as from"
-            f" motion{far} {way} the camera, and no strain; E is off by it too (docs/optics.md)"
+        way = "towards" if false > 0 else Message("away from")
+        far = (
+            "" if self._stand_off_mm is None else Message(" by {abs:.2f} mm", abs(false) * self._stand_off_mm)
+        )
+        return Message(
+            "the strains along and across do not fit nu = {nu:g}: {false:+.0f} µm/m in both is as from "
+            "motion{far} {way} the camera, and no strain; E is off by it too (docs/optics.md)",
+            nu,
+            false * 1e6,
+            far,
+            way,
         )
 
 
@@ -181,16 +192,20 @@ class TiltGuard:
             false = alike(step.exx, step.eyy, noise)
             if false:
                 self._seeks_dilatation = False
-                text = (
-                    f"exx and eyy are alike, {false * 1e6:+.0f} µm/m: as from motion by {abs(false):.1e} of the"
-                    " stand-off or from temperature, not from a load along one axis (docs/optics.md)"
+                text = Message(
+                    "exx and eyy are alike, {false:+.0f} µm/m: as from motion by {abs:.1e} of the stand-off or from "
+                    "temperature, not from a load along one axis (docs/optics.md)",
+                    false * 1e6,
+                    abs(false),
                 )
                 self._emit(step, text, false)
         if self._seeks_tilt:
             self._check_tilt(field, step)
 
     def _check_tilt(self, field: StrainField, step: TimeStep) -> None:
-        for way, found in zip(("from left to right", "from top to bottom"), keystones(field), strict=True):
+        for way, found in zip(
+            (Message("from left to right"), Message("from top to bottom")), keystones(field), strict=True
+        ):
             # A load makes exx and eyy differ, and an uneven specimen may then show anything.
             load = abs(step.exx - step.eyy)
             if not abs(found.rise) > max(FALSE_STRAIN + CERTAIN * found.sigma, load):
@@ -198,10 +213,13 @@ class TiltGuard:
             self._seeks_tilt = False
             angle = ""
             if self._focal_px is not None:
-                angle = f" by {abs(math.degrees(found.tilt(self._focal_px))):.2g} degrees"
-            text = (
-                f"strain rises by {found.rise * 1e6:+.0f} µm/m {way}, in x and y alike: as from a tilt{angle}, or from"
-                " a shift behind a lens that is not corrected (docs/optics.md)"
+                angle = Message(" by {abs:.2g} degrees", abs(math.degrees(found.tilt(self._focal_px))))
+            text = Message(
+                "strain rises by {rise:+.0f} µm/m {way}, in x and y alike: as from a tilt{angle}, or from a shift "
+                "behind a lens that is not corrected (docs/optics.md)",
+                found.rise * 1e6,
+                way,
+                angle,
             )
             self._emit(step, text, found.rise)
             return
@@ -211,11 +229,11 @@ class TiltGuard:
 
 
 CAUSES = {
-    "noise": "more noise than the reference or --noise has; more light",
-    "compression": "the blocks of a compressed picture; record uncompressed",
-    "bands": "bands or lines; a steady lamp, or an exposure of whole periods of the mains",
-    "blur": "another sharpness than the reference; focus, motion, distance",
-    "filter": "the filters of a camera (denoising, sharpening) or of a format; switch them off",
+    "noise": Message("more noise than the reference or --noise has; more light"),
+    "compression": Message("the blocks of a compressed picture; record uncompressed"),
+    "bands": Message("bands or lines; a steady lamp, or an exposure of whole periods of the mains"),
+    "blur": Message("another sharpness than the reference; focus, motion, distance"),
+    "filter": Message("the filters of a camera (denoising, sharpening) or of a format; switch them off"),
 }
 """What an error of the picture looks like (``PictureError.cause``), and what to do."""
 
@@ -242,7 +260,7 @@ class PictureGuard:
             self._emit(step.t, picture_words(field), "warning", error)
             self._cause = error.cause
         elif self._cause and not error.cause and error.factor < 0.85 * LIMIT:
-            self._emit(step.t, "the picture leaves what its noise explains again", "info", error)
+            self._emit(step.t, Message("the picture leaves what its noise explains again"), "info", error)
             self._cause = ""
 
     def _emit(self, t: float, text: str, level: Level, error: PictureError) -> None:
@@ -258,10 +276,15 @@ def picture_words(field: StrainField) -> str:
     sigma = _usual_sigma(field)
     shown = CAUSES[error.cause]
     if not error.factor > 1:
-        return f"the picture shows {shown}: strain of a ZOI is uncertain by {sigma:.0f} µm/m"
+        return Message(
+            "the picture shows {shown}: strain of a ZOI is uncertain by {sigma:.0f} µm/m", shown, sigma
+        )
     usual = sigma / error.factor
-    return (
-        f"the picture shows {shown}: strain of a ZOI is uncertain by {sigma:.0f} µm/m in place of {usual:.0f}"
+    return Message(
+        "the picture shows {shown}: strain of a ZOI is uncertain by {sigma:.0f} µm/m in place of {usual:.0f}",
+        shown,
+        sigma,
+        usual,
     )
 
 
@@ -291,7 +314,7 @@ class BlurGuard:
             self._emit(step, _blur_words(blur, field), "warning")
         elif self._changed and size < CALM * self._limit:
             self._changed = False
-            self._emit(step, "the picture is as sharp as the reference again", "info")
+            self._emit(step, Message("the picture is as sharp as the reference again"), "info")
 
     def _emit(self, step: TimeStep, text: str, level: Level) -> None:
         data = {"blur_px": step.blur, "sigma_blur_px": step.sigma_blur}
@@ -301,11 +324,16 @@ class BlurGuard:
 def _blur_words(blur: Blur, field: StrainField) -> str:
     error = field.picture
     if error is None or error.factor <= LIMIT:
-        return f"the picture is {blur.text} since the reference: look at focus, distance and exposure"
+        return Message(
+            "the picture is {text} since the reference: look at focus, distance and exposure", blur.text
+        )
     sigma = _usual_sigma(field)
-    return (
-        f"the picture is {blur.text} since the reference: look at focus, distance and exposure;"
-        f" strain of a ZOI is uncertain by {sigma:.0f} µm/m in place of {sigma / error.factor:.0f}"
+    return Message(
+        "the picture is {text} since the reference: look at focus, distance and exposure; strain of a ZOI is "
+        "uncertain by {sigma:.0f} µm/m in place of {sigma2:.0f}",
+        blur.text,
+        sigma,
+        sigma / error.factor,
     )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from acquire.events import Event, EventKind, EventSink, Level, ignore_event
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
+from acquire.text import Message
 from analysis.field import part_of
 from analysis.optics import (
     ASSUMED_TILT,
@@ -84,7 +85,7 @@ class Tracker:
         try:
             self._kernel = self._kernel.renewed(burst.mean, here, noise=averaged(self._noise_GL, burst.n))
         except ValueError as error:
-            text = f"the reference was not renewed: {error}"
+            text = Message("the reference was not renewed: {error}", error)
             self._on_event(Event(burst.t, EventKind.MEASUREMENT, "measurement", text, "warning"))
             return
         self._field = None
@@ -119,8 +120,8 @@ def _share(field: StrainField) -> float:
 
 def _renewal(burst: Burst, *, automatic: bool) -> Event:
     data = {"first": burst.first_index, "last": burst.last_index, "n": burst.n, "automatic": automatic}
-    why = "since the pattern had changed too much" if automatic else "as asked"
-    text = f"the reference was renewed {why}; results stay composed on the first one"
+    why = Message("since the pattern had changed too much") if automatic else Message("as asked")
+    text = Message("the reference was renewed {why}; results stay composed on the first one", why)
     level: Level = "warning" if automatic else "info"
     return Event(burst.t, EventKind.REFERENCE, "measurement", text, level, data | {"renewed": True})
 
@@ -163,10 +164,14 @@ class PlateCorrection:
 
     def _choose(self, whole: StrainField, burst: Burst) -> Model:
         chosen = choose_model(self._fit, whole, self._focal_px)
-        text = (
-            f"plates {', '.join(self._fit.layout.plates)}: {chosen.model} is corrected; in the mean strain that leaves"
-            f" {chosen.noise * 1e6:.1f} µm/m by noise of one burst and {chosen.unseen * 1e6:.1f} µm/m by a tilt of"
-            f" {math.degrees(ASSUMED_TILT):.1g} degrees"
+        text = Message(
+            "plates {join}: {model} is corrected; in the mean strain that leaves {noise:.1f} µm/m by noise of "
+            "one burst and {unseen:.1f} µm/m by a tilt of {degrees:.1g} degrees",
+            ", ".join(self._fit.layout.plates),
+            chosen.model,
+            chosen.noise * 1e6,
+            chosen.unseen * 1e6,
+            math.degrees(ASSUMED_TILT),
         )
         data = {"model": chosen.model, "noise": chosen.noise, "unseen": chosen.unseen}
         self._on_event(Event(burst.t, EventKind.MEASUREMENT, "plates", text, "info", data))
@@ -175,10 +180,13 @@ class PlateCorrection:
     def _report(self, words: str, burst: Burst) -> None:
         if bool(words) is bool(self._trouble):
             return
-        text, level = "the plates are measured again, and the correction goes on", "info"
+        text, level = Message("the plates are measured again, and the correction goes on"), "info"
         if words:
             level = "error"
-            text = f"{words}; the correction by plates has stopped: motion off the plane reads as strain from here on"
+            text = Message(
+                "{words}; the correction by plates has stopped: motion off the plane reads as strain from here on",
+                words,
+            )
         self._trouble = words
         self._on_event(Event(burst.t, EventKind.MEASUREMENT, "plates", text, cast(Level, level)))
 

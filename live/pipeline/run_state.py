@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields
 
 from acquire.events import Event, EventKind
 from acquire.load_cell import LoadLog
+from acquire.text import Message
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import EventLog, sentence
 from live.pipeline.history import History
@@ -84,16 +85,30 @@ class FrameCounts:
 
     def line(self) -> str:
         """One line for a person."""
-        on_purpose = f" and {self.thinned} on purpose" * (self.thinned > 0)
+        on_purpose = Message(" and {thinned} on purpose", self.thinned) * (self.thinned > 0)
         share = f" ({self.skipped_share:.1%})" * (self.skipped > 0)
-        load = f" / load samples lost {self.load_lost}" * (self.load_lost > 0)
-        load += f" / bursts without a force {self.without_force}" * (self.without_force > 0)
-        failed = f" / failed {self.failed}" * (self.failed > 0)
-        return (
-            f"grabbed {self.grabbed} / recorded {self.recorded} / measured {self.measured}"
-            f" / skipped {self.skipped}{share}{failed} / lost {self.lost}{load}"
-            f"  (reference {self.reference}, left over {self.left_out}, not recorded {self.unrecorded}"
-            f"{on_purpose}; {'adds up' if self.adds_up else 'DOES NOT ADD UP'})"
+        load = Message(" / load samples lost {load_lost}", self.load_lost) * (self.load_lost > 0)
+        load += Message(" / bursts without a force {without_force}", self.without_force) * (
+            self.without_force > 0
+        )
+        failed = Message(" / failed {failed}", self.failed) * (self.failed > 0)
+        return Message(
+            "grabbed {grabbed} / recorded {recorded} / measured {measured} / skipped {skipped}{share}{failed} / "
+            "lost {lost}{load}  (reference {reference}, left over {left_out}, not recorded "
+            "{unrecorded}{on_purpose}; {value})",
+            self.grabbed,
+            self.recorded,
+            self.measured,
+            self.skipped,
+            share,
+            failed,
+            self.lost,
+            load,
+            self.reference,
+            self.left_out,
+            self.unrecorded,
+            on_purpose,
+            "adds up" if self.adds_up else "DOES NOT ADD UP",
         )
 
 

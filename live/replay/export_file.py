@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.printable import counted
+from acquire.text.printable import counted
 from live.config.sections import LoadConfig
 from live.replay.export_headings import name_and_unit, newtons_of, seconds_per
 from live.replay.export_numbers import (

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import BinaryIO
 
 from acquire.errors import DataError
-from acquire.printable import counted
+from acquire.text.printable import counted
 from live.config.sections import LoadConfig
 from live.replay.export_headings import (
     find_columns,

@@ -21,7 +21,7 @@ from acquire.files.order import masks
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
 from acquire.opencv.images import picture_names
-from acquire.printable import counted
+from acquire.text.printable import counted
 from live.config.loading import Config
 from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Window
 

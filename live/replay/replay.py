@@ -23,7 +23,7 @@ from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind, EventSink
 from acquire.frame import Burst, Frame
 from acquire.opencv.images import picture_times
-from acquire.printable import counted
+from acquire.text.printable import counted
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
 from live.pipeline.consumer import Compose, RunInfo

@@ -15,7 +15,7 @@ from typing import Any
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst
-from acquire.printable import printable
+from acquire.text.printable import printable
 from live import VERSION
 from live.pipeline.measure import NewReference
 from live.pipeline.run_state import RunState

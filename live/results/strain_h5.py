@@ -27,7 +27,7 @@ from acquire.hdf5 import (
     reason,
     storable,
 )
-from acquire.printable import counted
+from acquire.text.printable import counted
 from analysis.evaluate import load_axis
 from live.results import layout
 from live.results.quantities import quantity_of

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from acquire.load_cell import LoadLog
-from acquire.printable import brief, share_text
+from acquire.text.printable import brief, share_text
 from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
+from acquire.text import Message
 from live.config.channels import OF_LOAD, is_joint
 from live.config.loading import Config
 from live.config.sections import AlarmConfig
@@ -31,9 +32,13 @@ log = logging.getLogger(__name__)
 EVERY_S = 0.2
 """What changes without a measurement is checked at this interval."""
 _STRAINS = ("axial", "exx", "eyy", "exy", "largest")
-_TWO_CAMERAS = "a camera on each side: give --back"
+_TWO_CAMERAS = Message("a camera on each side: give --back")
 _UNITS = {"_N": "N", "_MPa": "MPa", "_s": "s", "_min": "min", "_GL": "GL", "": ""}
-_LABELS = {"silent_s": "no frame for", "load_silent_s": "no force for", "disk_min": "disk full in"}
+_LABELS = {
+    "silent_s": Message("no frame for"),
+    "load_silent_s": Message("no force for"),
+    "disk_min": Message("disk full in"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,21 +126,24 @@ def check_alarms(config: Config, *, both_sides: bool = False) -> None:
     """
     joint = next((one for one in config.strain_out.channels or () if is_joint(one)), "")
     if joint and not both_sides:
-        raise ConfigError(f"strain_out.channels: {joint} needs {_TWO_CAMERAS}")
-    missing = dict.fromkeys((*OF_LOAD, "load_silent_s"), "a load cell: give --load ADDRESS")
+        raise ConfigError("strain_out.channels: {joint} needs {TWO_CAMERAS}", joint, _TWO_CAMERAS)
+    missing = dict.fromkeys((*OF_LOAD, "load_silent_s"), Message("a load cell: give --load ADDRESS"))
     if config.load.address != "none:":
         missing.clear()
     if config.specimen.area_m2 is None:
-        missing.setdefault("stress_MPa", "the section: give --section W,T")
+        missing.setdefault("stress_MPa", Message("the section: give --section W,T"))
     if not config.record.enabled:
-        missing["disk_min"] = "a recording: leave --no-record out"
+        missing["disk_min"] = Message("a recording: leave --no-record out")
     if not both_sides:
         missing |= {one.channel: _TWO_CAMERAS for one in config.alarm if is_joint(one.channel)}
     for number, alarm in enumerate(config.alarm, 1):
         if alarm.channel in missing:
             raise ConfigError(
-                f"alarm {number} ({alarm.channel}) can never come: it needs {missing[alarm.channel]}, or take the"
-                " alarm out of the configuration"
+                "alarm {number} ({channel}) can never come: it needs {missing}, or take the alarm out of the "
+                "configuration",
+                number,
+                alarm.channel,
+                missing[alarm.channel],
             )
 
 
@@ -145,10 +153,17 @@ def in_words(channel: str, value: float, limit: float) -> str:
     for prefix in ("sigma_", "mean_", "bending_"):
         plain = plain.removeprefix(prefix)
     if plain in _STRAINS or plain.startswith("gauge_"):
-        return f"{channel.replace('_', ' ')} {value * 1e6:.0f} µm/m, limit {limit * 1e6:.0f}"
+        return Message(
+            "{replace} {value:.0f} µm/m, limit {limit:.0f}",
+            channel.replace("_", " "),
+            value * 1e6,
+            limit * 1e6,
+        )
     suffix = next((one for one in _UNITS if plain.endswith(one)), "")
     label = _LABELS.get(channel, channel.removesuffix(suffix).replace("_", " "))
-    return f"{label} {value:.6g} {_UNITS[suffix]}".rstrip() + f", limit {limit:.6g}"
+    return Message("{label} {value:.6g} {UNITS}", label, value, _UNITS[suffix]).rstrip() + Message(
+        ", limit {limit:.6g}", limit
+    )
 
 
 class Alarm:
@@ -172,8 +187,12 @@ class Alarm:
     def __init__(self, config: AlarmConfig, actions: Sequence[Action] = ()) -> None:
         self.config, self.on, self.unknown = config, False, False
         self._actions, c = actions, config
-        limit = f"above {c.above:g}" if c.above is not None else f"below {c.below:g}"
-        self.name = c.name or f"{c.channel} {limit}"
+        limit = (
+            Message("above {above:g}", c.above)
+            if c.above is not None
+            else Message("below {below:g}", c.below)
+        )
+        self.name = c.name or Message("{channel} {limit}", c.channel, limit)
         self._sign, self._limit = (1.0, c.above) if c.above is not None else (-1.0, c.below or 0.0)
 
     @property
@@ -217,7 +236,7 @@ class Alarm:
     def message(self, value: float, instead: str = "") -> str:
         """Its text at ``value``, or with what is there ``instead`` of one."""
         c = self.config
-        named = f"{c.name}: " if c.name else ""
+        named = Message("{name}: ", c.name) if c.name else ""
         return named + (instead or in_words(c.channel, value, self._limit))
 
 
@@ -280,7 +299,7 @@ class AlarmWatch(Consumer):
     def end(self) -> str:
         """How often an alarm came on; a camera that has failed ends the test of its side, and may be why."""
         self._check_lost()
-        return f"{self._count} came" if self._count else "none came"
+        return Message("{count} came", self._count) if self._count else Message("none came")
 
     def _check(self, values: Mapping[str, float], stamp: float | None) -> None:
         """Judge all; ``stamp`` is the time of what the values are from, None: of each figure."""
@@ -290,7 +309,7 @@ class AlarmWatch(Consumer):
             changed, words = alarm.judge(figure, value), channel.replace("_", " ")
             instead = figure.trouble(channel.removesuffix("_N").removesuffix("_MPa").replace("_", " "))
             if not (instead or figure.known or figure.state is FigureState.NONE):
-                instead = f"{words}: {figure.state}"
+                instead = Message("{words}: {state}", words, figure.state)
             text = alarm.message(value, instead)
             if changed:
                 t = self._clock() - figure.age if stamp is None and figure.known else stamp
@@ -303,7 +322,7 @@ class AlarmWatch(Consumer):
         for alarm in self._alarms:
             channel = alarm.config.channel
             if why and is_joint(channel) and alarm.lose():
-                words = f"{channel.replace('_', ' ')} is not known, {why}"
+                words = Message("{replace} is not known, {why}", channel.replace("_", " "), why)
                 self._changed(alarm, None, math.nan, alarm.message(math.nan, words))
 
     def _changed(self, alarm: Alarm, value: float | None, stamp: float, text: str) -> None:
@@ -317,10 +336,10 @@ class AlarmWatch(Consumer):
         if not math.isnan(stamp):
             data["after_s"] = now - stamp
         if not alarm.on:
-            self._on_event(Event(now, EventKind.ALARM, "alarm", f"over: {text}", "info", data))
+            self._on_event(Event(now, EventKind.ALARM, "alarm", Message("over: {text}", text), "info", data))
             return
         data |= {action.key: getattr(alarm.config, action.key) for action in alarm.actions if action.key}
-        event = Event(now, EventKind.ALARM, "alarm", f"ALARM {text}", "warning", data)
+        event = Event(now, EventKind.ALARM, "alarm", Message("ALARM {text}", text), "warning", data)
         for action in alarm.actions:
             self._fire(action, event)
         self._on_event(event)
@@ -331,5 +350,5 @@ class AlarmWatch(Consumer):
             action.fire(event)
         except Exception as error:
             log.exception("an action of an alarm failed")
-            text = f"{type(action).__name__} of an alarm failed: {error!r}"
+            text = Message("{name} of an alarm failed: {error}", type(action).__name__, repr(error))
             self._on_event(Event(event.t, EventKind.ALARM, "alarm", text, "error"))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind
+from acquire.text import Message
 from live.pipeline.consumer import Compose, RunInfo
 from live.pipeline.latency import LatencyMonitor
 from live.pipeline.measurement import Measurement
@@ -39,7 +40,7 @@ from live.stream.record import Record, ReferenceWanted, Waiting
 from live.stream.state_keeper import StateKeeper
 from live.stream.stream import Stream, Subscriber
 
-_ARMED = "; nothing is recorded until the command start"
+_ARMED = Message("; nothing is recorded until the command start")
 _SILENT_S = 1.0
 _HINT_AFTER = 3  # times the frames of a reference
 
@@ -175,17 +176,17 @@ class CameraRun(Subscriber):
         if self.recording:
             state = "REC"
         elif self._recording is not None:
-            state = "NOT RECORDING" if self._has_recorded else "ARMED"
+            state = Message("NOT RECORDING") if self._has_recorded else "ARMED"
         else:
-            state = "not recorded"
-        return f"{state}, PAUSED" if self.paused else state
+            state = Message("not recorded")
+        return Message("{state}, PAUSED", state) if self.paused else state
 
     def command(self, kind: EventKind, note: str = "") -> str:
         """Carry out a command of the operator, but for a tare; raises ControlRefused where that is not possible."""
         if kind in (EventKind.PAUSE, EventKind.RESUME):
             self._pause(kind is EventKind.PAUSE)
         elif kind is EventKind.NEW_REFERENCE:
-            self.emit(kind, "a new reference is taken from the next frames")
+            self.emit(kind, Message("a new reference is taken from the next frames"))
             self._stream.publish(ReferenceWanted(), self.name)
         elif kind is EventKind.NOTE:
             self.emit(kind, note)
@@ -201,9 +202,11 @@ class CameraRun(Subscriber):
 
     def _pause(self, wanted: bool) -> None:
         if wanted is self._incoming.paused:
-            raise ControlRefused("measuring is paused already" if wanted else "measuring is not paused")
+            raise ControlRefused(
+                Message("measuring is paused already") if wanted else Message("measuring is not paused")
+            )
         kind = EventKind.PAUSE if wanted else EventKind.RESUME
-        self.emit(kind, "measuring is paused" if wanted else "measuring goes on")
+        self.emit(kind, Message("measuring is paused") if wanted else Message("measuring goes on"))
         self._incoming.paused = self._run_state.health.paused = wanted
         self._run_state.health.since_t = time.monotonic()
 
@@ -211,7 +214,7 @@ class CameraRun(Subscriber):
         names = self._run_state.alarms.silence() + self._run_state.faults.silence()
         if not names:
             raise ControlRefused("no alarm is on")
-        self.emit(EventKind.ALARM, f"silenced: {', '.join(names)}")
+        self.emit(EventKind.ALARM, Message("silenced: {join}", ", ".join(names)))
 
     def emit(self, kind: EventKind, text: str) -> None:
         """An event of the operator."""
@@ -244,9 +247,11 @@ class CameraRun(Subscriber):
         if self._hinted or self.has_measured or not counts.lost or counts.grabbed < _HINT_AFTER * n:
             return
         self._hinted = True
-        text = (
-            f"no {n} frames in a row for the reference, {counts.lost} were lost: lower the rate of the camera, or take"
-            " --reference-burst smaller"
+        text = Message(
+            "no {n} frames in a row for the reference, {lost} were lost: lower the rate of the camera, or take "
+            "--reference-burst smaller",
+            n,
+            counts.lost,
         )
         self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "warning")
 
@@ -262,7 +267,7 @@ class CameraRun(Subscriber):
         self._run_state.health.began_t = time.monotonic()
         self._run_state.health.state = self.state
         waits = "" if self.recording or self._recording is None else _ARMED
-        self._run_state.event_log.emit(EventKind.START, "phasedic", f"the test begins{waits}")
+        self._run_state.event_log.emit(EventKind.START, "phasedic", Message("the test begins{waits}", waits))
         self._keeper.begin()
 
     def start(self) -> None:
@@ -295,9 +300,9 @@ class CameraRun(Subscriber):
         self._run_state.loads.close()
         self.rig.camera.close()
         self.outputs.end()
-        own = TIME_IS_OVER if self._own_time_is_over or self.source.time_is_over else "camera ended"
+        own = TIME_IS_OVER if self._own_time_is_over or self.source.time_is_over else Message("camera ended")
         reason = self._stop.reason or own
-        self._run_state.event_log.emit(EventKind.STOP, "phasedic", f"the test ends: {reason}")
+        self._run_state.event_log.emit(EventKind.STOP, "phasedic", Message("the test ends: {reason}", reason))
         if self._recording is not None:
             self._recording.close({"stop_reason": reason})
 

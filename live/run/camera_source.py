@@ -19,7 +19,8 @@ from acquire.camera import Camera, missing_at_end
 from acquire.errors import PhasedicError
 from acquire.events import EventKind, RateLimiter
 from acquire.frame import Burst, CameraInfo, Frame, frozen
-from acquire.printable import counted
+from acquire.text import Message
+from acquire.text.printable import counted
 from live.config.loading import Config
 from live.pipeline.reference import ReferenceTaker
 from live.pipeline.run_state import RunState
@@ -182,10 +183,10 @@ class CameraSource(Subscriber):
                 if self.time_is_over:
                     break
         except PhasedicError as error:
-            self._ended_by(error, str(error))
+            self._ended_by(error, error.text)
         except Exception as error:
             log.exception("the grab thread failed")
-            self._ended_by(error, f"a defect in the grab thread: {error!r}")
+            self._ended_by(error, Message("a defect in the grab thread: {error}", repr(error)))
         finally:
             self._health.camera_ended = True
             self._count_open_gap(time.monotonic() - self.arrived_t)
@@ -201,7 +202,11 @@ class CameraSource(Subscriber):
         missing = missing_at_end(self._camera.info, silent_s)
         if missing:
             self._frame_counts.add(lost=missing)
-            text = f"{counted(missing, 'frame')} lost at the end: none came for the last {silent_s:.1f} s"
+            text = Message(
+                "{counted} lost at the end: none came for the last {silent_s:.1f} s",
+                counted(missing, "frame"),
+                silent_s,
+            )
             data = {"count": missing, "where": "end"}
             self._event_log.emit(EventKind.LOST, self._camera.info.address, text, "warning", data)
 
@@ -234,7 +239,9 @@ class CameraSource(Subscriber):
         self._unreported += frame.lost_before
         if not self._limiter.due(frame.t):
             return
-        text = f"{counted(self._unreported, 'frame')} lost, the last before frame {frame.index}"
+        text = Message(
+            "{counted} lost, the last before frame {index}", counted(self._unreported, "frame"), frame.index
+        )
         data = {"count": self._unreported, "before": frame.index}
         self._event_log.emit(EventKind.LOST, self._camera.info.address, text, "warning", data)
         self._unreported = 0
@@ -246,10 +253,16 @@ class CameraSource(Subscriber):
             if not self._damage_told and self._damage_limiter.due(frame.t):
                 self._damage_told = True
                 self._emit_damage(
-                    f"pictures come damaged from frame {frame.index} on; they count as lost", 1, frame
+                    Message("pictures come damaged from frame {index} on; they count as lost", frame.index),
+                    1,
+                    frame,
                 )
         elif self._damage_told:
-            text = f"whole pictures again from frame {frame.index} on, {counted(self._damaged, 'frame')} came damaged"
+            text = Message(
+                "whole pictures again from frame {index} on, {counted} came damaged",
+                frame.index,
+                counted(self._damaged, "frame"),
+            )
             self._emit_damage(text, self._damaged, frame)
             self._damaged, self._damage_told = 0, False
 

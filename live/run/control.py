@@ -22,9 +22,11 @@ import queue
 from collections.abc import Callable
 from typing import Protocol
 
+from acquire.errors import Spoken
 from acquire.events import Event, EventKind, Level
 from acquire.load_sample import LoadCellInfo, LoadSample
-from acquire.printable import printable
+from acquire.text import Message
+from acquire.text.printable import printable
 from live.config.listen_address import ListenAddress, read_token
 from live.pipeline.screen import Screen
 from live.run.tcp_lines import LineServer
@@ -36,13 +38,13 @@ FORCED, UNDO, ONCE = "force", "undo", "once"
 BOUNCE_S, CONFIRM_S = 0.5, 3.0
 """A command is repeated, as a confirmation, after this time and before that: a key that is held repeats too soon."""
 TARED_S = 2.0  # the answer to a tare waits so long for what the load cell did
-QUEUED = "queued; the load cell has not done it yet, and an event will report it"
+QUEUED = Message("queued; the load cell has not done it yet, and an event will report it")
 NO_LOAD = 1e-3  # share of the capacity
-ENDED = "ended by the operator"
+ENDED = Message("ended by the operator")
 MAX_LENGTH = 500  # of a line
-COMMANDS = (
-    "start, stop, reference, tare, tare force, tare undo, pause, resume, note TEXT, alarm off, quit;"
-    " short: s, r, t, t!, u, p, n TEXT, a, q"
+COMMANDS = Message(
+    "start, stop, reference, tare, tare force, tare undo, pause, resume, note TEXT, alarm off, quit; "
+    "short: s, r, t, t!, u, p, n TEXT, a, q"
 )
 WHAT = "the port for commands"
 _SHORT = {"s": "start", "r": "reference", "t": "tare", "t!": "tare force", "u": "tare undo", "a": "alarm off",
@@ -63,7 +65,7 @@ _COMMANDS = {
 EmitEvent = Callable[[EventKind, str, str, Level], None]  # kind, source, text, level
 
 
-class ControlRefused(Exception):
+class ControlRefused(Spoken):
     """Its text is why a command is not carried out, and what to do."""
 
 
@@ -137,16 +139,19 @@ class TareControl:
         while not self._done.empty():
             self._done.get()
         if how == UNDO:
-            self._emit(EventKind.TARE, "operator", "undo the last tare", "info")
+            self._emit(EventKind.TARE, "operator", Message("undo the last tare"), "info")
             self._cell.undo_tare()
         elif risk and (how == ONCE or not BOUNCE_S <= self._clock() - confirm_t <= CONFIRM_S):
-            text = (
-                f"{risk}: forces before and after a tare have different zeros, and so have modulus and stress"
+            text = Message(
+                "{risk}: forces before and after a tare have different zeros, and so have modulus and stress",
+                risk,
             )
             if how == ONCE:
-                raise ControlRefused(f"{text}; confirm it")
+                raise ControlRefused("{text}; confirm it", text)
             self._confirm_t = self._clock()
-            raise ControlRefused(f"{text}; repeat the command within {CONFIRM_S:g} s to do it")
+            raise ControlRefused(
+                "{text}; repeat the command within {CONFIRM_S:g} s to do it", text, CONFIRM_S
+            )
         else:
             self._emit(EventKind.TARE, "operator", "tare" + (", forced" if how == FORCED else ""), "info")
             self._cell.tare(force=how == FORCED)
@@ -166,8 +171,8 @@ class TareControl:
         sample, capacity = self._latest(), self._cell.info.capacity_N
         if sample is None or not self._measured() or abs(sample.force) <= NO_LOAD * (capacity or 0.0):
             return ""
-        load = "an unknown load" if math.isnan(sample.force) else f"{sample.force:.6g} N"
-        return f"not tared yet: {load} in mid-test"
+        load = Message("an unknown load") if math.isnan(sample.force) else f"{sample.force:.6g} N"
+        return Message("not tared yet: {load} in mid-test", load)
 
 
 class Controls(Protocol):
@@ -212,7 +217,7 @@ def answer(line: str, controls: Controls) -> str:
 def _expanded(line: str, controls: Controls) -> str:
     """The command with its short form expanded, its words separated by one blank."""
     if len(line) > MAX_LENGTH:
-        raise ControlRefused(f"a command has up to {MAX_LENGTH} letters")
+        raise ControlRefused("a command has up to {MAX_LENGTH} letters", MAX_LENGTH)
     first, *rest = line.split() or [""]
     if first == "p":
         first = "resume" if controls.paused else "pause"
@@ -230,7 +235,7 @@ def _execute(command: str, controls: Controls) -> str:
         return controls.command(EventKind.NOTE, printable(text))
     if command in ("help", "?"):
         return COMMANDS
-    raise ControlRefused(f"{command!r} is no command; there are {COMMANDS}")
+    raise ControlRefused("{command} is no command; there are {COMMANDS}", repr(command), COMMANDS)
 
 
 def _in_one_line(text: object) -> str:
@@ -265,8 +270,10 @@ class ControlPort:
         """Begin to take commands; the port."""
         self._server = LineServer(self._listening, self._token, lambda line: answer(line, controls))
         self._server.start()
-        token = " (with a token)" if self._token else ""
-        self._screen.print(f"commands are taken at {self._host}:{self._server.port}{token}")
+        token = Message(" (with a token)") if self._token else ""
+        self._screen.print(
+            Message("commands are taken at {host}:{port}{token}", self._host, self._server.port, token)
+        )
         return self._server.port
 
     def close(self) -> None:

@@ -13,6 +13,7 @@ from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind, EventSink, Level
 from acquire.frame import Burst
 from acquire.system import lower_priority
+from acquire.text import Message
 from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample
 from live.pipeline.measure import NewReference
 from live.pipeline.measurement import Measurement
@@ -54,10 +55,13 @@ class ReferenceSelector:
         """
         reference = self._incoming.next_reference()
         if reference is None:
-            text = f"the camera ended before the reference was complete ({self._run_state.frame_counts.grabbed} frames)"
+            text = Message(
+                "the camera ended before the reference was complete ({grabbed} frames)",
+                self._run_state.frame_counts.grabbed,
+            )
             self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "error")
             return None
-        what = f"the reference from {self._prepared.config.camera.address}"
+        what = Message("the reference from {address}", self._prepared.config.camera.address)
         for attempt in itertools.count(1):
             ready = self._prepared.plan.on(reference.burst, what)
             motion = _motion(ready, reference)
@@ -67,7 +71,9 @@ class ReferenceSelector:
                 break
             again = self._another(motion, attempt)
             if again is None and math.isnan(motion.px):
-                text = "no reference could be measured; keep the specimen still, look at light and focus"
+                text = Message(
+                    "no reference could be measured; keep the specimen still, look at light and focus"
+                )
                 self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "error")
                 return None
             if again is None:
@@ -85,20 +91,23 @@ class ReferenceSelector:
         """
         if attempt >= TRIES and not math.isnan(motion.px):
             return None
-        what = f"the picture moved by {motion.amount} px during the reference burst"
+        what = Message("the picture moved by {amount} px during the reference burst", motion.amount)
         if math.isnan(motion.px):
-            what = "the reference burst cannot be measured (fast motion, glare, no focus?)"
+            what = Message("the reference burst cannot be measured (fast motion, glare, no focus?)")
         if attempt < TRIES:
             self._run_state.event_log.emit(
-                EventKind.MEASUREMENT, "reference", f"{what}; taking another", "warning"
+                EventKind.MEASUREMENT, "reference", Message("{what}; taking another", what), "warning"
             )
         elif attempt == TRIES:
-            text = f"{what}; tried again until the picture is still"
+            text = Message("{what}; tried again until the picture is still", what)
             self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "error")
         return self._incoming.retake_reference()
 
     def _moved(self, motion: ReferenceMotion) -> None:
-        text = f"the reference moved by {motion.amount} px; keep the specimen still when strains must be absolute"
+        text = Message(
+            "the reference moved by {amount} px; keep the specimen still when strains must be absolute",
+            motion.amount,
+        )
         self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "warning")
 
     def _report(self, burst: Burst, motion: ReferenceMotion) -> None:
@@ -111,8 +120,14 @@ class ReferenceSelector:
             "force_N": _or_none(force),
             "shift_px": _or_none(motion.px),
         }
-        noise = f", noise of one {burst.noise:.2f} GL, motion {motion.px:.4f} px" if burst.n > 1 else ""
-        text = f"reference: {burst.n} frames{noise}" + (f", force {force:.2f} N" if n else "")
+        noise = (
+            Message(", noise of one {noise:.2f} GL, motion {px:.4f} px", burst.noise, motion.px)
+            if burst.n > 1
+            else ""
+        )
+        text = Message("reference: {n} frames{noise}", burst.n, noise) + (
+            Message(", force {force:.2f} N", force) if n else ""
+        )
         self._run_state.event_log.record(
             Event(burst.t, EventKind.REFERENCE, "measurement", text, "info", data)
         )
@@ -151,12 +166,14 @@ class SmearGuard:
         # Hysteresis: a motion near the limit does not repeat the events.
         calm = burst.motion_px < 0.8 * self._limit
         if smeared and not self._smeared:
-            text = (
-                f"the picture moves {burst.motion_px:.2f} px during a burst of {burst.n}; take shorter bursts"
+            text = Message(
+                "the picture moves {motion_px:.2f} px during a burst of {n}; take shorter bursts",
+                burst.motion_px,
+                burst.n,
             )
             self._emit(burst, text, "warning")
         elif calm and self._smeared:
-            self._emit(burst, "the picture stands still enough again during a burst", "info")
+            self._emit(burst, Message("the picture stands still enough again during a burst"), "info")
         self._smeared = smeared or (self._smeared and not calm)
 
     def _emit(self, burst: Burst, text: str, level: Level) -> None:
@@ -233,11 +250,11 @@ class Measurer:
                 self._measure(ready)
         except PhasedicError as error:
             self._refused = error
-            self._stop.request("the start failed")
+            self._stop.request(Message("the start failed"))
         except Exception as error:
             log.exception("the measurement failed")
             self.failure = 1
-            text = f"measuring has stopped by a defect, recording goes on: {error!r}"
+            text = Message("measuring has stopped by a defect, recording goes on: {error}", repr(error))
             self._run_state.event_log.emit(EventKind.MEASUREMENT, "measurement", text, "error")
             self._incoming.skip_rest()
 
@@ -281,5 +298,5 @@ class Measurer:
 
 def _measured(burst: Burst) -> Event:
     data = {"first": burst.first_index, "last": burst.last_index, "n": burst.n, "lost": burst.lost}
-    text = f"frames {burst.first_index} to {burst.last_index}"
+    text = Message("frames {first_index} to {last_index}", burst.first_index, burst.last_index)
     return Event(burst.t, EventKind.MEASURED, "measurement", text, "info", data)

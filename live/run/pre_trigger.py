@@ -16,6 +16,7 @@ from typing import Any, Protocol
 from acquire.events import Event, EventKind
 from acquire.frame import Burst, Frame
 from acquire.load_sample import LoadSample
+from acquire.text import Message
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import FrameCounts
 from live.pipeline.timed.figure import TimedFigure
@@ -147,7 +148,7 @@ class PreTriggerBuffer(Subscriber):
         """Take a load sample: always recorded, since the pictures just before it need its force."""
         self._recorder.sample(sample)
         if abs(sample.force) > self._above_N and not self.on:
-            self._switch_on(f"the force is above {self._above_N:g} N")
+            self._switch_on(Message("the force is above {above_N:g} N", self._above_N))
         self._watch_force()
 
     def _watch_force(self) -> None:
@@ -170,9 +171,9 @@ class PreTriggerBuffer(Subscriber):
     def command(self, what: str) -> str:
         """Begin (START) or end recording; raises ControlRefused where it is so already, or nothing can be written."""
         if self.failed is not None:
-            raise ControlRefused(f"nothing can be recorded: {self.failed}")
+            raise ControlRefused("nothing can be recorded: {failed}", self.failed)
         if (what == START) is self.on:
-            raise ControlRefused("recording already" if self.on else "not recording")
+            raise ControlRefused(Message("recording already") if self.on else Message("not recording"))
         return self._switch_on("ordered") if what == START else self._switch_off()
 
     def close(self, frame_counts: dict[str, Any]) -> None:
@@ -193,15 +194,15 @@ class PreTriggerBuffer(Subscriber):
             for _, _, item in kept:
                 self._pass(item)
         kind = "bursts" if self._settings.bursts else "frames"
-        text = f"recording begins ({why}), with {len(pictures)} {kind} before"
+        text = Message("recording begins ({why}), with {len} {kind} before", why, len(pictures), kind)
         self._event_log.emit(EventKind.RECORD, "operator", text, data={"on": True, "before": len(pictures)})
-        return f"with {len(pictures)} before"
+        return Message("with {len} before", len(pictures))
 
     def _switch_off(self) -> str:
         with self._lock:
             self.on = False
         self._event_log.emit(
-            EventKind.RECORD, "operator", "recording ends, measuring goes on", data={"on": False}
+            EventKind.RECORD, "operator", Message("recording ends, measuring goes on"), data={"on": False}
         )
         return ""
 

@@ -22,6 +22,7 @@ from acquire.hdf5 import forecast, network_share
 from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import RotatingWriter, SessionInfo, SessionWriter
+from acquire.text import Message
 from live.pipeline.event_log import EventLog
 from live.pipeline.queues import BoundedQueue
 from live.pipeline.run_state import FrameCounts, RunState
@@ -65,7 +66,7 @@ def open_recording(
         int(record.buffer_MB * 1e6),
         mode=mode,
         waits=not camera.live,
-        on_failure=lambda: stop.request("recording failed") if record.when_full == "stop" else None,
+        on_failure=lambda: stop.request(Message("recording failed")) if record.when_full == "stop" else None,
         health=run_state.health,
     )
     settings = PreTrigger(
@@ -101,10 +102,16 @@ def _announce_disk(path: Path, camera: CameraInfo, mode: RecordMode, screen: Scr
     """Show how long the disk lasts, and warn of a network share; the time, s."""
     rate = camera.width * camera.height * (2 if camera.bits > 8 else 1) * (camera.fps or 30.0) / mode.every
     minutes = forecast(path, rate) / 60
-    where = f"recording about {rate / 1e6:.0f} MB/s at most, room for {minutes:.0f} minutes"
-    screen.print(f"warning: {where}" if minutes < 30 else where)
+    where = Message(
+        "recording about {rate:.0f} MB/s at most, room for {minutes:.0f} minutes", rate / 1e6, minutes
+    )
+    screen.print(Message("warning: {where}", where) if minutes < 30 else where)
     if share := network_share(path):
-        screen.print(f"warning: {path.parent} is on a network share ({share}); a local disk is safer")
+        screen.print(
+            Message(
+                "warning: {parent} is on a network share ({share}); a local disk is safer", path.parent, share
+            )
+        )
     return minutes * 60
 
 
@@ -180,7 +187,7 @@ class Recorder:
             self._end_gap()
             return True
         if self._gap == 0 and self.failed is None:
-            text = "the disk is too slow, frames are not recorded; measuring goes on"
+            text = Message("the disk is too slow, frames are not recorded; measuring goes on")
             self._event_log.emit(EventKind.RECORDER, "recorder", text, "error", {"from": index})
         self._gap += n
         return False
@@ -188,7 +195,7 @@ class Recorder:
     def _end_gap(self) -> None:
         if not self._gap:
             return
-        text = f"recording again after {self._gap} frames that are not in the session"
+        text = Message("recording again after {gap} frames that are not in the session", self._gap)
         self._event_log.emit(EventKind.RECORDER, "recorder", text, "warning", {"count": self._gap})
         self._gap = 0
 
@@ -247,7 +254,9 @@ class Recorder:
         left = forecast(self._writer.path, rate)
         self._health.room(self._now(), left)
         if left < _DISK_WARN_S and not self._disk_warned:
-            text = f"the disk is full in {left:.0f} s at this rate; free some space, the recording goes on"
+            text = Message(
+                "the disk is full in {left:.0f} s at this rate; free some space, the recording goes on", left
+            )
             self._event_log.emit(
                 EventKind.RECORDER, str(self._writer.path), text, "warning", {"seconds": left}
             )
@@ -272,10 +281,10 @@ class Recorder:
         try:
             write()
         except DataError as error:
-            self._fail(str(error))
+            self._fail(error.text)
         except Exception as error:
             log.exception("the recorder failed")
-            self._fail(f"a defect of the recorder: {error!r}")
+            self._fail(Message("a defect of the recorder: {error}", repr(error)))
         else:
             return True
         return False
@@ -286,6 +295,6 @@ class Recorder:
         self.failed = why
         lost = self._writer.unflushed_frames  # written, and gone with the file
         self._frame_counts.add(recorded=-lost, unrecorded=lost)
-        text = f"recording has stopped, measuring goes on: {why}"
+        text = Message("recording has stopped, measuring goes on: {why}", why)
         self._event_log.emit(EventKind.RECORDER, "recorder", text, "error")
         self._on_failure()

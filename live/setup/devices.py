@@ -115,7 +115,9 @@ def _check_one_specimen(addresses: Sequence[str]) -> None:
         differ = sorted(key for key in SPECIMEN_KEYS if first.get(key) != second.get(key))
         if differ or found[0].target != other.target:
             what = differ[0] if differ else "kind"
-            raise ConfigError(f"{other.text}: not the specimen of the front; give {what} as in its address")
+            raise ConfigError(
+                "{text}: not the specimen of the front; give {what} as in its address", other.text, what
+            )
 
 
 def check_load_port(address: str) -> None:

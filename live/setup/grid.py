@@ -35,13 +35,19 @@ def grid_for(config: Config, width: int, height: int, mask: NDArray[np.bool_] | 
     x, y, w, h = m.roi if isinstance(m.roi, tuple) else whole_picture(width, height, m.zoi)
     if x + w > width or y + h > height:
         raise ConfigError(
-            f"measure.roi = {x},{y},{w},{h} leaves the picture of {width} x {height} px;"
-            f" allowed: x + width <= {width}, y + height <= {height}"
+            "measure.roi = {x},{y},{w},{h} leaves the picture of {width} x {height} px; allowed: x + width <= "
+            "{width}, y + height <= {height}",
+            x,
+            y,
+            w,
+            h,
+            width,
+            height,
         )
     try:
         grid = ZoiGrid.cover(Roi(x, y, w, h), size=m.zoi, step=m.step, mask=mask)
     except ValueError as error:
-        raise ConfigError(f"measure: {error}") from None
+        raise ConfigError("measure: {error}", error) from None
     return without_plates(grid, _boxes(config)) if config.plate else grid
 
 
@@ -55,13 +61,18 @@ def plates_for(config: Config, grid: ZoiGrid, width: int, height: int) -> PlateL
     """
     for name, (x, y, w, h) in _boxes(config).items():
         if x + w > width or y + h > height:
-            raise ConfigError(f"plate.{name}: the box leaves the picture of {width} x {height} px; move it")
+            raise ConfigError(
+                "plate.{name}: the box leaves the picture of {width} x {height} px; move it",
+                name,
+                width,
+                height,
+            )
     if not config.plate:
         return None
     try:
         return PlateLayout.of(grid, _boxes(config))
     except ValueError as error:
-        raise ConfigError(f"plate: {error}") from None
+        raise ConfigError("plate: {error}", error) from None
 
 
 def _boxes(config: Config) -> dict[str, Box]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 from analysis.optics import LensModel, strain_of_shift
 from live.config.loading import Config
 from live.config.sections import LensConfig
@@ -32,17 +33,29 @@ def lens_for(config: Config, width: int, height: int, grid: ZoiGrid) -> LensMode
     lens = _lens(given)
     if given.picture is not None and given.picture != (width, height):
         raise ConfigError(
-            f"lens: it was calibrated with pictures of {given.picture[0]} x {given.picture[1]} px, these have"
-            f" {width} x {height}; calibrate with the same format and --crop, or measure with --no-lens"
+            "lens: it was calibrated with pictures of {picture} x {picture2} px, these have {width} x {height}; "
+            "calibrate with the same format and --crop, or measure with --no-lens",
+            given.picture[0],
+            given.picture[1],
+            width,
+            height,
         )
     x, y = np.meshgrid(grid.x, grid.y)
     x, y = x[grid.active], y[grid.active]
     if given.box is not None and not _inside(given.box, x, y):
         left, top, across, down = given.box
         raise ConfigError(
-            f"lens: ZOIs from {x.min():.0f},{y.min():.0f} to {x.max():.0f},{y.max():.0f} px leave the part that was"
-            f" calibrated, {left:.0f},{top:.0f} to {left + across:.0f},{top + down:.0f}; calibrate over the whole"
-            " region, take a smaller --roi, or measure with --no-lens"
+            "lens: ZOIs from {min:.0f},{min2:.0f} to {max:.0f},{max2:.0f} px leave the part that was calibrated, "
+            "{left:.0f},{top:.0f} to {left2:.0f},{top2:.0f}; calibrate over the whole region, take a smaller "
+            "--roi, or measure with --no-lens",
+            x.min(),
+            y.min(),
+            x.max(),
+            y.max(),
+            left,
+            top,
+            left + across,
+            top + down,
         )
     if not lens.is_single_valued(x, y):
         raise ConfigError("lens: its terms fold the picture at the ZOIs; calibrate again")
@@ -65,7 +78,10 @@ def _inside(box: tuple[float, float, float, float], x: np.ndarray, y: np.ndarray
 def lens_words(lens: LensModel, grid: ZoiGrid) -> str:
     """What the lens does to the strain of the region, and how well that is known."""
     strain, sigma = strain_of_shift(lens, grid, SHOWN_SHIFT_PX)
-    return (
-        f"a shift of {SHOWN_SHIFT_PX:g} px shows {strain * 1e6:.1f} µm/m in the region; removed, known to"
-        f" {sigma * 1e6:.2g} µm/m"
+    return Message(
+        "a shift of {SHOWN_SHIFT_PX:g} px shows {strain:.1f} µm/m in the region; removed, known to "
+        "{sigma:.2g} µm/m",
+        SHOWN_SHIFT_PX,
+        strain * 1e6,
+        sigma * 1e6,
     )

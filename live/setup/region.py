@@ -21,6 +21,7 @@ from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError, DeviceError
 from acquire.events import Event, EventSink
 from acquire.frame import QUANTISATION, CameraInfo, Frame
+from acquire.text import Message
 from live.config.loading import Config
 from live.config.values import ALL, AUTO
 from live.setup.devices import at_rest, open_rig
@@ -95,7 +96,9 @@ def region_of(config: Config, picture: NDArray[Any], noise: float | None = None)
     box = config.measure.roi if isinstance(config.measure.roi, tuple) else None
     if not is_auto_region(config):
         mask = read_mask(config.measure.mask, width, height)
-        words = "as given" if box is not None or mask is not None else "all but a rim, as given"
+        words = (
+            Message("as given") if box is not None or mask is not None else Message("all but a rim, as given")
+        )
         return Region(box, mask, words)
     return _found(config, picture, noise)
 
@@ -104,15 +107,17 @@ def _found(config: Config, picture: NDArray[Any], noise: float | None) -> Region
     from analysis.quality.specimen import find_specimen
 
     height, width = picture.shape
-    none = Region(None, None, "no specimen was found that stands out: all but a rim")
+    none = Region(None, None, Message("no specimen was found that stands out: all but a rim"))
     specimen = find_specimen(picture, noise) if min(picture.shape) >= config.measure.zoi else None
     if specimen is None:
         return none
     if specimen.share > FILLS_PICTURE and _deepest_gap(specimen.mask) < config.measure.zoi / 4:
-        return Region(None, None, "the specimen fills the picture: all but a rim", found=True)
+        return Region(None, None, Message("the specimen fills the picture: all but a rim"), found=True)
     box = _within(specimen.box.x, specimen.box.y, specimen.box.width, specimen.box.height, config, picture)
-    share = f"{specimen.share:.0%} of the picture"
-    words = f"the specimen was found: {share}, within x,y,width,height = {','.join(map(str, box))}"
+    share = Message("{share:.0%} of the picture", specimen.share)
+    words = Message(
+        "the specimen was found: {share}, within x,y,width,height = {join}", share, ",".join(map(str, box))
+    )
     region = Region(box, specimen.mask, words, found=True)
     try:
         zois = region.grid(config, width, height).n_active
@@ -198,7 +203,7 @@ def first_look(config: Config, print_line: Callable[[str], None]) -> FirstLook:
     finally:
         rig.close()
     if not images:
-        raise DataError(f"{config.camera.address}: gave no whole frame; look at the camera")
+        raise DataError("{address}: gave no whole frame; look at the camera", config.camera.address)
     return FirstLook(*_mean_and_noise(images), rig.camera.info)
 
 
@@ -222,8 +227,10 @@ def _whole_frames(camera: Camera) -> Iterator[Frame]:
             yield frame
         elif silent:
             raise DeviceError(
-                f"{camera.info.name}: no whole picture came in {SILENCE_S:g} s; look at its cable, its trigger and the"
-                " light, and call again"
+                "{name}: no whole picture came in {SILENCE_S:g} s; look at its cable, its trigger and the light, and "
+                "call again",
+                camera.info.name,
+                SILENCE_S,
             )
         else:
             return
@@ -274,5 +281,5 @@ def located_on(
     """
     region = region_of(config, first.picture, first.visible_noise)
     if is_auto_region(config):
-        print_line(f"{region.words} (--roi all or --roi X,Y,W,H choose another region)")
+        print_line(Message("{words} (--roi all or --roi X,Y,W,H choose another region)", region.words))
     return with_auto_gauges(region.config(config), region.grid(config, *first.size)), region.mask

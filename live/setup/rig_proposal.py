@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from acquire.errors import ConfigError
-from acquire.printable import printable
+from acquire.text.printable import printable
 from analysis.quality.pattern import zoi_pattern
 from analysis.quality.plates import FoundPlates, find_plates
 from analysis.quality.specimen import find_specimen

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
+from acquire.text import Message
 from live.setup.region import Region
 
 Bools = NDArray[np.bool_]
@@ -80,7 +81,9 @@ def from_points(points: tuple[float, float, float, float], length_mm: float, sig
         raise ConfigError("the scale needs two points more than 1 px apart and a length above 0 mm")
     relative = math.hypot(math.sqrt(2) * POINT_PX / px, sigma_mm / length_mm)
     scale = length_mm / px
-    return Scale(scale, scale * relative, f"two points {px:.1f} px apart, {length_mm:g} mm")
+    return Scale(
+        scale, scale * relative, Message("two points {px:.1f} px apart, {length_mm:g} mm", px, length_mm)
+    )
 
 
 def from_width(
@@ -97,9 +100,16 @@ def from_width(
     scale = width_mm / px
     relative = math.hypot(sigma_px / px, sigma_mm / width_mm)
     remarks = (
-        ("the edges are known to some px only: two points or a board are better",) if relative > 0.01 else ()
+        (Message("the edges are known to some px only: two points or a board are better"),)
+        if relative > 0.01
+        else ()
     )
-    return Scale(scale, scale * relative, f"width of the specimen, {px:.1f} px are {width_mm:g} mm", remarks)
+    return Scale(
+        scale,
+        scale * relative,
+        Message("width of the specimen, {px:.1f} px are {width_mm:g} mm", px, width_mm),
+        remarks,
+    )
 
 
 def false_strain(stand_off_mm: float, out_of_plane_mm: float = OUT_OF_PLANE_MM) -> float:
@@ -213,7 +223,9 @@ class Board:
 
     def __post_init__(self) -> None:
         if not (3 <= self.columns <= MAX_SQUARES and 3 <= self.rows <= MAX_SQUARES and self.square_mm > 0):
-            raise ConfigError(f"a board has 3 to {MAX_SQUARES} columns and rows, and squares above 0 mm")
+            raise ConfigError(
+                "a board has 3 to {MAX_SQUARES} columns and rows, and squares above 0 mm", MAX_SQUARES
+            )
         if not 0 <= self.marker_mm < self.square_mm:
             raise ConfigError("the markers of a ChArUco board are smaller than its squares")
 
@@ -240,11 +252,15 @@ def find_corners(picture: NDArray[Any], board: Board) -> Corners:
     grey = np.clip((picture - low) * (255 / max(float(high - low), 1e-6)), 0, 255).astype(np.uint8)
     found = _charuco(grey, board) if board.marker_mm else _checkerboard(grey, board)
     if found is None or len(found.px) < MIN_CORNERS:
-        kind = "ChArUco board" if board.marker_mm else "checkerboard"
-        count = "squares" if board.marker_mm else "inner corners"
+        kind = Message("ChArUco board") if board.marker_mm else "checkerboard"
+        count = "squares" if board.marker_mm else Message("inner corners")
         raise DataError(
-            f"no {kind} of {board.columns} x {board.rows} {count} is found; hold all of it in the picture, in focus"
-            " and evenly lit, and count again"
+            "no {kind} of {columns} x {rows} {count} is found; hold all of it in the picture, in focus and "
+            "evenly lit, and count again",
+            kind,
+            board.columns,
+            board.rows,
+            count,
         )
     return found
 
@@ -267,11 +283,12 @@ def _charuco(grey: NDArray[np.uint8], board: Board) -> Corners | None:
     name = f"DICT_{board.dictionary.upper()}"
     if not (name.replace("_", "").isalnum() and hasattr(cv2.aruco, name)):
         raise ConfigError(
-            f"no dictionary of markers {board.dictionary!r}; give one as 4X4_50, 5X5_100, APRILTAG_36H11"
+            "no dictionary of markers {dictionary}; give one as 4X4_50, 5X5_100, APRILTAG_36H11",
+            repr(board.dictionary),
         )
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
     if len(dictionary.bytesList) < board.columns * board.rows // 2:
-        raise ConfigError(f"the dictionary {board.dictionary} has too few markers for this board")
+        raise ConfigError("the dictionary {dictionary} has too few markers for this board", board.dictionary)
     made = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square_mm, board.marker_mm, dictionary)
     corners, ids, _, _ = cv2.aruco.CharucoDetector(made).detectBoard(grey)
     if ids is None:
@@ -311,9 +328,9 @@ def from_board(
     uneven = 1 - smaller / larger
     fit = rms / (larger * spread * math.sqrt(len(corners.mm)))
     relative = math.sqrt(fit**2 + (sigma_mm / extent) ** 2 + uneven**2 / 12)
-    kind = "ChArUco board" if board.marker_mm else "checkerboard"
+    kind = Message("ChArUco board") if board.marker_mm else "checkerboard"
     scale = float(math.sqrt(1 / (larger * smaller)))
-    method = f"{kind} of {len(corners.mm)} corners, {rms:.2f} px rms"
+    method = Message("{kind} of {len} corners, {rms:.2f} px rms", kind, len(corners.mm), rms)
     change = float(np.hypot(*gradient)) * extent
     return Scale(scale, scale * relative, method, tuple(_tilt(change, float(uneven), extent, stand_off_mm)))
 
@@ -325,8 +342,13 @@ def _tilt(change: float, uneven: float, extent: float, stand_off_mm: float | Non
     if stand_off_mm is not None:
         degrees = math.degrees(math.asin(min(change / extent * stand_off_mm, 1.0)))
     yield (
-        f"the board is tilted, about {degrees:.0f} degrees: the scale changes by {change:.1%} over it and by"
-        f" {uneven:.1%} between its directions; set the camera square to the specimen"
+        Message(
+            "the board is tilted, about {degrees:.0f} degrees: the scale changes by {change:.1%} over it and by "
+            "{uneven:.1%} between its directions; set the camera square to the specimen",
+            degrees,
+            change,
+            uneven,
+        )
     )
 
 

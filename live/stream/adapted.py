@@ -16,6 +16,7 @@ from acquire.frame import Frame
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from acquire.system import lower_priority
+from acquire.text import Message
 from live.pipeline.consumer import KINDS, Consumer, ConsumerReport, Policy, kinds_taken
 from live.pipeline.event_log import EventLog
 from live.pipeline.latency import OUTPUT
@@ -110,7 +111,7 @@ class Adapted(Subscriber):
                 self._changed.notify_all()
             self._thread.join(self._consumer.timeout_s)
             if self._thread.is_alive():
-                self._fail("did not take its data in time and was left behind")
+                self._fail(Message("did not take its data in time and was left behind"))
         elif not self._ending:
             self._ending = True
             self._close()
@@ -173,10 +174,10 @@ class Adapted(Subscriber):
         try:
             step()
         except PhasedicError as error:
-            self._fail(str(error))
+            self._fail(error.text)
         except BaseException as error:  # a panic inside a library is not an Exception
             log.exception("%s failed", self._consumer.name)
-            self._fail(f"by a defect: {error!r}")
+            self._fail(Message("by a defect: {error}", repr(error)))
         else:
             return True
         return False
@@ -258,5 +259,5 @@ class Outputs:
         self._reports = [adapted.end() for adapted in self._adapted]
 
     def _report_failure(self, name: str, why: str, critical: bool) -> None:
-        text = f"{name} stopped, all else goes on: {why}"
+        text = Message("{name} stopped, all else goes on: {why}", name, why)
         self._event_log.emit(EventKind.VIEW, name, text, "error" if critical else "warning")

@@ -10,6 +10,7 @@ from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
+from acquire.text import Message
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.stream.record import LoadEnded, Record
@@ -88,7 +89,7 @@ class StateKeeper(Subscriber):
         self._load_ended = True
         if error is not None:
             self.load_failure = error.exit_code if isinstance(error, PhasedicError) else 1
-            text = f"the load is lost, images go on: {error}"
+            text = Message("the load is lost, images go on: {error}", error)
             self._run_state.event_log.emit(EventKind.DEVICE, self._load, text, "error")
         self._run_state.loads.close()
 
@@ -102,6 +103,8 @@ class StateKeeper(Subscriber):
             return
         missing = max(1, round(silent_s * rate))
         self._run_state.frame_counts.add(load_lost=missing)
-        text = f"the load is missing at the end: no sample came for the last {silent_s:.1f} s"
+        text = Message(
+            "the load is missing at the end: no sample came for the last {silent_s:.1f} s", silent_s
+        )
         data = {"count": missing, "where": "end"}
         self._run_state.event_log.emit(EventKind.LOST, self._load, text, "warning", data)

@@ -21,7 +21,7 @@ from acquire.files.picture import (
     read_picture,
     write_picture,
 )
-from acquire.printable import printable
+from acquire.text.printable import printable
 
 
 def smooth(dtype: type = np.uint8) -> np.ndarray:

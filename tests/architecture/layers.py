@@ -7,26 +7,27 @@ PACKAGES = ("acquire", "analysis", "hw_mocks", "live")
 # Package -> what it may import besides itself. A line also covers the sub-packages that have none of
 # their own. Imports for a type checker count too.
 ACQUIRE = {
-    "acquire": "",  # frame, errors, events, addresses ...
-    "acquire.hdf5": "acquire",
-    "acquire.files": "acquire",
-    "acquire.burst": "acquire acquire.files",
-    "acquire.camera": "acquire",
-    "acquire.load_cell": "acquire",
-    "acquire.protocols": "acquire",
-    "acquire.opencv": "acquire acquire.camera acquire.files",
-    "acquire.v4l2": "acquire acquire.camera acquire.opencv",
-    "acquire.genicam": "acquire acquire.camera",
-    "acquire.pylon": "acquire acquire.camera acquire.genicam",
-    "acquire.serial_line": "acquire acquire.load_cell acquire.protocols",
-    "acquire.session": "acquire acquire.hdf5",
+    "acquire.text": "",
+    "acquire": "acquire.text",  # frame, errors, events, addresses ...
+    "acquire.hdf5": "acquire acquire.text",
+    "acquire.files": "acquire acquire.text",
+    "acquire.burst": "acquire acquire.text acquire.files",
+    "acquire.camera": "acquire acquire.text",
+    "acquire.load_cell": "acquire acquire.text",
+    "acquire.protocols": "acquire acquire.text",
+    "acquire.opencv": "acquire acquire.text acquire.camera acquire.files",
+    "acquire.v4l2": "acquire acquire.text acquire.camera acquire.opencv",
+    "acquire.genicam": "acquire acquire.text acquire.camera",
+    "acquire.pylon": "acquire acquire.text acquire.camera acquire.genicam",
+    "acquire.serial_line": "acquire acquire.text acquire.load_cell acquire.protocols",
+    "acquire.session": "acquire acquire.text acquire.hdf5",
 }
 ANALYSIS = {
-    "analysis.field": "",
+    "analysis.field": "acquire.text",
     "analysis.compiled": "",
     "analysis.picture": "analysis.field analysis.compiled",
     "analysis.follow": "analysis.field analysis.compiled",
-    "analysis.evaluate": "analysis.field",
+    "analysis.evaluate": "analysis.field acquire.text",
     "analysis.optics": "analysis.field analysis.evaluate",
     "analysis.quality": "analysis.field analysis.picture",
     "analysis.fit": "analysis.field analysis.compiled analysis.picture",
@@ -37,6 +38,7 @@ ANALYSIS = {
 }
 # From the bottom to the top: each may import those before it, and acquire and analysis.
 LIVE = (
+    "live.words",
     "live.config",
     "live.pipeline",
     "live.stream",
@@ -51,7 +53,7 @@ SIDE_BY_SIDE = {"live.replay": "live.run"}
 LAYERS = {
     **ACQUIRE,
     **ANALYSIS,
-    "hw_mocks": "acquire acquire.camera acquire.load_cell",
+    "hw_mocks": "acquire acquire.text acquire.camera acquire.load_cell",
     "live": "",  # the version
     "live.__main__": "live.cli",
     **{
@@ -65,7 +67,7 @@ LAYERS = {
         )
         for i, layer in enumerate(LIVE)
     },
-    "live.cli": "acquire.errors acquire.printable live.commands.arguments live.commands.environment"
+    "live.cli": "acquire.errors acquire.text.printable live.commands.arguments live.commands.environment"
     " live.commands.exit_codes live.commands.signals live.commands.streams",
 }
 # One module opens the simulated devices. The demo compares with their truth.

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquire.printable import share_text
+from acquire.text.printable import share_text
 from analysis import Status, StrainField
 from analysis.evaluate import AreaGauge, Gauge
 from analysis.field import ZoiGrid

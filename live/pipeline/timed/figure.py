@@ -13,6 +13,8 @@ from enum import StrEnum
 from itertools import pairwise
 from statistics import median
 
+from acquire.text import Message
+
 OLD_S, OLD_INTERVALS, ARRIVALS = 2.0, 5, 20
 TOGETHER_S = 0.1
 """What comes within this time of another arrival came with it: lines that a device sends in one go."""
@@ -26,7 +28,7 @@ class FigureState(StrEnum):
     UNKNOWN = "unknown"  # what comes gives no value
     OVERLOAD = "overload"  # as the load cell says
     UNDERLOAD = "underload"
-    NOT_YET = "not yet"  # at the start, and after a pause
+    NOT_YET = Message("not yet")  # at the start, and after a pause
     PAUSED = "paused"
     ENDED = "ended"
     NONE = "none"  # there is no such source
@@ -130,7 +132,11 @@ class TimedFigure:
     def trouble(self, name: str) -> str:
         """What is wrong with the figure ``name``, in words; empty where nothing is."""
         if self.state in BEYOND:
-            return f"{name}: {self.state.upper()}"
+            return Message("{name}: {upper}", name, self.state.upper())
         if self.state not in LACKING:
             return ""
-        return f"no value of {name}: {self.why}" if self.why else f"no value of {name} for {self.age:.0f} s"
+        return (
+            Message("no value of {name}: {why}", name, self.why)
+            if self.why
+            else Message("no value of {name} for {age:.0f} s", name, self.age)
+        )

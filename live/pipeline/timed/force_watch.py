@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from acquire.events import Event, EventKind, Level
+from acquire.text import Message
 from live.pipeline.consumer import Consumer
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
@@ -33,7 +34,9 @@ class ForceWatch(Consumer):
         self._last_t = t
         if not math.isnan(measurement.force):
             if self._reported:
-                self._emit(t, f"bursts have a force again, after {self._count} without", "info")
+                self._emit(
+                    t, Message("bursts have a force again, after {count} without", self._count), "info"
+                )
             self._since, self._count, self._reported = math.nan, 0, False
             return
         self._since = t if math.isnan(self._since) else self._since
@@ -46,7 +49,11 @@ class ForceWatch(Consumer):
             why = self._run_state.loads.why_none_at(t)
             self._emit(
                 t,
-                f"no force for the bursts of the last {self._newest_t - self._since:.1f} s: {why}",
+                Message(
+                    "no force for the bursts of the last {newest_t:.1f} s: {why}",
+                    self._newest_t - self._since,
+                    why,
+                ),
                 "warning",
             )
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadFlag
+from acquire.text import Message
 from live.pipeline.history import History
 from live.pipeline.measurement import TimeStep
 from live.pipeline.snapshot import AXIAL, BURST, DISK, FPS, peak_force
@@ -112,7 +113,7 @@ class Health:
         t, disk_t = (self.frame_t, self.disk_t) if self.live else (now, now)
         fps = TimedFigure.at(now, t, self.fps, lasts_s=self.frames.lasts_s)
         if self.camera_failed:
-            fps = fps.but(FigureState.UNKNOWN, "the camera has failed")
+            fps = fps.but(FigureState.UNKNOWN, Message("the camera has failed"))
         elif self.camera_ended:
             fps = fps.but(FigureState.ENDED)
         elif math.isnan(self.frame_t):
@@ -127,7 +128,7 @@ def force_at(now: float, health: Health, loads: LoadLog, step: TimeStep | None) 
     if not health.live:
         return _force_of(step, loads)
     newest, latest, lasts_s = loads.telling, loads.latest, health.readings.lasts_s
-    began = TimedFigure.at(now, health.began_t, math.nan, lasts_s=lasts_s, why="nothing came yet")
+    began = TimedFigure.at(now, health.began_t, math.nan, lasts_s=lasts_s, why=Message("nothing came yet"))
     if newest is None and began.state is not FigureState.OLD:
         return TimedFigure(state=FigureState.NOT_YET)
     found = began if newest is None else TimedFigure.at(now, newest.t, newest.force, lasts_s=lasts_s)
@@ -139,15 +140,19 @@ def force_at(now: float, health: Health, loads: LoadLog, step: TimeStep | None) 
     if latest is None or now - latest.t > lasts_s:
         return found
     stale = LoadFlag.STALE in latest.flags
-    why = "the time of its readings is not known" if stale else "the lines of the load cell are no readings"
-    return found.but(FigureState.UNKNOWN, f"{why}, for {found.age:.0f} s")
+    why = (
+        Message("the time of its readings is not known")
+        if stale
+        else Message("the lines of the load cell are no readings")
+    )
+    return found.but(FigureState.UNKNOWN, Message("{why}, for {age:.0f} s", why, found.age))
 
 
 def _force_of(step: TimeStep | None, loads: LoadLog) -> TimedFigure:
     """The force at a time step of recorded pictures."""
     if step is None or (math.isnan(step.force) and not loads.covers(step.t)):
         return TimedFigure(state=FigureState.NOT_YET)
-    return TimedFigure.at(step.t, step.t, step.force, why="none is recorded at this time")
+    return TimedFigure.at(step.t, step.t, step.force, why=Message("none is recorded at this time"))
 
 
 def strains_at(now: float, health: Health, history: History, step: TimeStep | None) -> dict[str, TimedFigure]:
@@ -156,7 +161,7 @@ def strains_at(now: float, health: Health, history: History, step: TimeStep | No
     if step is None:
         no_frames = health.machine(now)[FPS]
         lacks = no_frames.state in LACKING
-        why = no_frames.why or f"no frame for {no_frames.age:.0f} s"
+        why = no_frames.why or Message("no frame for {age:.0f} s", no_frames.age)
         none = (
             TimedFigure(state=FigureState.UNKNOWN, why=why)
             if lacks

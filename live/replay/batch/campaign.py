@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import ConfigError, DataError, PhasedicError
-from acquire.printable import counted
+from acquire.text.printable import counted
 from live.config.loading import load_config
 from live.pipeline.screen import Screen
 from live.replay.batch.cluster import Cluster, check_scheduler
@@ -217,7 +217,7 @@ def _planned(wanted: CampaignRequest) -> tuple[dict[str, BatchRow], list[Task]]:
         try:
             task = dataclasses.replace(task, key=key_of(task))
         except PhasedicError as error:
-            rows[task.name] = failed(task.name, task.source, str(error), error.exit_code)
+            rows[task.name] = failed(task.name, task.source, error.text, error.exit_code)
             continue
         if (row := row_done(task)) is not None:
             rows[task.name] = row

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import ConfigError, DataError
-from acquire.printable import printable
+from acquire.text.printable import printable
 from live.pipeline.screen import Screen
 from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow, failed

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from acquire.printable import printable
+from acquire.text.printable import printable
 from analysis.evaluate import TensileFigures
 from live.config.loading import Config
 from live.pipeline.history import History

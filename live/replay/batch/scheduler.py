@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import PhasedicError
-from acquire.printable import duration
+from acquire.text.printable import duration
 from live.pipeline.screen import Screen
 from live.replay.batch.keys import is_session, key_of_chunk
 from live.replay.batch.row import RENEWED, BatchRow, failed

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from acquire.errors import PhasedicError
-from acquire.printable import printable
+from acquire.text.printable import printable
 from live.pipeline.screen import Screen
 from live.replay.batch.row import BatchRow, failed, row_of, row_of_chunk
 from live.replay.batch.workdir import make, publish, remove, staging_dir, sweep
@@ -179,7 +179,7 @@ def perform(task: Task, on_progress: OnProgress = _no_progress) -> BatchRow:
         publish(staging, task.folder)
         return row
     except PhasedicError as error:
-        return _not_done(task, staging, str(error), error.exit_code)
+        return _not_done(task, staging, error.text, error.exit_code)
     except OSError as error:
         words = f"{error.filename or task.folder}: cannot be written ({error.strerror or error}); make room"
         return _not_done(task, staging, words, 4)

@@ -18,7 +18,7 @@ from typing import Any
 from acquire.addresses import expanded, parse_address
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
-from acquire.printable import printable
+from acquire.text.printable import printable
 
 LISTS = (".toml", ".csv")
 _PICTURES = (".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm")

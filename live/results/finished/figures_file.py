@@ -83,7 +83,7 @@ def finished(
     try:
         FiguresFile.of(test, run_state.frame_counts.as_dict(), exit_code).write(folder)
     except PhasedicError as error:
-        run_state.event_log.emit(EventKind.RECORDER, FILE, str(error), "warning")
+        run_state.event_log.emit(EventKind.RECORDER, FILE, error.text, "warning")
     return test
 
 

@@ -7,6 +7,7 @@ import math
 from acquire.burst import sum_kind
 from acquire.hdf5 import free_bytes
 from acquire.record_mode import RecordMode
+from acquire.text import Message
 from live.config.cameras import other_cameras
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST
@@ -44,15 +45,30 @@ def disk_lines(rate: float, config: Config) -> list[CheckLine]:
     try:
         free = free_bytes(folder)
     except OSError as error:
-        words = "connect the disk, or choose another with --out"
-        return [CheckLine("disk", f"{folder}: cannot be asked ({error.strerror})", False, words)]
+        words = Message("connect the disk, or choose another with --out")
+        return [
+            CheckLine(
+                "disk",
+                Message("{folder}: cannot be asked ({strerror})", folder, error.strerror),
+                False,
+                words,
+            )
+        ]
     minutes = math.floor(10 * free / rate / 60) / 10  # not more than there is
     return [
         CheckLine(
             "disk",
-            f"room for {minutes:.4g} min at this rate ({rate / 1e6:.3g} MB/s, {free / 1e9:.3g} GB free)",
+            Message(
+                "room for {minutes:.4g} min at this rate ({rate:.3g} MB/s, {free:.3g} GB free)",
+                minutes,
+                rate / 1e6,
+                free / 1000000000.0,
+            ),
             free / rate >= wanted_s,
-            f"too little for a test of {wanted_s / 60:.3g} min: free some space, choose another disk with --out,"
-            " or record less (--record bursts)",
+            Message(
+                "too little for a test of {wanted_s:.3g} min: free some space, choose another disk with --out, or "
+                "record less (--record bursts)",
+                wanted_s / 60,
+            ),
         )
     ]

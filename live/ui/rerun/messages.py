@@ -19,7 +19,7 @@ from analysis.field import Measure, StrainField, ZoiGrid
 from live.pipeline.measurement import Measurement
 from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
 from live.pipeline.timed.figure import FigureState, TimedFigure
-from live.ui.rerun.wire import Kind, Message, WireError
+from live.ui.rerun.wire import Kind, Parcel, WireError
 
 STRAINS = ("exx", "eyy", "exy")
 MAPS = (*STRAINS, "e1", "e2", "sigma", "residual", "status")
@@ -126,14 +126,14 @@ class PictureMessage:
     step: int
 
 
-def setup_message(setup: ViewSetup, target: ViewTarget) -> Message:
+def setup_message(setup: ViewSetup, target: ViewTarget) -> Parcel:
     """The first message."""
     meta = {one.name: getattr(setup, one.name) for one in fields(setup) if one.name != "grid"}
     meta |= {"port": target.port, "rrd": target.rrd, "recording": target.recording}
-    return Message(Kind.SETUP, {**meta, "grid": setup.grid.to_dict()}, {"active": setup.grid.active})
+    return Parcel(Kind.SETUP, {**meta, "grid": setup.grid.to_dict()}, {"active": setup.grid.active})
 
 
-def setup_of(message: Message) -> tuple[ViewSetup, ViewTarget]:
+def setup_of(message: Parcel) -> tuple[ViewSetup, ViewTarget]:
     """The content of ``setup_message``."""
     meta = dict(message.meta)
     try:
@@ -149,16 +149,16 @@ def row_of(measurement: Measurement) -> Row:
     return (i.t, i.exx, i.sigma_exx, i.eyy, i.sigma_eyy, i.exy, i.sigma_exy)
 
 
-def rows_message(kind: Kind, rows: Iterable[Row], name: str = "") -> Message:
+def rows_message(kind: Kind, rows: Iterable[Row], name: str = "") -> Parcel:
     """Means, loads, points of the curve, or the gauge ``name``; columns as in ``COLUMNS``."""
-    return Message(
+    return Parcel(
         kind,
         {"name": name} if name else {},
         {"rows": np.array(list(rows), np.float64).reshape(-1, COLUMNS[kind])},
     )
 
 
-def rows_of(message: Message) -> list[Row]:
+def rows_of(message: Parcel) -> list[Row]:
     """The content of ``rows_message``."""
     rows = _array(message, "rows")
     if rows.ndim != 2 or rows.shape[1] != COLUMNS[message.kind]:
@@ -166,16 +166,16 @@ def rows_of(message: Message) -> list[Row]:
     return [tuple(row) for row in rows.tolist()]
 
 
-def field_message(t: float, field: StrainField) -> Message:
+def field_message(t: float, field: StrainField) -> Parcel:
     """What the view draws of a strain field at ``t`` (s, monotonic); the arrays are not copied."""
     arrays: dict[str, NDArray[Any]] = {
         "parameters": field.parameters, "covariance": field.covariance, "status": field.status,
         "active": field.grid.active, "residual": field.residual,
     }  # fmt: skip
-    return Message(Kind.FIELD, {"t": t, "grid": field.grid.to_dict(), "measure": field.measure}, arrays)
+    return Parcel(Kind.FIELD, {"t": t, "grid": field.grid.to_dict(), "measure": field.measure}, arrays)
 
 
-def field_of(message: Message) -> tuple[float, StrainField]:
+def field_of(message: Parcel) -> tuple[float, StrainField]:
     """Time and field of ``field_message``; what the view does not draw is 0."""
     grid = _grid(message.meta.get("grid"), message)
     parameters, covariance, status = (_array(message, n) for n in ("parameters", "covariance", "status"))
@@ -198,14 +198,14 @@ def field_of(message: Message) -> tuple[float, StrainField]:
     return _number(message, "t"), field
 
 
-def picture_message(frame: Frame) -> Message:
+def picture_message(frame: Frame) -> Parcel:
     """A frame, thinned where it exceeds ``MAX_PICTURE_BYTES``."""
     step = max(1, math.ceil(math.sqrt(frame.image.nbytes / MAX_PICTURE_BYTES)))
     image = frame.image if step == 1 else frame.image[::step, ::step]
-    return Message(Kind.PICTURE, {"t": frame.t, "bits": frame.bits, "step": step}, {"image": image})
+    return Parcel(Kind.PICTURE, {"t": frame.t, "bits": frame.bits, "step": step}, {"image": image})
 
 
-def picture_of(message: Message) -> PictureMessage:
+def picture_of(message: Parcel) -> PictureMessage:
     """The content of ``picture_message``."""
     image = _array(message, "image")
     if image.ndim != 2 or not image.size or image.dtype.kind != "u":
@@ -214,12 +214,12 @@ def picture_of(message: Message) -> PictureMessage:
     return PictureMessage(image, bits, _number(message, "t"), step)
 
 
-def events_message(events: Sequence[Event]) -> Message:
+def events_message(events: Sequence[Event]) -> Parcel:
     """Events, without their data."""
-    return Message(Kind.EVENTS, {"events": [[e.t, e.kind, e.source, e.text, e.level] for e in events]})
+    return Parcel(Kind.EVENTS, {"events": [[e.t, e.kind, e.source, e.text, e.level] for e in events]})
 
 
-def events_of(message: Message) -> list[Event]:
+def events_of(message: Parcel) -> list[Event]:
     """The content of ``events_message``."""
     try:
         return [
@@ -230,7 +230,7 @@ def events_of(message: Message) -> list[Event]:
         raise WireError(f"events to the view are damaged: {error}") from error
 
 
-def figures_message(snapshot: Snapshot) -> Message:
+def figures_message(snapshot: Snapshot) -> Parcel:
     """The large figures of ``snapshot``."""
     meta = {
         name: getattr(snapshot, name) for name in (*_NUMBERS, "valid", "zois", "state", "axial_name", *_TEXTS)
@@ -243,10 +243,10 @@ def figures_message(snapshot: Snapshot) -> Message:
         for name in _FIGURES
         if name in snapshot.figures
     }
-    return Message(Kind.FIGURES, {**meta, "figures": figures})  # NaN is no JSON
+    return Parcel(Kind.FIGURES, {**meta, "figures": figures})  # NaN is no JSON
 
 
-def figures_of(message: Message) -> Snapshot:
+def figures_of(message: Parcel) -> Snapshot:
     """The large figures, as a snapshot without the rest."""
     meta = message.meta
     try:
@@ -276,7 +276,7 @@ def _figure(
     )
 
 
-def _measure(message: Message) -> Measure:
+def _measure(message: Parcel) -> Measure:
     name = message.meta.get("measure")
     measures: tuple[Measure, ...] = get_args(Measure)
     for measure in measures:
@@ -285,21 +285,21 @@ def _measure(message: Message) -> Measure:
     raise WireError(f"a field to the view has an unknown measure of strain {name!r}")
 
 
-def _grid(description: Any, message: Message) -> ZoiGrid:
+def _grid(description: Any, message: Parcel) -> ZoiGrid:
     try:
         return ZoiGrid.from_dict(description, _array(message, "active"))
     except (KeyError, TypeError, ValueError) as error:
         raise WireError(f"a message {message.kind.name} to the view has no grid: {error}") from error
 
 
-def _array(message: Message, name: str) -> NDArray[Any]:
+def _array(message: Parcel, name: str) -> NDArray[Any]:
     try:
         return message.arrays[name]
     except KeyError:
         raise WireError(f"a message {message.kind.name} to the view has no array {name!r}") from None
 
 
-def _number(message: Message, name: str) -> float:
+def _number(message: Parcel, name: str) -> float:
     try:
         return float(message.meta[name])
     except (KeyError, TypeError, ValueError):

@@ -24,7 +24,7 @@ from live.ui.rerun.messages import (
     rows_message,
     setup_message,
 )
-from live.ui.rerun.wire import Kind, Message
+from live.ui.rerun.wire import Kind, Parcel
 
 if TYPE_CHECKING:
     from acquire.events import Event
@@ -39,7 +39,7 @@ FIELD_HZ = 10.0
 MAX_BYTES_S = 60e6
 """Of fields, and of pictures, each; very large ones are sent less often."""
 
-MessageSource = Callable[[], Iterable[Message]]
+MessageSource = Callable[[], Iterable[Parcel]]
 
 
 class Pending:
@@ -122,7 +122,7 @@ class Outbox:
     def __init__(self, setup: ViewSetup, pending: Pending, playback: MessageSource = lambda: ()) -> None:
         self._setup, self._pending, self._past = setup, pending, PastMessages()
         self._playback = playback
-        self._first: Iterator[Message] = iter(())
+        self._first: Iterator[Parcel] = iter(())
         self._due_t = {Kind.FIELD: -math.inf, Kind.PICTURE: -math.inf}
         self._ending = False
         self.sent = dict.fromkeys(self._due_t, 0)
@@ -135,20 +135,20 @@ class Outbox:
         """Send END after what waits."""
         self._ending = True
 
-    def _all(self, target: ViewTarget) -> Iterator[Message]:
+    def _all(self, target: ViewTarget) -> Iterator[Parcel]:
         yield setup_message(self._setup, target)
         for kind, rows in self._past.rows.items():
             yield rows_message(kind, rows.items())
         yield events_message(list(self._past.events))
         if self._past.status is not None:
-            yield Message(Kind.STATUS, {"markdown": self._past.status})
+            yield Parcel(Kind.STATUS, {"markdown": self._past.status})
         yield from self._playback()
 
-    def next(self, now: float) -> Message | None:
+    def next(self, now: float) -> Parcel | None:
         """The message due at ``now`` (s, monotonic); None: nothing yet."""
         return next(self._first, None) or self._small() or self._large(now) or self._last()
 
-    def _small(self) -> Message | None:
+    def _small(self) -> Parcel | None:
         pending, past = self._pending, self._past
         for kind, waiting in pending.rows.items():
             if waiting:
@@ -162,13 +162,13 @@ class Outbox:
             return events_message(events)
         if pending.status is not None:
             past.status, pending.status = pending.status, None
-            return Message(Kind.STATUS, {"markdown": past.status})
+            return Parcel(Kind.STATUS, {"markdown": past.status})
         if pending.figures is not None:
             figures, pending.figures = pending.figures, None
             return figures_message(figures)
         return None
 
-    def _large(self, now: float) -> Message | None:
+    def _large(self, now: float) -> Parcel | None:
         pending = self._pending
         if pending.field is not None and self._is_due(Kind.FIELD, now):
             (t, field), pending.field = pending.field, None
@@ -181,16 +181,16 @@ class Outbox:
     def _is_due(self, kind: Kind, now: float) -> bool:
         return now >= self._due_t[kind] or self._ending
 
-    def _paced(self, message: Message, now: float, rate: float) -> Message:
+    def _paced(self, message: Parcel, now: float, rate: float) -> Parcel:
         size = sum(array.nbytes for array in message.arrays.values())
         period = max(1 / rate, size / MAX_BYTES_S)
         self._due_t[message.kind] = max(self._due_t[message.kind] + period, now + period / 2)
         self.sent[message.kind] += 1
         return message
 
-    def _last(self) -> Message | None:
+    def _last(self) -> Parcel | None:
         if not self._ending:
             return None
         # Once for each process.
         self._ending = False
-        return Message(Kind.END)
+        return Parcel(Kind.END)

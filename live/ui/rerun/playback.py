@@ -34,7 +34,7 @@ from live.ui.rerun.messages import (
     rows_message,
 )
 from live.ui.rerun.view import View, spawn_viewer
-from live.ui.rerun.wire import Kind, Message
+from live.ui.rerun.wire import Kind, Parcel
 
 MAX_BYTES = 500e6
 """Of pictures and maps as drawn: the viewer keeps them all in memory."""
@@ -113,7 +113,7 @@ class _PlayedMessages:
         self._run, self._rows, self._screen = run, rows, screen
         self.all, self.trouble = threading.Event(), ""
 
-    def messages(self) -> Iterator[Message]:
+    def messages(self) -> Iterator[Parcel]:
         try:
             done = 0
             for message in playback_messages(self._run, self._rows):
@@ -217,7 +217,7 @@ def _outlines(run: RunFolder) -> dict[str, tuple[tuple[tuple[float, float], ...]
         return {}
 
 
-def playback_messages(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Message]:
+def playback_messages(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Parcel]:
     """All messages, with times in seconds since the start of the test.
 
     Raises
@@ -225,7 +225,7 @@ def playback_messages(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Message
     DataError
         A file cannot be read.
     """
-    yield Message(Kind.STATUS, {"markdown": _status(run)})
+    yield Parcel(Kind.STATUS, {"markdown": _status(run)})
     yield from _curves(run)
     yield from _events(run)
     pictures = iter(()) if run.pictures is None else run.pictures.each(rows)
@@ -245,7 +245,7 @@ def _frame(image: NDArray[Any], t: float, bits: int) -> Frame:
     return Frame(frozen(levels), 0, t, "nominal", 0, bits, t)
 
 
-def _curves(run: RunFolder) -> Iterator[Message]:
+def _curves(run: RunFolder) -> Iterator[Parcel]:
     values, t = run.strain.values, np.asarray(run.strain.time_s, np.float64)
     columns = [values[column] for name in STRAINS for column in (name, f"sigma_{name}")]
     yield rows_message(Kind.MEANS, zip(t, *columns, strict=True))
@@ -262,7 +262,7 @@ def _points(run: RunFolder, start: int, stop: int) -> list[tuple[float, float]]:
     return list(zip(run.axial_strain[start:stop].tolist(), run.force[start:stop].tolist(), strict=True))
 
 
-def _events(run: RunFolder) -> Iterator[Message]:
+def _events(run: RunFolder) -> Iterator[Parcel]:
     yield events_message([replace(event, t=event.t - run.start_monotonic) for event in run.events])
 
 

@@ -34,7 +34,7 @@ from acquire.system import (
 from live.pipeline.latency import OUTPUT
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox
-from live.ui.rerun.wire import Kind, Message, Reader, WireError, encoded
+from live.ui.rerun.wire import Kind, Parcel, Reader, WireError, encoded
 
 TICK_S = 0.05
 STUCK_S, START_S = 15.0, 90.0
@@ -75,7 +75,7 @@ class RenderProcess:
         self._pending: deque[memoryview] = deque()
         self.pid, self.progress_t = self._process.pid, time.monotonic()
 
-    def send(self, message: Message) -> None:
+    def send(self, message: Parcel) -> None:
         """Queue ``message``."""
         if not self._pending:
             self.progress_t = time.monotonic()
@@ -106,7 +106,7 @@ class RenderProcess:
                 return
             sent -= piece.nbytes
 
-    def replies(self) -> Iterator[Message]:
+    def replies(self) -> Iterator[Parcel]:
         """The messages received since the last call.
 
         Raises
@@ -232,7 +232,7 @@ class Supervisor:
             raise Stuck(f"took nothing for {silent:.0f} s (stopped?)")
         return False
 
-    def _handle(self, message: Message) -> None:
+    def _handle(self, message: Parcel) -> None:
         meta = message.meta
         if message.kind is Kind.SERVING:
             self._is_up = True

@@ -55,7 +55,7 @@ class WireError(DataError):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Message:
+class Parcel:
     """One message.
 
     Attributes
@@ -70,7 +70,7 @@ class Message:
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
 
-def encoded(message: Message) -> list[memoryview]:
+def encoded(message: Parcel) -> list[memoryview]:
     """The bytes of ``message`` in pieces. The arrays are not copied; they must not change until they are sent.
 
     Raises
@@ -109,7 +109,7 @@ class Reader:
         self._head: tuple[Kind, int] | None = None
         self._expect(_HEADER.size)
 
-    def next(self) -> Message:
+    def next(self) -> Parcel:
         """The next message.
 
         Raises
@@ -155,13 +155,13 @@ def _checked_header(header: bytes) -> tuple[Kind, int, int]:
         raise WireError(f"the view has no message {number}") from error
 
 
-def _message(kind: Kind, body: bytearray, length: int) -> Message:
+def _message(kind: Kind, body: bytearray, length: int) -> Parcel:
     try:
         meta = json.loads(bytes(body[:length]))
         listed = [(str(name), str(dtype), tuple(shape)) for name, dtype, shape in meta.pop("arrays")]
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise WireError(f"a message {kind.name} to or from the view is damaged: {error}") from error
-    return Message(kind, meta, _arrays(kind, memoryview(body)[length:], listed))
+    return Parcel(kind, meta, _arrays(kind, memoryview(body)[length:], listed))
 
 
 def _arrays(

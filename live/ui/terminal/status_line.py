@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from acquire.printable import duration, share_text
+from acquire.text.printable import duration, share_text
 from live.pipeline.snapshot import AXIAL, BURST, DISK, FORCE, FPS, STRESS
 from live.pipeline.timed.figure import BEYOND, LACKING, FigureState
 

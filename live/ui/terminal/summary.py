@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquire.printable import counted
+from acquire.text.printable import counted
 from live.pipeline.consumer import ConsumerReport
 from live.pipeline.event_log import sentence
 from live.pipeline.history import History

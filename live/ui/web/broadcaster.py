@@ -7,12 +7,16 @@ import math
 import threading
 from typing import Any
 
+from acquire.text import Message
+
 MAX_PAGES = 8
 """Pages that may be open at one time."""
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON can hold it; NaN and infinity become None."""
+    """A value as JSON can hold it; NaN and infinity become None, messages keep template and values."""
+    if isinstance(value, Message):
+        return plain(value.to_json())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from acquire.text import Message
 from analysis.field import VALUES, Status
 from live.config.gauges import complete_gauges
 from live.config.loading import Config
@@ -19,7 +20,7 @@ from live.ui.web.painting import as_jpeg, shrunk
 RANGES = ("automatic", "symmetric", "fixed")
 BARS = 24
 """Of the histogram, over the range of the colours."""
-OUTSIDE = "no ZOI is here"
+OUTSIDE = Message("no ZOI is here")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +67,14 @@ class MapView:
     def choose(self, name: object, span: object, limit: object) -> str:
         """Show another map, or another range; the reason of a refusal, or empty."""
         if name not in FIELD_MAPS:
-            return f"there is no map {str(name)[:40]!r}; there are {', '.join(FIELD_MAPS)}"
+            return Message(
+                "there is no map {str}; there are {join}", repr(str(name)[:40]), ", ".join(FIELD_MAPS)
+            )
         if span not in RANGES:
-            return f"the ranges of a map are {', '.join(RANGES)}"
+            return Message("the ranges of a map are {join}", ", ".join(RANGES))
         given = isinstance(limit, int | float) and not isinstance(limit, bool)
         if span == "fixed" and not (given and 1e-7 <= limit <= 10):  # type: ignore[operator]
-            return "a fixed range is a strain from 1e-7 to 10"
+            return Message("a fixed range is a strain from 1e-7 to 10")
         self._take(MapChoice(str(name), str(span), float(limit) if given else None))  # type: ignore[arg-type]
         return ""
 

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
-from acquire.printable import printable, share_text
+from acquire.text.printable import printable, share_text
 from analysis.evaluate import ExtensionGauge, LineGauge
 from live.config.gauges import complete_gauges
 from live.config.loading import Config

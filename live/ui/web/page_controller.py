@@ -19,7 +19,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from acquire.errors import PhasedicError
-from acquire.printable import brief, printable
+from acquire.text import Message
+from acquire.text.printable import brief, printable
 from analysis.evaluate import GAUGE_KINDS
 from live.config.loading import Config
 from live.results.maps.field_maps import FIELD_MAPS
@@ -182,7 +183,7 @@ class PageController:
         self._broadcaster.publish("after", self._result)
         self._enter(AFTER, "")
         if self.draft is None:
-            self.reported(None, "this run makes no report; phasedic report makes one of its folder")
+            self.reported(None, Message("this run makes no report; phasedic report makes one of its folder"))
 
     def _names(self) -> dict[str, str | None]:
         """The names of this specimen and of the next one; None where no other test follows."""
@@ -194,7 +195,9 @@ class PageController:
     def reported(self, report: Path | None, why: str = "") -> None:
         """Show that the report of the last run can be opened, or (None) why there is none."""
         self._report = report
-        self._result |= {"report": True if report is not None else printable(why) or "no report was made"}
+        self._result |= {
+            "report": True if report is not None else printable(why) or Message("no report was made")
+        }
         self._broadcaster.publish("after", self._result)
 
     def after(self) -> bool:
@@ -239,12 +242,12 @@ class PageController:
     def _mask(self, query: Mapping[str, str]) -> Response:
         sessions = self.sessions
         if sessions is None:
-            raise HttpError(404, "nothing is set up")
+            raise HttpError(404, Message("nothing is set up"))
         return Response(sessions.of(query.get("side")).region.shade(), "image/png")
 
     def _show_report(self, query: Mapping[str, str]) -> Response:
         if self._report is None:
-            raise HttpError(404, "there is no report yet")
+            raise HttpError(404, Message("there is no report yet"))
         return Response(self._report.read_bytes(), "text/html; charset=utf-8", REPORT_POLICY)
 
     def _viewer(self, request: Mapping[str, Any]) -> dict[str, str]:
@@ -267,7 +270,9 @@ class PageController:
         live, command = self._live, line.strip()
         if live is not None:
             # Two pages must not confirm one another: the page that asks forces the tare.
-            return answer(f"{command} {ONCE}" if command in ("t", "tare") else line, live)
+            return answer(
+                Message("{command} {ONCE}", command, ONCE) if command in ("t", "tare") else line, live
+            )
         if self.stage == RUN or (self.stage == SET_UP and self.sessions is None):
             return "no: the test is being opened"
         allowed = (START, QUIT) if self.stage == SET_UP else (NEXT, AGAIN, QUIT)

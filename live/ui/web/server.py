@@ -27,6 +27,7 @@ from live.config.listen_address import listening_socket
 from live.pipeline.latency import OUTPUT
 from live.ui.web.authorization import HttpError, RequestGuard
 from live.ui.web.broadcaster import Broadcaster, json_bytes
+from live.words.language import LANGUAGES, entries
 
 log = logging.getLogger(__name__)
 
@@ -92,6 +93,13 @@ def jpeg_response(content: bytes) -> Response:
 def json_response(value: Any) -> Response:
     """Values as JSON."""
     return Response(json_bytes(value))
+
+
+def _file(path: str) -> Response:
+    """A file of the page, or the entries of a language; raises ``HttpError``."""
+    if path in (f"/words/{language}.json" for language in LANGUAGES):
+        return json_response(entries(path[7:9]))
+    return static("index.html" if path == "/" else path.removeprefix("/static/"))
 
 
 def static_names() -> frozenset[str]:
@@ -290,8 +298,7 @@ class _Handler(BaseHTTPRequestHandler):
         elif parts.path in page.gets:
             self._send(page.gets[parts.path](query))
         else:
-            name = "index.html" if parts.path == "/" else parts.path.removeprefix("/static/")
-            self._send(static(name))
+            self._send(_file(parts.path))
 
     def _log_in(self, token: str) -> None:
         """Put the token into a cookie, and remove it from the address, where others could read it."""

@@ -18,9 +18,10 @@ from acquire.events import ignore_event
 from live.cli import main
 from live.config.loading import Config, load_config
 from live.setup.check.check_list import CheckFigures, automatic_controls, examine, table_lines
+from live.setup.check.noise_advice import advice, reaching
 from live.setup.check.noise_floor import BURSTS, StrainNoise, ZoiFloor
 from live.setup.check.sample import FrameStack, take
-from live.setup.check.verdict import advice, check_lines, reaching
+from live.setup.check.verdict import check_lines
 from live.setup.specimen_drawing import GOOD, POOR
 
 STILL = "sim:uniform?bits=8&fps=50&seconds=20&width=224&height=192&lockstep=yes"

@@ -11,6 +11,7 @@ import pytest
 
 from analysis.quality.exposure import Depth, Exposure
 from analysis.quality.steadiness import Steadiness
+from live.setup.check.noise_advice import advice
 from live.setup.check.noise_floor import GaugeNoise, StrainNoise, ZoiFloor
 from live.setup.check.sample import MIN_FRAMES
 from live.setup.check.verdict import (
@@ -25,7 +26,6 @@ from live.setup.check.verdict import (
     _pattern,
     _sharpness,
     _sssig,
-    advice,
     check_lines,
 )
 

@@ -12,9 +12,10 @@ import pytest
 
 from analysis.quality.steadiness import Steadiness
 from live.setup.check.check_list import automatic_controls, table_lines
+from live.setup.check.noise_advice import reaching
 from live.setup.check.noise_floor import StrainNoise, ZoiFloor
 from live.setup.check.stillness import PictureStillness
-from live.setup.check.verdict import CheckLine, _flicker, _sharpness, _vibration, reaching
+from live.setup.check.verdict import CheckLine, _flicker, _sharpness, _vibration
 from live.setup.region import Region
 from live.setup.specimen_drawing import FAIR, GOOD, POOR, Overlay, _Drawing
 from tests.live.made_up import make_grid

@@ -25,7 +25,7 @@ from live.ui.rerun.messages import (
     rows_of,
     setup_of,
 )
-from live.ui.rerun.wire import Kind, Message, Reader, encoded
+from live.ui.rerun.wire import Kind, Parcel, Reader, encoded
 
 log = logging.getLogger(__name__)
 
@@ -47,7 +47,7 @@ class ReplyChannel:
     def send(self, kind: Kind, **meta: Any) -> None:
         """Send a message; ignored where the test has ended."""
         with self._lock, contextlib.suppress(OSError):
-            for piece in encoded(Message(kind, meta)):
+            for piece in encoded(Parcel(kind, meta)):
                 self._parent.sendall(piece)
 
     def notify(self, text: str) -> None:
@@ -120,7 +120,7 @@ def _draw(reader: Reader, scene: ViewScene, channel: ReplyChannel, max_MiB: floa
         scene.end()
 
 
-def _show(scene: ViewScene, message: Message) -> None:
+def _show(scene: ViewScene, message: Parcel) -> None:
     kind = message.kind
     if kind is Kind.MEANS:
         scene.means(rows_of(message))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from acquire.printable import printable
+from acquire.text.printable import printable
 from live.results.maps.colours import MICROSTRAIN
 from live.ui.rerun.drawing.layout import blueprint
 from live.ui.rerun.drawing.proxy import ViewerProxy, hidden_address, wait_for

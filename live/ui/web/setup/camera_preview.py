@@ -13,8 +13,8 @@ from acquire.camera import Camera
 from acquire.errors import DataError, DeviceError, PhasedicError
 from acquire.events import Event
 from acquire.frame import CameraInfo, Frame
-from acquire.printable import brief, printable
 from acquire.system import lower_priority
+from acquire.text.printable import brief, printable
 from live.pipeline.latency import OUTPUT
 from live.setup.devices import at_rest, open_rig
 from live.ui.web.setup.config_draft import ConfigDraft
@@ -101,7 +101,7 @@ class CameraPreview:
             error = self._opened.get(timeout=OPEN_S)
         except queue.Empty:
             error = DeviceError(
-                f"{brief(address)}: not open within {OPEN_S:g} s; look at its cable and power"
+                "{brief}: not open within {OPEN_S:g} s; look at its cable and power", brief(address), OPEN_S
             )
         if error is not None:
             self._draft.change_all({"camera.address": before})
@@ -158,7 +158,7 @@ class CameraPreview:
                 self._failed(error, asked)
             except Exception as error:
                 log.exception("the preview of the camera failed")
-                self._failed(DeviceError(f"the camera failed: {error!r}"), asked)
+                self._failed(DeviceError("the camera failed: {error}", repr(error)), asked)
             if self.trouble and not self._reopen.is_set():
                 self._closing.wait(RETRY_S)
 

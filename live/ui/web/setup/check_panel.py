@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.frame import CameraInfo, Frame
-from acquire.printable import printable
+from acquire.text.printable import printable
 from live.setup.check.check_list import CheckFigures
 from live.setup.check.sample import FrameStack
 from live.setup.check.verdict import CheckLine

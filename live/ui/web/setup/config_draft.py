@@ -113,7 +113,7 @@ class ConfigDraft:
         try:
             write_picture(path, mask.astype(np.uint8) * 255)
         except DataError as error:
-            raise ConfigError(str(error)) from None
+            raise ConfigError(error.text) from None
         return path
 
 

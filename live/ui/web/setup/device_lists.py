@@ -10,9 +10,10 @@ from typing import Any
 
 from acquire.camera import CameraListing, list_cameras
 from acquire.errors import PhasedicError
-from acquire.printable import brief, printable
 from acquire.serial_line import identify
 from acquire.serial_line.ports import PortInfo, list_serial_ports
+from acquire.text import Message
+from acquire.text.printable import brief, printable
 
 log = logging.getLogger(__name__)
 
@@ -68,13 +69,13 @@ class DeviceLists:
             self._finding = printable(brief(error))
         except Exception as error:
             log.exception("the search for devices failed")
-            self._finding = f"the search failed: {error!r}"
+            self._finding = Message("the search failed: {error}", repr(error))
         finally:
             self._busy.release()
 
     def _search(self) -> None:
         self._finding = "searching …"
-        recorded = [CameraListing(address, "recorded session") for address in self._sessions()]
+        recorded = [CameraListing(address, Message("recorded session")) for address in self._sessions()]
         simulated = [CameraListing("sim:", "simulated"), CameraListing("sim:hole", "simulated")]
         self._cameras = [*self._list_cameras(), *recorded, *simulated]
         others = [*recorded, CameraListing("sim:", "simulated"), CameraListing("none:", "none")]
@@ -86,14 +87,14 @@ class DeviceLists:
         return (f"session:{path}" for path in files[-MAX_SESSIONS:])
 
     def _identify(self, port: str) -> None:
-        self._finding = "listening at all speeds …"
+        self._finding = Message("listening at all speeds …")
         for _, _, finding in identify.listen(port):
             if finding is not None:
                 known = [one for one in self._loads if one["address"] != finding.address]
                 self._loads = [{"address": finding.address, "name": finding.protocol}, *known]
-                self._finding = f"found: {finding.protocol}; choose it in the list"
+                self._finding = Message("found: {protocol}; choose it in the list", finding.protocol)
                 return
-        self._finding = "nothing recognised: check cable and power, or write the address"
+        self._finding = Message("nothing recognised: check cable and power, or write the address")
 
 
 def _shown(one: CameraListing) -> dict[str, str]:
@@ -101,5 +102,5 @@ def _shown(one: CameraListing) -> dict[str, str]:
 
 
 def _port(one: PortInfo) -> dict[str, str]:
-    trouble = "" if one.accessible else "this user may not open it"
+    trouble = "" if one.accessible else Message("this user may not open it")
     return {"address": one.device, "name": printable(one.description), "trouble": trouble}

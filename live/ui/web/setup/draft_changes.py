@@ -12,6 +12,7 @@ import numpy as np
 from acquire.addresses import with_setting
 from acquire.bounds import NotAllowed, as_number
 from acquire.errors import ConfigError
+from acquire.text import Message
 from analysis.evaluate import GAUGE_KINDS
 from live.setup.scale import Board, from_points
 from live.ui.web.setup.drawn_region import are_points
@@ -51,7 +52,7 @@ def whole_picture(session: SetupSession, request: Request) -> None:
 def overlay(session: SetupSession, request: Request) -> None:
     """Show or hide an overlay of the picture."""
     if request.get("name") not in OVERLAYS:
-        raise ConfigError(f"the overlays are {', '.join(OVERLAYS)}")
+        raise ConfigError("the overlays are {join}", ", ".join(OVERLAYS))
     session.overlays[str(request["name"])] = request.get("on") is True
 
 
@@ -61,7 +62,7 @@ def camera(session: SetupSession, request: Request) -> None:
     info = session.preview.info
     keys = [] if info is None else [setting.key for setting in info.settings]
     if key not in keys:
-        raise ConfigError(f"a number for one of {', '.join(keys) or 'the settings of an open camera'}")
+        raise ConfigError("a number for one of {join}", ", ".join(keys) or "the settings of an open camera")
     number = _number(str(key), value)
     session.preview.reopen(with_setting(session.draft.config.camera.address, str(key), number))
 
@@ -87,7 +88,7 @@ def load(session: SetupSession, request: Request) -> None:
 def _address(value: object) -> str:
     """The address of a device from a page: a text in one line."""
     if not isinstance(value, str) or not value or len(value) > MAX_ADDRESS or not value.isprintable():
-        raise ConfigError(f"an address is a text of 1 to {MAX_ADDRESS} letters in one line")
+        raise ConfigError("an address is a text of 1 to {MAX_ADDRESS} letters in one line", MAX_ADDRESS)
     return value
 
 
@@ -119,7 +120,7 @@ def set_key(session: SetupSession, request: Request) -> None:
         or key.startswith(("camera.", "gauges.", "load."))
         or key in ("measure.roi", "measure.mask")
     ):
-        raise ConfigError(f"{key} cannot be changed like this")
+        raise ConfigError("{key} cannot be changed like this", key)
     of_specimen = key.startswith(("specimen.", "metadata.")) and key != "specimen.axis"
     (session.shared if of_specimen else session.draft).change_all({key: None if value == "" else value})
     if key.startswith("measure."):
@@ -144,7 +145,7 @@ def gauge(session: SetupSession, request: Request) -> None:
     changes: dict[str, Any] = {}
     if before and was != name:
         if name in gauges:
-            raise ConfigError(f"there is already a gauge {name}")
+            raise ConfigError("there is already a gauge {name}", name)
         changes[f"gauges.{was}"] = None
     session.region.set_gauges(changes | {f"gauges.{name}": table})
 
@@ -152,9 +153,9 @@ def gauge(session: SetupSession, request: Request) -> None:
 def _parameters_at(kind: object, points: object) -> dict[str, Any]:
     """The parameters of a gauge of ``kind`` at the points that a page has sent."""
     if not isinstance(kind, str) or kind not in GAUGE_KINDS:
-        raise ConfigError(f"there is no such kind of gauge; there are {', '.join(GAUGE_KINDS)}")
+        raise ConfigError("there is no such kind of gauge; there are {join}", ", ".join(GAUGE_KINDS))
     if not are_points(points, 1, MAX_GAUGE_POINTS):
-        raise ConfigError(f"a gauge has 1 to {MAX_GAUGE_POINTS} points, x and y in px")
+        raise ConfigError("a gauge has 1 to {MAX_GAUGE_POINTS} points, x and y in px", MAX_GAUGE_POINTS)
     return GAUGE_KINDS[kind].from_handles([(float(x), float(y)) for x, y in points])
 
 
@@ -194,8 +195,8 @@ def board(session: SetupSession, request: Request) -> None:
         raise ConfigError(
             "a board has whole numbers of columns and rows, and a dictionary where it has markers"
         )
-    square = _number("a square in mm", request.get("square"), 0, MAX_MM)
-    marker = _number("a marker in mm", request.get("marker", 0), 0, MAX_MM)
+    square = _number(Message("a square in mm"), request.get("square"), 0, MAX_MM)
+    marker = _number(Message("a marker in mm"), request.get("marker", 0), 0, MAX_MM)
     calibration_board = Board(columns, rows, square, marker, dictionary)
     session.draft.change_all(session.scale_from(calibration_board).changes())
     session.region.changed()
@@ -205,7 +206,7 @@ def _number(what: str, value: object, low: float = -math.inf, high: float = math
     try:
         return as_number(value, low, high)
     except NotAllowed as allowed:
-        raise ConfigError(f"{what} is {allowed}") from None
+        raise ConfigError("{what} is {allowed}", what, allowed) from None
 
 
 def reset_peak(session: SetupSession, request: Request) -> None:

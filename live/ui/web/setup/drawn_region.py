@@ -53,10 +53,13 @@ class Stroke:
         tool, points, radius = request.get("tool"), request.get("points"), request.get("radius", 8)
         min_points = {"rectangle": 2, "polygon": 3}.get(str(tool), 1)
         if tool not in TOOLS:
-            raise ConfigError(f"no such tool; there are {', '.join(TOOLS)}")
+            raise ConfigError("no such tool; there are {join}", ", ".join(TOOLS))
         if not are_points(points, min_points, MAX_POINTS):
             raise ConfigError(
-                f"a {tool} has {min_points} to {MAX_POINTS} points, each two numbers, x and y in px"
+                "a {tool} has {min_points} to {MAX_POINTS} points, each two numbers, x and y in px",
+                tool,
+                min_points,
+                MAX_POINTS,
             )
         if not _is_coordinate(radius) or not 0.5 <= radius <= 1000:
             raise ConfigError("a brush has a radius from 0.5 to 1000 px")

@@ -16,8 +16,9 @@ from acquire.events import Event
 from acquire.load_cell import LoadCell
 from acquire.load_cell.check import ListenResult, LoadReport, report, stillness
 from acquire.load_sample import LoadCellInfo, LoadSample
-from acquire.printable import brief, printable
 from acquire.system import lower_priority
+from acquire.text import Message
+from acquire.text.printable import brief, printable
 from live.pipeline.latency import OUTPUT
 from live.pipeline.timed.figure import OLD_S
 from live.setup.check.verdict import CheckLine
@@ -111,7 +112,9 @@ class LoadPreview:
         silent = self._clock() - last
         if self._fault or silent < SILENT_S:
             return self._fault
-        return f"the load cell is silent for {silent:.0f} s: look at cable, power and settings"
+        return Message(
+            "the load cell is silent for {silent:.0f} s: look at cable, power and settings", silent
+        )
 
     def state(self) -> dict[str, Any]:
         """Force, noise, rate and zero as the page shows them."""
@@ -171,7 +174,7 @@ class LoadPreview:
                 self._fault = printable(brief(error))
             except Exception as error:
                 log.exception("the preview of the load cell failed")
-                self._fault = f"the load cell failed: {error!r}"
+                self._fault = Message("the load cell failed: {error}", repr(error))
             self._cell = None
             if not self._closing.is_set():
                 self._reopen.wait(RETRY_S)

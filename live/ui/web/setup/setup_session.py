@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from acquire.frame import CameraInfo, Frame
-from acquire.printable import printable
+from acquire.text.printable import printable
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST
 from live.results.maps.painting import overlay_cells

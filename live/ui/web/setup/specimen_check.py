@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from acquire.errors import PhasedicError
 from acquire.frame import CameraInfo, Frame
-from acquire.printable import brief, printable
 from acquire.system import lower_priority
+from acquire.text import Message
+from acquire.text.printable import brief, printable
 from live.config.sections import DEFAULT_REFERENCE_BURST
 from live.pipeline.latency import OUTPUT
 from live.setup.check.check_list import CheckFigures, examine
@@ -117,7 +118,7 @@ class SpecimenCheck:
                 self._failed(printable(brief(error)))
             except Exception as error:
                 log.exception("the check of the specimen failed")
-                self._failed(f"a defect: {error!r}")
+                self._failed(Message("a defect: {error}", repr(error)))
             self._refresh()
             self._closing.wait(EVALUATE_S)
 
@@ -187,7 +188,10 @@ class SpecimenCheck:
         try:
             names = ", ".join(self._region.ready(self._folder).gauges)
         except PhasedicError as error:
-            return CheckLine("gauges", str(error), False, "move it onto the region")
+            return CheckLine("gauges", error.text, False, "move it onto the region")
         return CheckLine(
-            "gauges", f"placed: {names}" if names else "none: the strain of the region is reported"
+            "gauges",
+            Message("placed: {names}", names)
+            if names
+            else Message("none: the strain of the region is reported"),
         )

@@ -112,5 +112,5 @@ function theme(name) {
 $("theme").addEventListener("click", () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
 $("language").addEventListener("change", (event) => setLanguage(event.target.value));
 theme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
-setLanguage(language());
+await setLanguage(language());
 connect();

@@ -5,7 +5,8 @@ export const $ = (id) => document.getElementById(id);
 
 // Writes only a changed text, so that the layout is not computed again.
 export function put(element, text) {
-  if (element.textContent !== text) element.textContent = text;
+  const words = text?.say != null ? t(text) : text;
+  if (element.textContent !== words) element.textContent = words;
 }
 
 // A new element: tag, properties (class, text, t: a text to translate, data-...), children.
@@ -13,8 +14,8 @@ export function el(tag, properties = {}, ...children) {
   const element = document.createElement(tag);
   for (const [key, value] of Object.entries(properties)) {
     if (key === "class") element.className = value;
-    else if (key === "text") element.textContent = value;
-    else if (key === "t") { element.dataset.t = value; element.textContent = t(value); }
+    else if (key === "text") element.textContent = value?.say != null ? t(value) : value;
+    else if (key === "t") { if (value?.say == null) element.dataset.t = value; element.textContent = t(value); }
     else if (key.includes("-")) element.setAttribute(key, value);
     else element[key] = value;
   }

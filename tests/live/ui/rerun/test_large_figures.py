@@ -14,7 +14,7 @@ from live.pipeline.snapshot import Snapshot
 from live.pipeline.timed.figure import TimedFigure
 from live.ui.rerun.drawing.large_figures import HEIGHT, WIDTH, _cells, paint
 from live.ui.rerun.messages import figures_message, figures_of
-from live.ui.rerun.wire import Kind, Message, WireError
+from live.ui.rerun.wire import Kind, Parcel, WireError
 from tests.live.made_up import figures
 
 NOW = Snapshot(
@@ -30,7 +30,7 @@ def test_figures_come_back_from_a_message() -> None:
     }
     sent = replace(NOW, figures=lost, alarms=("strain limit: axial is 0.02",))
     meta = json.loads(json.dumps(figures_message(sent).meta, allow_nan=False))
-    back = figures_of(Message(Kind.FIGURES, meta))
+    back = figures_of(Parcel(Kind.FIGURES, meta))
     assert math.isnan(back.figure("stress").value) and back.troubles == sent.troubles
     for name in ("force", "axial"):
         np.testing.assert_equal(asdict(back.figure(name)), asdict(lost[name]))
@@ -42,7 +42,7 @@ def test_figures_come_back_from_a_message() -> None:
         meta | {"figures": {"force": [1]}},
     ):
         with pytest.raises(WireError):
-            figures_of(Message(Kind.FIGURES, damaged))
+            figures_of(Parcel(Kind.FIGURES, damaged))
 
 
 def test_an_alarm_is_red_and_digits_are_large() -> None:

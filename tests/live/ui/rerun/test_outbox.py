@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from acquire.events import Event, EventKind
-from acquire.printable import printable
+from acquire.text.printable import printable
 from live.pipeline.screen import Screen
 from live.pipeline.snapshot import Snapshot
 from live.results.run_folder import open_run
@@ -29,7 +29,7 @@ from live.ui.rerun.messages import (
 from live.ui.rerun.outbox import Outbox, Pending
 from live.ui.rerun.playback import ShowRequest, selected_rows, view_setup
 from live.ui.rerun.view import View, remote_access, url, viewer_failure
-from live.ui.rerun.wire import Kind, Message
+from live.ui.rerun.wire import Kind, Parcel
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
 from tests.live.made_up import START, figures, make_field, make_frame, make_grid
 
@@ -43,7 +43,7 @@ def boxed(**more: Any) -> tuple[Outbox, Pending]:
     return Outbox(SETUP, pending, **more), pending
 
 
-def all_of(outbox: Outbox, now: float = 0.0) -> list[Message]:
+def all_of(outbox: Outbox, now: float = 0.0) -> list[Parcel]:
     found = []
     while (message := outbox.next(now)) is not None:
         found.append(message)
@@ -91,7 +91,7 @@ def test_large_pictures_are_sent_less_often(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_a_new_process_gets_the_past() -> None:
-    more = Message(Kind.STATUS, {"markdown": "played"})
+    more = Parcel(Kind.STATUS, {"markdown": "played"})
     outbox, pending = boxed(playback=lambda: [more])
     outbox.begin(TARGET)
     assert [one.kind.name for one in all_of(outbox)] == [

@@ -26,7 +26,7 @@ from live.ui.rerun.messages import (
     rows_message,
     setup_message,
 )
-from live.ui.rerun.wire import Kind, Message, Reader, encoded
+from live.ui.rerun.wire import Kind, Parcel, Reader, encoded
 from tests.live.made_up import START, make_frame, make_grid, make_measurement
 from tests.live.made_up import figures as live_figures
 
@@ -59,10 +59,10 @@ class Channel:
 class Messages:
     """A reader of these messages."""
 
-    def __init__(self, *messages: Message) -> None:
-        self._left: Iterator[Message] = iter(messages)
+    def __init__(self, *messages: Parcel) -> None:
+        self._left: Iterator[Parcel] = iter(messages)
 
-    def next(self) -> Message:
+    def next(self) -> Parcel:
         return next(self._left)
 
 
@@ -78,10 +78,10 @@ EVENT = Event(START, EventKind.DEVICE, "camera", "a fault", "error")
         (rows_message(Kind.POINTS, [(1e-3, 5.0)]), [("points", ([(1e-3, 5.0)],))]),
         (rows_message(Kind.GAUGE, [(START, 1e-3, 1e-5)], "axial"), [("gauge", ("axial", [(START, 1e-3, 1e-5)]))]),
         (events_message([EVENT, EVENT]), [("event", (EVENT,))] * 2),
-        (Message(Kind.STATUS, {"markdown": "**well**"}), [("status", ("**well**",))]),
+        (Parcel(Kind.STATUS, {"markdown": "**well**"}), [("status", ("**well**",))]),
     ],
 )  # fmt: skip
-def test_a_message_is_drawn(message: Message, drawn: list[Any]) -> None:
+def test_a_message_is_drawn(message: Parcel, drawn: list[Any]) -> None:
     scene = Scene()
     process._show(scene, message)  # type: ignore[arg-type]
     assert scene.told == drawn
@@ -104,7 +104,7 @@ def test_pictures_fields_and_figures_are_drawn() -> None:
 
 def test_it_draws_until_the_end_and_says_so() -> None:
     scene, channel = Scene(), Channel()
-    reader = Messages(Message(Kind.STATUS, {"markdown": "a"}), Message(Kind.END), Message(Kind.STATUS))
+    reader = Messages(Parcel(Kind.STATUS, {"markdown": "a"}), Parcel(Kind.END), Parcel(Kind.STATUS))
     process._draw(reader, scene, channel, 1e9)  # type: ignore[arg-type]
     assert [name for name, _ in scene.told] == ["begin", "status", "end", "end"]
     assert channel.sent == [(Kind.ENDED, {})]
@@ -119,7 +119,7 @@ def test_it_ends_where_it_has_grown_too_large(
     monkeypatch.setattr(process.time, "monotonic", lambda: next(times))
     monkeypatch.setattr(process, "memory_MiB", lambda: grown)
     scene, channel = Scene(), Channel()
-    reader = Messages(*[Message(Kind.STATUS)] * 3, Message(Kind.END))
+    reader = Messages(*[Parcel(Kind.STATUS)] * 3, Parcel(Kind.END))
     process._draw(reader, scene, channel, 641.0)  # type: ignore[arg-type]
     assert channel.sent == ([(Kind.FULL, {"memory_MiB": 642})] if full else [(Kind.ENDED, {})])
     assert len([name for name, _ in scene.told if name == "status"]) == (2 if full else 3)

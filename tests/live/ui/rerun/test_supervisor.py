@@ -12,7 +12,7 @@ import pytest
 from live.ui.rerun import supervisor
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.supervisor import RenderProcess, Supervisor
-from live.ui.rerun.wire import Kind, Message
+from live.ui.rerun.wire import Kind, Parcel
 from tests.clock import Clock
 
 TARGET = ViewTarget(9876, "/a/view.rrd", "id")
@@ -24,11 +24,11 @@ class Process:
     ends = 1
 
     def __init__(self, clock: Clock) -> None:
-        self.pid, self.progress_t, self.answers = 7, clock.now_s, list[Message]()
-        self.sent: list[Message] = []
+        self.pid, self.progress_t, self.answers = 7, clock.now_s, list[Parcel]()
+        self.sent: list[Parcel] = []
         self.gone = self.stuck = False
 
-    def replies(self) -> Iterator[Message]:
+    def replies(self) -> Iterator[Parcel]:
         if self.gone:
             raise EOFError
         answers, self.answers = self.answers, []
@@ -37,7 +37,7 @@ class Process:
     def flush(self) -> bool:
         return not self.stuck
 
-    def send(self, message: Message) -> None:
+    def send(self, message: Parcel) -> None:
         self.sent.append(message)
 
     def wait(self, seconds: float, *, to_send: bool) -> None: ...
@@ -69,7 +69,7 @@ class Watched:
         self.processes.append(Process(self.clock))
         return self.processes[-1]
 
-    def step(self, seconds: float = 0.0, *answers: Message) -> None:
+    def step(self, seconds: float = 0.0, *answers: Parcel) -> None:
         self.clock.now_s += seconds
         if answers:
             self.processes[-1].answers += answers
@@ -85,8 +85,8 @@ def watched(monkeypatch: pytest.MonkeyPatch) -> Watched:
     return Watched(monkeypatch)
 
 
-def serving(port: int | None = 9877, rrd: str | None = "/a/view.rrd") -> Message:
-    return Message(Kind.SERVING, {"port": port, "rrd": rrd})
+def serving(port: int | None = 9877, rrd: str | None = "/a/view.rrd") -> Parcel:
+    return Parcel(Kind.SERVING, {"port": port, "rrd": rrd})
 
 
 def test_it_serves_once_the_process_says_so(watched: Watched) -> None:
@@ -95,9 +95,9 @@ def test_it_serves_once_the_process_says_so(watched: Watched) -> None:
     assert (one.served.port, one.served.rrd, one.pid, watched.served) == (None, None, 7, 0)
     watched.step(0.1, serving())
     assert (one.served, watched.served) == (replace(TARGET, port=9877), 1)
-    watched.step(0.1, Message(Kind.TROUBLE, {"text": "a word", "lasting": False}))
+    watched.step(0.1, Parcel(Kind.TROUBLE, {"text": "a word", "lasting": False}))
     assert watched.told == [("warning", "a word")] and one.failed == ""
-    watched.step(0.1, Message(Kind.TROUBLE, {"text": "no place", "lasting": True}))
+    watched.step(0.1, Parcel(Kind.TROUBLE, {"text": "no place", "lasting": True}))
     assert one.failed == "no place"
 
 
@@ -158,7 +158,7 @@ def test_one_that_takes_nothing_is_replaced(watched: Watched, up: bool, limit: f
 def test_one_that_has_grown_is_restarted_at_once(watched: Watched) -> None:
     watched.step()
     watched.step(0.0, serving())
-    watched.step(0.0, Message(Kind.FULL, {"memory_MiB": 650}))
+    watched.step(0.0, Parcel(Kind.FULL, {"memory_MiB": 650}))
     watched.lose()
     assert watched.told == [("info", "the view's process had grown to 650 MiB and is restarted")]
     watched.step()
@@ -174,7 +174,7 @@ def test_a_signal_is_named(watched: Watched, monkeypatch: pytest.MonkeyPatch) ->
 
 def test_at_its_end_it_is_done_or_told(watched: Watched) -> None:
     watched.step()
-    watched.step(0.0, serving(), Message(Kind.ENDED))
+    watched.step(0.0, serving(), Parcel(Kind.ENDED))
     watched.one._finish(5.0)
     assert watched.told == [] and watched.one.pid is None
 

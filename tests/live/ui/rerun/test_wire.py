@@ -29,11 +29,11 @@ from live.ui.rerun.messages import (
     setup_message,
     setup_of,
 )
-from live.ui.rerun.wire import Kind, Message, Reader, WireError, encoded
+from live.ui.rerun.wire import Kind, Parcel, Reader, WireError, encoded
 from tests.live.made_up import START, make_frame, make_grid, make_measurement
 
 
-def passed(*pieces: bytes | memoryview) -> Message:
+def passed(*pieces: bytes | memoryview) -> Parcel:
     ours, theirs = socket.socketpair()
     with theirs, ThreadPoolExecutor() as other, ours:
         other.submit(send, ours, b"".join(pieces))
@@ -45,7 +45,7 @@ def send(ours: socket.socket, data: bytes) -> None:
     ours.shutdown(socket.SHUT_WR)
 
 
-def sent_and_received(message: Message) -> Message:
+def sent_and_received(message: Parcel) -> Parcel:
     return passed(*encoded(message))
 
 
@@ -139,20 +139,20 @@ def test_any_bytes_are_a_message_or_refused(body: bytes, kind: Kind) -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (rows_of, Message(Kind.LOADS, {}, {"rows": np.zeros((2, 3))})),
-        (rows_of, Message(Kind.LOADS)),
-        (picture_of, Message(Kind.PICTURE, {"t": 0.0, "bits": 8, "step": 1}, {"image": np.zeros((2, 2, 2), np.uint8)})),
-        (picture_of, Message(Kind.PICTURE, {"t": 0.0}, {"image": np.zeros((2, 2), np.uint8)})),
-        (events_of, Message(Kind.EVENTS, {"events": [[1.0, "no such kind", "", "", "info"]]})),
-        (setup_of, Message(Kind.SETUP, {"grid": {}}, {"active": np.ones((2, 2), bool)})),
-        (field_of, Message(Kind.FIELD, {"t": 0.0, "grid": None}, {"active": np.ones((2, 2), bool)})),
+        (rows_of, Parcel(Kind.LOADS, {}, {"rows": np.zeros((2, 3))})),
+        (rows_of, Parcel(Kind.LOADS)),
+        (picture_of, Parcel(Kind.PICTURE, {"t": 0.0, "bits": 8, "step": 1}, {"image": np.zeros((2, 2, 2), np.uint8)})),
+        (picture_of, Parcel(Kind.PICTURE, {"t": 0.0}, {"image": np.zeros((2, 2), np.uint8)})),
+        (events_of, Parcel(Kind.EVENTS, {"events": [[1.0, "no such kind", "", "", "info"]]})),
+        (setup_of, Parcel(Kind.SETUP, {"grid": {}}, {"active": np.ones((2, 2), bool)})),
+        (field_of, Parcel(Kind.FIELD, {"t": 0.0, "grid": None}, {"active": np.ones((2, 2), bool)})),
     ],
 )  # fmt: skip
-def test_a_message_with_something_else_in_it_is_refused(make: Any, message: Message) -> None:
+def test_a_message_with_something_else_in_it_is_refused(make: Any, message: Parcel) -> None:
     with pytest.raises(WireError):
         make(sent_and_received(message))
 
 
 def test_arrays_of_other_types_are_not_sent() -> None:
     with pytest.raises(WireError, match="<i8"):
-        encoded(Message(Kind.LOADS, {}, {"rows": np.zeros(3, np.int64)}))
+        encoded(Parcel(Kind.LOADS, {}, {"rows": np.zeros(3, np.int64)}))

@@ -1,0 +1,119 @@
+"""Texts for people as data: a template in English, and the values that are filled in.
+
+A ``Message`` is a ``str``, its English text, so that everything that takes a text takes it. The page and the terminal
+put the template of another language in place of the English one and fill in the same values (``live.words``).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
+from typing import Any, Self
+
+FIELD = re.compile(r"\{\{|\}\}|\{(\w+)(?::([^{}]*))?\}")
+"""A named field of a template, with its format, or a doubled brace, which is one of the text."""
+SAY, WITH = "say", "with"  # keys of a message as JSON
+
+
+def filled(template: str, values: Mapping[str, Any], shown: Callable[[Any, str], str]) -> str:
+    """The template with each field replaced by what ``shown`` makes of its value and format."""
+
+    def put(field: re.Match[str]) -> str:
+        return shown(values[field[1]], field[2] or "") if field[1] else field[0][0]
+
+    return FIELD.sub(put, template)
+
+
+@cache
+def fields(template: str) -> tuple[str, ...]:
+    """The names of its fields, each once, in their order."""
+    return tuple(dict.fromkeys(field[1] for field in FIELD.finditer(template) if field[1]))
+
+
+class Message(str):
+    """A text with named fields: ``Message("{name}: no picture for {waited:.1f} s", camera, 2.13)``.
+
+    Parameters
+    ----------
+    template : str
+    *given
+        The values of the fields, in the order in which they first stand in the template: numbers, names, or
+        messages; what else is given counts as its text.
+    **named
+        Others by their names.
+
+    Attributes
+    ----------
+    template : str
+    values : mapping of str to value
+
+    Raises
+    ------
+    ValueError, KeyError
+        Fields and values do not agree.
+    """
+
+    __slots__ = ("template", "values")
+    template: str
+    values: Mapping[str, Any]
+
+    def __new__(cls, template: str, /, *given: Any, **named: Any) -> Self:
+        """Fill it in English."""
+        names = [name for name in fields(template) if name not in named] if given else []
+        values = dict(zip(names, given, strict=True)) | named
+        values = {
+            name: getattr(value, "text", value) if isinstance(value, Exception) else value
+            for name, value in values.items()
+        }
+        made = super().__new__(cls, filled(template, values, format))
+        made.template, made.values = template, values
+        return made
+
+    def __reduce__(self) -> Any:
+        return _made, (self.template, dict(self.values))
+
+    def __add__(self, other: str) -> Message:
+        return joined("", (self, other))
+
+    def __radd__(self, other: str) -> Message:
+        return joined("", (other, self))
+
+    def __mul__(self, times: Any) -> Any:
+        return self if times == 1 else "" if times == 0 else str(self) * times
+
+    def to_json(self) -> Any:
+        """``{"say": template, "with": values}``."""
+        return {SAY: self.template, WITH: {key: _plain(value) for key, value in self.values.items()}}
+
+
+def _made(template: str, values: Mapping[str, Any]) -> Message:
+    return Message(template, **values)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Message):
+        return value.to_json()
+    if hasattr(value, "item"):
+        value = value.item()
+    return value if isinstance(value, bool | int | float | str) else str(value)
+
+
+def from_json(value: Any) -> Any:
+    """The message of such an object; any other value as it is. Fit for ``object_hook`` of ``json.loads``."""
+    if isinstance(value, dict) and value.keys() == {SAY, WITH}:
+        return Message(value[SAY], **{key: from_json(one) for key, one in value[WITH].items()})
+    return value
+
+
+def joined(between: str, parts: Iterable[str]) -> Message:
+    """The parts that are not empty, one after the other, each still to be translated."""
+    kept = [part for part in parts if part]
+    names = [f"part{k}" for k in range(len(kept))]
+    template = between.replace("{", "{{").replace("}", "}}").join(f"{{{name}}}" for name in names)
+    return Message(template, **dict(zip(names, kept, strict=True)))
+
+
+def about(name: object, what: str) -> Message:
+    """What is said of a file, a device or a setting."""
+    return Message("{name}: {what}", name, what)

@@ -1,0 +1,69 @@
+"""Messages: English text, template and values, nested, joined, as JSON, and pickled."""
+
+from __future__ import annotations
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+
+from acquire.text import Message
+from acquire.text.message import about, filled, from_json, joined
+
+
+def test_it_is_its_english_text() -> None:
+    text = Message("no picture for {waited:.1f} s; {what}", waited=2.13, what="still waiting")
+    assert text == "no picture for 2.1 s; still waiting" and isinstance(text, str)
+    assert text.template == "no picture for {waited:.1f} s; {what}"
+    assert text.values == {"waited": 2.13, "what": "still waiting"}
+
+
+def test_a_field_without_a_value_is_an_error() -> None:
+    with pytest.raises(KeyError, match="gone"):
+        Message("{gone}")
+
+
+def test_values_stand_in_the_order_of_the_fields() -> None:
+    text = Message("{name}: {n} of {all}, {n:.1f}", "a", 2, all=3)
+    assert text == "a: 2 of 3, 2.0" and text.values == {"name": "a", "n": 2, "all": 3}
+    for wrong in ((1,), (1, 2, 3)):
+        with pytest.raises(ValueError, match="zip"):
+            Message("{a} {b}", *wrong)
+
+
+def test_braces_of_the_text_and_of_a_value_stay() -> None:
+    assert Message("{{a}} {b}", b="{c}") == "{a} {c}"
+
+
+def test_it_goes_through_json_and_pickle_with_its_values() -> None:
+    text = about("/dev/video0", Message("{n} frames lost", n=np.int64(3)))
+    for again in (
+        from_json(text.to_json()),
+        json.loads(json.dumps(text.to_json()), object_hook=from_json),
+        pickle.loads(pickle.dumps(text)),
+    ):
+        assert isinstance(again, Message)
+        assert (again, again.template) == ("/dev/video0: 3 frames lost", "{name}: {what}")
+        assert again.values["what"].values == {"n": 3}
+    assert from_json({"say": 1}) == {"say": 1}
+
+
+def test_what_json_does_not_know_is_its_text() -> None:
+    assert Message("{error}", error=OSError("gone")).to_json() == {
+        "say": "{error}",
+        "with": {"error": "gone"},
+    }
+
+
+def test_parts_stay_messages() -> None:
+    text = Message("a {n}", n=1) + "; " + Message("b")
+    assert text == "a 1; b" and isinstance(text, Message)
+    assert "x: " + Message("b") == "x: b"
+    assert joined(", ", ["a", "", "b"]) == "a, b" and joined(", ", []) == ""
+    assert Message("a") * True == "a" and Message("a") * False == ""
+
+
+def test_it_is_filled_by_whoever_shows_it() -> None:
+    shown = filled("{a:.1f} und {b}", {"a": 1.25, "b": "c"}, lambda value, spec: f"<{value}|{spec}>")
+    assert shown == "<1.25|.1f> und <c|>"
