@@ -343,8 +343,8 @@ def report_lines(found: LoadReport) -> list[str]:
             Message(
                 "rate     {rate:.4g} 1/s, jitter {jitter_s:.2f} ms, longest gap {longest_s:.0f} ms",
                 found.rate,
-                found.jitter_s * 1000.0,
-                found.longest_s * 1000.0,
+                found.jitter_s * 1e3,
+                found.longest_s * 1e3,
             ),
             Message(
                 "force    mean {mean_text} N, from {lowest_N:.6g} to {highest_N:.6g} N",

@@ -182,7 +182,7 @@ class SerialCell(Closing):
                 "info",
                 Message(
                     "device clock: arrivals {jitter:.1f} ms late on average (rms){known}",
-                    jitter * 1000.0,
+                    jitter * 1e3,
                     known,
                 ),
             )

@@ -83,7 +83,9 @@ class Message(str):
         return self if times == 1 else "" if times == 0 else str(self) * times
 
     def to_json(self) -> Any:
-        """``{"say": template, "with": values}``."""
+        """``{"say": template, "with": values}``; without fields the text alone."""
+        if not self.values:
+            return str(self)
         return {SAY: self.template, WITH: {key: _plain(value) for key, value in self.values.items()}}
 
 
@@ -117,3 +119,17 @@ def joined(between: str, parts: Iterable[str]) -> Message:
 def about(name: object, what: str) -> Message:
     """What is said of a file, a device or a setting."""
     return Message("{name}: {what}", name, what)
+
+
+def without_name(text: str, name: str) -> str:
+    """What is said of ``name`` in a text that begins with it."""
+    if not isinstance(text, Message):
+        return text.removeprefix(f"{name}: ")
+    first, *others = fields(text.template) or ("",)
+    if not text.template.startswith(f"{{{first}}}: ") or str(text.values[first]) != name:
+        return text
+    rest = text.template.removeprefix(f"{{{first}}}: ")
+    alone: Any = text.values[others[0]] if others and rest == f"{{{others[0]}}}" else None
+    return (
+        alone if isinstance(alone, str) else Message(rest, **{key: text.values[key] for key in fields(rest)})
+    )

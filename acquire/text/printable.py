@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
+
+from acquire.text.message import Message
 
 # Control characters of both kinds (but for line feed and tab), halves of surrogate pairs, marks that turn the
 # direction of writing or are not seen, and separators that some terminals take for an end of line.
@@ -15,9 +18,17 @@ _HARMFUL = re.compile(
 def printable(text: object) -> str:
     """``text`` with everything that could command a terminal written as an escape, ``\\x1b`` for one.
 
-    Bytes of a file name that are no UTF-8 are shown as those bytes.
+    Bytes of a file name that are no UTF-8 are shown as those bytes. A message stays one: its values are changed.
     """
-    return _HARMFUL.sub(_escaped, str(text))
+    return _changed(text, lambda words: _HARMFUL.sub(_escaped, words))
+
+
+def _changed(text: object, change: Callable[[str], str]) -> str:
+    text = getattr(text, "text", text) if isinstance(text, Exception) else text
+    if not isinstance(text, Message):
+        return change(str(text))
+    values = {key: _changed(one, change) if isinstance(one, str) else one for key, one in text.values.items()}
+    return Message(text.template, **values)
 
 
 # A device or file by its address at the beginning of a sentence, with its settings; a path goes on after them.
@@ -26,12 +37,12 @@ _ADDRESS = re.compile(r"^([^\s?]+)\?[A-Za-z_]\w*=[^\s/]*(?=: |$)")
 
 def brief(text: object) -> str:
     """A sentence that begins with an address, without the settings of that address."""
-    return _ADDRESS.sub(r"\1", str(text))
+    return _changed(text, lambda words: _ADDRESS.sub(r"\1", words))
 
 
 def counted(n: int, noun: str) -> str:
     """As "1 frame" or "3 frames"."""
-    return f"{n} {noun}{'' if n == 1 else 's'}"
+    return Message(f"{{n}} {noun}{'' if n == 1 else 's'}", n)
 
 
 def duration(seconds: float) -> str:

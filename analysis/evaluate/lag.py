@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
 from analysis.evaluate.curve import Curve, noise
 from analysis.evaluate.figure import Figure, quantile
 from analysis.evaluate.programme import KindOfTest, reversals
@@ -83,8 +84,11 @@ def find_lag(strain: Track, force: Track, max_lag: float = 1.0, max_half_width: 
         best = fit
     if best is None:
         return Figure.none(
-            f"nowhere from the start on do {_IN_PART} frames follow the force in a straight line;"
-            " begin to measure some seconds before the load"
+            Message(
+                "nowhere from the start on do {IN_PART} frames follow the force in a straight line; begin to measure "
+                "some seconds before the load",
+                _IN_PART,
+            )
         )
     return _accepted(best, max_lag, max_half_width)
 
@@ -109,13 +113,13 @@ class _Fit:
 
 def _too_little(strain: Track, force: Track, max_lag: float) -> str:
     if len(strain.t) < MIN_FRAMES:
-        return f"{len(strain.t)} frames have a strain, {MIN_FRAMES} are needed"
+        return Message("{len} frames have a strain, {MIN_FRAMES} are needed", len(strain.t), MIN_FRAMES)
     if len(force.t) < MIN_FRAMES:
-        return f"{len(force.t)} load samples, {MIN_FRAMES} are needed"
+        return Message("{len} load samples, {MIN_FRAMES} are needed", len(force.t), MIN_FRAMES)
     if strain.t[-1] - strain.t[0] < 2 * max_lag or force.t[-1] - force.t[0] < 2 * max_lag:
-        return f"the test is shorter than twice the largest lag looked for, {max_lag:g} s"
+        return Message("the test is shorter than twice the largest lag looked for, {max_lag:g} s", max_lag)
     if np.ptp(force.values) <= 10 * noise(force.values):
-        return "the force does not change beyond its noise"
+        return Message("the force does not change beyond its noise")
     return ""
 
 
@@ -123,7 +127,7 @@ def _turns_round(strain: Track, force: Track) -> str:
     """Why the course of the test gives no lag; empty where it may."""
     curve = Curve(strain.t, strain.values, np.interp(strain.t, force.t, force.values))
     cyclic = KindOfTest.of(curve).kind == "cyclic"
-    return "in a cyclic test a loop of the material looks like a lag" if cyclic else ""
+    return Message("in a cyclic test a loop of the material looks like a lag") if cyclic else ""
 
 
 def _elastic(strain: Track, force: Track, share: float, max_lag: float) -> Track:
@@ -262,12 +266,15 @@ def _pace_noise(force: Track) -> float:
 
 def _accepted(fit: _Fit, max_lag: float, max_half_width: float) -> Figure:
     if fit.significance < 10:
-        return Figure.none("the strain does not follow the force")
+        return Figure.none(Message("the strain does not follow the force"))
     half = quantile(fit.n - 3) * fit.sigma
     if fit.known < _KNOWN or fit.separation < _SEPARATION or not half <= max_half_width:
         return Figure.none(
-            "the force rises too evenly to tell a lag from an offset; begin to measure some seconds before the load"
+            Message(
+                "the force rises too evenly to tell a lag from an offset; begin to measure some seconds before the "
+                "load"
+            )
         )
     if abs(fit.lag) > 0.95 * max_lag:
-        return Figure.none(f"no lag within {max_lag:g} s fits; the clocks differ by more")
+        return Figure.none(Message("no lag within {max_lag:g} s fits; the clocks differ by more", max_lag))
     return Figure.about(fit.lag, fit.sigma, fit.n - 3)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
 from analysis.evaluate.curve import Curve, Floats, broken_at, noise
 
 _USUAL, _STEEP = 75, 3.0  # percentile of the rises, and times those
@@ -34,10 +35,12 @@ def confirmed(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
         return curve, ()
     rows = known[alone]
     highest = int(rows[np.argmax(curve.stress[rows])])
-    words = (
-        f"forces left out because no neighbour confirms them: {len(rows)}, the highest, at"
-        f" {curve.t[highest] - curve.t[0]:.4g} s, {curve.stress[highest] / np.max(stress[~alone]):.3g} times"
-        " the highest of the others"
+    words = Message(
+        "forces left out because no neighbour confirms them: {len}, the highest, at {t:.4g} s, {stress:.3g} "
+        "times the highest of the others",
+        len(rows),
+        curve.t[highest] - curve.t[0],
+        curve.stress[highest] / np.max(stress[~alone]),
     )
     return replace(curve, stress=np.where(np.isin(np.arange(len(curve.t)), rows), math.nan, curve.stress)), (
         words,
@@ -135,5 +138,7 @@ def unseen(curve: Curve, measured: Curve) -> Unseen | None:
         return None
     k = int(hidden[0])
     after = int(known[k + 1]) if k + 1 < len(known) else -1
-    until = f"to {curve.t[after] - curve.t[0]:.4g} s" if after >= 0 else "on"
-    return Unseen(int(known[k]), after, f"no force is known from {t[k] - curve.t[0]:.4g} s {until}")
+    until = Message("to {t:.4g} s", curve.t[after] - curve.t[0]) if after >= 0 else "on"
+    return Unseen(
+        int(known[k]), after, Message("no force is known from {t:.4g} s {until}", t[k] - curve.t[0], until)
+    )

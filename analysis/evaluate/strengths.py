@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
 from analysis.evaluate.curve import ENOUGH, Curve, Floats, Loading, first_crossing, noise, reading, smoothed
 from analysis.evaluate.elastic import FittedLine
 from analysis.evaluate.figure import Figure, quantile
@@ -49,7 +50,11 @@ def proof_strength(loading: Loading, line: FittedLine, offset: float) -> Figure:
     at = first_crossing(course, offset, line.first)
     if math.isnan(at):
         most = float(course[line.first :].max())
-        return Figure.none(f"the plastic strain reaches {100 * most:.2g} %, {100 * offset:g} % is needed")
+        return Figure.none(
+            Message(
+                "the plastic strain reaches {most:.2g} %, {offset:g} % is needed", 100 * most, 100 * offset
+            )
+        )
     first, last = _around(course, at, (1 - _ABOUT) * offset, (1 + _ABOUT) * offset)
     strain = reading(plastic, at, first, last, noise(plastic[line.first : last]))
     stress = reading(loading.stress, at, first, last, loading.noise_stress)
@@ -57,7 +62,10 @@ def proof_strength(loading: Loading, line: FittedLine, offset: float) -> Figure:
     hardening = abs(stress.slope / strain.slope) if strain.slope > 0 else 0.0
     if loading.course[last - 1] - loading.course[first] < _PULLED * (course[last - 1] - course[first]):
         return Figure.none(
-            f"{100 * offset:g} % plastic strain is reached while the stress falls and the strain rests"
+            Message(
+                "{offset:g} % plastic strain is reached while the stress falls and the strain rests",
+                100 * offset,
+            )
         )
     value = stress.value + stress.slope * float(np.clip(place, -2, 2))
     doubt = math.hypot(strain.sigma, line.sigma_at(value))
@@ -82,7 +90,7 @@ def yield_point(loading: Loading, line: FittedLine) -> Yield:
         if lasts and loading.course[at] - line.strain_at(loading.level[at]) < _BEGINS:
             upper = highest_stress(loading, at)
             return Yield(upper, _lower(loading, at, end, upper), at)
-    why = "no yield point: nowhere does the stress fall by 0.5 % for 0.05 % strain where flow begins"
+    why = Message("no yield point: nowhere does the stress fall by 0.5 % for 0.05 % strain where flow begins")
     return Yield(Figure.none(why), Figure.none(why))
 
 
@@ -90,12 +98,12 @@ def tensile_strength(curve: Curve) -> Figure:
     """Rm: the highest stress up to the break (3.10.1), whether strain is known there or not, Pa."""
     loading = Loading.of(replace(curve, strain=np.zeros_like(curve.stress)))
     if not loading.n:
-        return Figure.none("no stress is known")
+        return Figure.none(Message("no stress is known"))
     if loading.stress[loading.top] <= 0:
-        return Figure.none("no tensile stress is known")
+        return Figure.none(Message("no tensile stress is known"))
     found = highest_stress(loading, loading.top)
     if found.low <= 0:
-        return Figure.none("no tensile stress beyond its noise is known")
+        return Figure.none(Message("no tensile stress beyond its noise is known"))
     rises = not loading.broke and loading.level[-1] >= loading.level.max() - 3 * loading.noise_stress
     return replace(found, why="so far: the test ended while the stress still rose") if rises else found
 
@@ -121,7 +129,7 @@ def strain_at_top(loading: Loading) -> Figure:
     flat = np.flatnonzero(loading.level >= loading.level.max() - doubt)
     first, last = int(flat[0]), int(flat[-1])
     if last == loading.n - 1 and not loading.broke:
-        return Figure.none("the test ended before the stress fell")
+        return Figure.none(Message("the test ended before the stress fell"))
     low, high = float(loading.course[first]), float(loading.course[last])
     half = quantile() * loading.noise_strain + _step(loading, last)
     return Figure((low + high) / 2, low - half, high + half)
@@ -130,7 +138,7 @@ def strain_at_top(loading: Loading) -> Figure:
 def strain_at_break(loading: Loading) -> Figure:
     """At without its zero: the last strain before the break."""
     if not loading.broke:
-        return Figure.none("no break was seen: the stress did not fall below 2 % of the highest")
+        return Figure.none(Message("no break was seen: the stress did not fall below 2 % of the highest"))
     value, half = float(loading.strain[-1]), quantile() * loading.noise_strain
     return Figure(value, value - half, value + half + 2 * _step(loading, loading.n - 1))
 
@@ -153,7 +161,7 @@ def _lower(loading: Loading, at: int, passed: int, upper: Figure) -> Figure:
     )
     part = plateau[after[plateau] <= _PLATEAU]
     if not len(part):
-        return Figure.none("the plateau is too short to tell the lower yield strength")
+        return Figure.none(Message("the plateau is too short to tell the lower yield strength"))
     half, level = _fine(loading, part)
     doubt = _SURE * loading.noise_stress / math.sqrt(2 * half + 1)
     value = float(level[part].min())

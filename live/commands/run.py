@@ -24,6 +24,7 @@ from live.pipeline.screen import Screen
 from live.results.folder import check_folder
 from live.results.sides.channels import JointChannels
 from live.run.alarms import check_alarms
+from live.run.control import Answer, refusal
 from live.run.live_run import CameraOfTest, LiveRun, run_cameras
 from live.run.outcome import Outcome, OutcomeOfTest, StopSignal
 from live.setup.devices import check_load_port
@@ -95,14 +96,14 @@ def run_with_page(
     return outcome.folder, code
 
 
-def _open_viewer(port: int) -> str:
-    """Open the viewer in its own window; returns "ok", or "no: " and the reason."""
+def _open_viewer(port: int) -> Answer:
+    """Open the viewer in its own window."""
     trouble: queue.Queue[str] = queue.Queue()
     if spawn_viewer(port, trouble.put) is None:
-        return "no: no window can be opened here; the folder of the run has view.rrd"
+        return refusal("no window can be opened here; the folder of the run has view.rrd")
     with contextlib.suppress(queue.Empty):
-        return f"no: {trouble.get(timeout=VIEWER_OPENS_S)}"
-    return "ok"
+        return refusal(trouble.get(timeout=VIEWER_OPENS_S))
+    return Answer()
 
 
 def run_attended(

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from acquire.events import Event, EventKind, EventSink, Level
+from acquire.text.message import about, without_name
 from acquire.text.printable import brief
 
 log = logging.getLogger(__name__)
@@ -23,9 +24,8 @@ _SESSION_ONLY = {EventKind.MEASURED}  # one for each burst: not for a person
 
 def sentence(event: Event, names: Mapping[str, str] | None = None) -> str:
     """Source and text: a device by its name in ``names``, else by its address without settings, and only once."""
-    source, text = brief(event.source), brief(event.text)
-    text = text.removeprefix(f"{source}: ")
-    return f"{(names or {}).get(event.source, source)}: {text}"
+    source, text = brief(event.source), without_name(brief(event.text), brief(event.source))
+    return about((names or {}).get(event.source, source), text)
 
 
 class EventLog:

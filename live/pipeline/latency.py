@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquire.system import processor_times
+from acquire.text import Message
 
 WINDOW_S = 5.0
 """The monitor judges the latencies of this time."""
@@ -123,17 +124,25 @@ class LatencyMonitor:
             return ""
         self._warned_t, self._before = sample.t, None
         cause = self._cause(before, now, period_s)
-        return f"results come up to {self.p95_s * 1e3:.0f} ms late (p95), bursts every {period_s * 1e3:.0f} ms: {cause}"
+        return Message(
+            "results come up to {p95_s:.0f} ms late (p95), bursts every {period_s:.0f} ms: {cause}",
+            self.p95_s * 1e3,
+            period_s * 1e3,
+            cause,
+        )
 
     def _cause(self, before: ProcessorUse | None, now: ProcessorUse | None, period_s: float) -> str:
         if self._backlog() > WAITING_SHARE:
-            return "the disk is too slow; record less (--record bursts) or on a faster disk"
+            return Message("the disk is too slow; record less (--record bursts) or on a faster disk")
         others, view = (0.0, 0.0) if before is None or now is None else now.since(before)
         if others > BUSY_CORES:
-            return f"another program takes {others:.1f} processor cores; end it"
+            return Message("another program takes {others:.1f} processor cores; end it", others)
         kernel = float(np.median([one.kernel_s for one in self._samples]))
         if kernel > 0.8 * period_s:
-            return f"the kernel needs {kernel * 1e3:.0f} ms; take fewer ZOIs (--step, --roi) or longer bursts"
+            return Message(
+                "the kernel needs {kernel:.0f} ms; take fewer ZOIs (--step, --roi) or longer bursts",
+                kernel * 1e3,
+            )
         if view > BUSY_CORES:
-            return f"drawing takes {view:.1f} processor cores; close viewers or give --no-view"
-        return "the processor is short; close what else runs, take fewer ZOIs or longer bursts"
+            return Message("drawing takes {view:.1f} processor cores; close viewers or give --no-view", view)
+        return Message("the processor is short; close what else runs, take fewer ZOIs or longer bursts")

@@ -14,6 +14,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from acquire.frame import Burst
+from acquire.text import Message
 from analysis.evaluate import COME_APART, AreaStrain, Gauge, GaugeValue, extension_of
 from analysis.field import StrainField, area_share, mean_blur
 from analysis.optics import ApparentMotion, LensReading
@@ -128,7 +129,7 @@ class TimeStep:
 
     def strains(self, axis: str) -> dict[str, tuple[float, float, str]]:
         """Value, sigma and why there is none: of ``axial``, of the region, of gauges; of ``burst`` the valid share."""
-        why = self.refused or "no ZOI has a value"
+        why = self.refused or Message("no ZOI has a value")
         region = {
             name: (getattr(self, name), getattr(self, f"sigma_{name}"), why) for name in ("exx", "eyy", "exy")
         }
@@ -188,7 +189,7 @@ def time_step_of(burst: Burst, field: StrainField, force: float, measure_s: floa
         zoi_sigma=float(np.median(field.sigma_eyy[valid])) if values.size else math.nan,
         n_valid=int(valid.sum()),
         n_zoi=int(field.grid.active.sum()),
-        refused=", ".join(f"{n} {status.name}" for status, n in field.refused.items()),
+        refused=", ".join(Message("{n} {name}", n, status.name) for status, n in field.refused.items()),
         noise_GL=burst.noise,
         measure_s=measure_s,
         blur=blur.px,

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from acquire.burst import BurstAccumulator, PictureMemory
 from acquire.errors import ConfigError, DataError, MachineUnfit, PhasedicError
 from acquire.frame import Burst, Frame
+from acquire.text import Message
 from analysis.field import Status, StrainField
 from analysis.quality.steadiness import strain_drifts
 
@@ -32,7 +33,7 @@ def numerics_error(error: ValueError, what: str) -> PhasedicError:
     from analysis import PatternError
 
     kind = DataError if isinstance(error, PatternError) else ConfigError
-    return kind(f"{what}: {error}")
+    return kind(Message("{what}: {error}", what, error))
 
 
 @contextlib.contextmanager
@@ -75,7 +76,7 @@ def prepare(
     settings: KernelSettings,
     stated_noise_GL: float | None,
     correct: Correction = unchanged,
-    what: str = "the reference",
+    what: str = Message("the reference"),
     steps: Sequence[float] | None = None,
 ) -> tuple[PhaseKernel, float | None]:
     """The kernel on ``reference``, and the noise of one frame that goes with it.
@@ -165,9 +166,13 @@ def repetition_text(period: NDArray[np.float64]) -> str:
     if repeats.sum() <= MIN_REPEATING * able:
         return ""
     known = period[repeats]
-    return (
-        f"the pattern repeats every {np.median(known):.1f} px in {known.size} of {able} ZOIs; it may move by"
-        f" {ALLOWED_PERIODS * known.min():.1f} px between two pictures, and to the first one"
+    return Message(
+        "the pattern repeats every {median:.1f} px in {size} of {able} ZOIs; it may move by "
+        "{ALLOWED_PERIODS:.1f} px between two pictures, and to the first one",
+        np.median(known),
+        known.size,
+        able,
+        ALLOWED_PERIODS * known.min(),
     )
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from acquire.text import Message
 from live.config.channels import SYSTEM_CHANNELS, is_joint
 from live.pipeline.measurement import TimeStep
 from live.pipeline.timed.figure import TimedFigure
@@ -85,7 +86,11 @@ class Snapshot:
     @property
     def troubles(self) -> tuple[str, ...]:
         """Why the state of the test is not good: alarms, errors, and figures that are old, unknown or beyond."""
-        names = {AXIAL: self.axial_name, FPS: "the frame rate", DISK: "the room on the disk"}
+        names = {
+            AXIAL: self.axial_name,
+            FPS: Message("the frame rate"),
+            DISK: Message("the room on the disk"),
+        }
         lacking = (
             figure.trouble(names.get(name, name.removeprefix("gauge_")))
             for name, figure in self.figures.items()

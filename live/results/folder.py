@@ -15,6 +15,7 @@ from typing import Any
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst
+from acquire.text import Message
 from acquire.text.printable import printable
 from live import VERSION
 from live.pipeline.measure import NewReference
@@ -47,7 +48,7 @@ def installed_versions() -> dict[str, str]:
         try:
             found[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "not installed"
+            found[name] = Message("not installed")
     return found
 
 
@@ -58,7 +59,10 @@ def differing_versions(then: Mapping[str, Any]) -> list[str]:
     """What differs from the versions ``then`` of an earlier measurement and changes the last digits, in words."""
     now = versions()
     differ = [name for name in _DIGITS if name in then and str(then[name]) != now[name]]
-    return [f"{name} {printable(str(then[name]))[:40]} (here {now[name]})" for name in differ]
+    return [
+        Message("{name} {printable} (here {now})", name, printable(str(then[name]))[:40], now[name])
+        for name in differ
+    ]
 
 
 def check_folder(wanted: str | None) -> None:
@@ -72,8 +76,8 @@ def check_folder(wanted: str | None) -> None:
     folder = Path(wanted) if wanted else Path("runs")
     there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     if not (there.is_dir() and os.access(there, os.W_OK | os.X_OK)):
-        why = "Permission denied" if there.is_dir() else "Not a directory"
-        raise ConfigError(f"{folder}: cannot be made ({why}); choose another --out")
+        why = Message("Permission denied") if there.is_dir() else Message("Not a directory")
+        raise ConfigError("{folder}: cannot be made ({why}); choose another --out", folder, why)
     if wanted:
         _check_free(folder)
 
@@ -82,7 +86,9 @@ def _check_free(folder: Path) -> None:
     existing = [name for name in FILES if (folder / name).exists()]
     if existing:
         raise ConfigError(
-            f"{folder} already holds {existing[0]}; nothing is overwritten, choose another --out"
+            "{folder} already holds {existing}; nothing is overwritten, choose another --out",
+            folder,
+            existing[0],
         )
 
 
@@ -98,7 +104,9 @@ def make_folder(wanted: str | None, now: datetime.datetime) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise ConfigError(f"{folder}: cannot be made ({error.strerror}); choose another --out") from None
+        raise ConfigError(
+            "{folder}: cannot be made ({strerror}); choose another --out", folder, error.strerror
+        ) from None
     _check_free(folder)
     return folder
 
@@ -132,12 +140,18 @@ class BurstFailures:
         """Take burst ``number`` (from 0), or a new reference before it, and what was raised."""
         self.count += 1
         burst, what = (
-            (item, f"burst {number + 1}") if isinstance(item, Burst) else (item.burst, "the new reference")
+            (item, Message("burst {number}", number + 1))
+            if isinstance(item, Burst)
+            else (item.burst, Message("the new reference"))
         )
-        frames = f"frames {burst.first_index} to {burst.last_index}"
-        text = (
-            f"{what} ({frames}) could not be measured, the next one is: {type(error).__name__}: {error};"
-            f" {self._path.name} has the details"
+        frames = Message("frames {first_index} to {last_index}", burst.first_index, burst.last_index)
+        text = Message(
+            "{what} ({frames}) could not be measured, the next one is: {name}: {error}; {name2} has the details",
+            what,
+            frames,
+            type(error).__name__,
+            error,
+            self._path.name,
         )
         if self.count <= MAX_TRACEBACKS:
             trace = "".join(traceback.format_exception(error))

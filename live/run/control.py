@@ -20,7 +20,7 @@ from __future__ import annotations
 import math
 import queue
 from collections.abc import Callable
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from acquire.errors import Spoken
 from acquire.events import Event, EventKind, Level
@@ -66,7 +66,37 @@ EmitEvent = Callable[[EventKind, str, str, Level], None]  # kind, source, text, 
 
 
 class ControlRefused(Spoken):
-    """Its text is why a command is not carried out, and what to do."""
+    """Its text is why a command is not carried out, and what to do; ``risk``: of a tare that may be confirmed."""
+
+    risk = ""
+
+
+class Answer(NamedTuple):
+    """What became of a command.
+
+    Attributes
+    ----------
+    text : str
+        What was done, mostly empty; why it was refused.
+    refused : bool
+    risk : str
+        Of a tare under load: what it would do; the page asks, and forces it.
+    """
+
+    text: str = ""
+    refused: bool = False
+    risk: str = ""
+
+    @property
+    def line(self) -> str:
+        """``ok``, ``ok: TEXT`` or ``no: REASON``, in one line."""
+        word = "no" if self.refused else "ok"
+        return f"{word}: {_in_one_line(self.text)}" if self.text else word
+
+
+def refusal(text: str, *values: object) -> Answer:
+    """A command that is not carried out, and why."""
+    return Answer(Message(text, *values) if values else text, refused=True)
 
 
 class TareableCell(Protocol):
@@ -147,7 +177,9 @@ class TareControl:
                 risk,
             )
             if how == ONCE:
-                raise ControlRefused("{text}; confirm it", text)
+                refused = ControlRefused("{text}; confirm it", text)
+                refused.risk = text
+                raise refused
             self._confirm_t = self._clock()
             raise ControlRefused(
                 "{text}; repeat the command within {CONFIRM_S:g} s to do it", text, CONFIRM_S
@@ -207,11 +239,15 @@ class Controls(Protocol):
 
 def answer(line: str, controls: Controls) -> str:
     """Carry out one line; ``ok``, ``ok: TEXT`` or ``no: REASON``, in one line."""
+    return carry_out(line, controls).line
+
+
+def carry_out(line: str, controls: Controls) -> Answer:
+    """Carry out one line."""
     try:
-        text = _execute(_expanded(line, controls), controls)
+        return Answer(_execute(_expanded(line, controls), controls))
     except ControlRefused as refused:
-        return f"no: {_in_one_line(refused)}"
-    return f"ok: {_in_one_line(text)}" if text else "ok"
+        return Answer(refused.text, True, refused.risk)
 
 
 def _expanded(line: str, controls: Controls) -> str:

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import ast
+import re
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
+from babel.messages.extract import extract
 
 from acquire.text import Message
-from acquire.text.message import about
+from acquire.text.message import about, fields
+from analysis.evaluate import GAUGE_KINDS
+from live.results.maps.field_maps import FIELD_MAPS
 from live.words import language
-from live.words.language import entries, of_environment, parsed, said
+from live.words.language import LANGUAGES, entries, of_environment, parsed, said
+from tests.live.ui.web.browser import ROOT
+from tests.live.ui.web.page_texts import of_the_page
 
 PO = r"""
 # a comment
@@ -79,3 +88,85 @@ def test_an_entry_with_other_fields_leaves_english(german: Path) -> None:
 )
 def test_the_language_is_that_of_the_environment(environ: dict[str, str], name: str) -> None:
     assert of_environment(environ) == name
+
+
+# Calls whose texts are for people, and which of their arguments are: what ``pybabel extract -k`` takes.
+KEYWORDS: dict[str, Any] = {
+    "Message": None, "refusal": None, "Spoken": None, "PhasedicError": None, "ConfigError": None, "DataError": None,
+    "DeviceError": None, "MachineUnfit": None, "Interrupted": None, "ControlRefused": None, "NotAllowed": None,
+    "NotACamera": None, "DeviceFault": None, "GenicamError": None,
+}  # fmt: skip
+FIELDS = re.compile(r"\{(\w+)[:}]")
+
+
+def name_of(call: ast.Call) -> str:
+    return getattr(call.func, "id", getattr(call.func, "attr", ""))
+
+
+def formatted(path: Path) -> set[int]:
+    """Lines of calls whose text is put together on the spot (commands of a terminal): it stays English."""
+    calls = [
+        node
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Call) and node.args
+    ]
+    return {
+        call.lineno for call in calls if isinstance(call.args[0], ast.JoinedStr) and name_of(call) in KEYWORDS
+    }
+
+
+@cache
+def templates() -> dict[str, str]:
+    """All messages of the program, with the place of each."""
+    found: dict[str, str] = {}
+    for package in ("acquire", "analysis", "hw_mocks", "live"):
+        for path in sorted((ROOT / package).rglob("*.py")):
+            english_only = formatted(path)
+            with path.open("rb") as file:
+                for line, text, *_ in extract("python", file, KEYWORDS):
+                    if line not in english_only:
+                        found.setdefault(str(text), f"{path.relative_to(ROOT)}:{line}")
+    return {text: place for text, place in found.items() if re.search("[A-Za-z]{2}", FIELDS.sub("", text))}
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_every_message_is_translated(name: str) -> None:
+    known = entries(name)
+    assert len(templates()) > 800
+    missing = {f"{place}: {text}" for text, place in templates().items() if text not in known}
+    assert not missing, "give each an entry in live/words/*.po"
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_every_text_of_the_page_is_translated(name: str) -> None:
+    served = {word for kind in GAUGE_KINDS.values() for word in (kind.label, kind.hint)}
+    assert not {text for text in {*of_the_page(), *FIELD_MAPS, *served} if text not in entries(name)}
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_a_translation_has_the_fields_of_its_text_and_stands_for_one_that_is_there(name: str) -> None:
+    for english, words in entries(name).items():
+        assert set(FIELDS.findall(words)) == set(FIELDS.findall(english)), english
+        made_of_words = "{n} "  # ``counted`` puts a noun behind
+        assert not FIELDS.search(english) or english in templates() or english.startswith(made_of_words), (
+            english
+        )
+
+
+def test_every_field_has_a_value() -> None:
+    """Of each message that is written down with its values."""
+    for package in ("acquire", "analysis", "hw_mocks", "live"):
+        for path in sorted((ROOT / package).rglob("*.py")):
+            for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+                if not isinstance(node, ast.Call) or not node.args or isinstance(node.args[-1], ast.Starred):
+                    continue
+                name = name_of(node)
+                text = node.args[0].value if isinstance(node.args[0], ast.Constant) else None
+                if (
+                    name in KEYWORDS
+                    and isinstance(text, str)
+                    and not any(one.arg is None for one in node.keywords)
+                ):
+                    given = len(node.args) - 1 + len(node.keywords)
+                    want = len(fields(text)) if given or name == "Message" else 0
+                    assert given == want, f"{path}:{node.lineno}: {text}"

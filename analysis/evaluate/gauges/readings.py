@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
 from analysis.evaluate.area.strain import GRADIENTS, AreaStrain
 from analysis.evaluate.gauges.gauge import GaugeValue
 from analysis.evaluate.gauges.geometry import Floats, Mask
@@ -18,7 +19,7 @@ from analysis.field import PAIR_INDEX, VALUES, Status, StrainField, ZoiGrid, var
 
 Statistic = Literal["affine", "mean", "largest", "smallest"]
 
-COME_APART = "the region has come apart"
+COME_APART = Message("the region has come apart")
 """Why an area has no strain."""
 MIN_SHARE = 0.5
 """A gauge has a value as long as this share of the ZOIs of an area, or of each of its ends, has one."""
@@ -50,10 +51,10 @@ def read_ends(chosen: Sequence[Mask], field: StrainField) -> GaugeValue:
     """
     for number, end in enumerate(chosen, 1):
         if missing := _missing(end, field):
-            return GaugeValue(math.nan, math.nan, f"end {number}: {missing}")
+            return GaugeValue(math.nan, math.nan, Message("end {number}: {missing}", number, missing))
     found = extension(field, Ends(chosen[0] & field.ok, chosen[1] & field.ok))
     if not found.length > 0:
-        return GaugeValue(math.nan, math.nan, "both ends are the same ZOIs; make the gauge longer")
+        return GaugeValue(math.nan, math.nan, Message("both ends are the same ZOIs; make the gauge longer"))
     return GaugeValue(found.strain, found.sigma)
 
 
@@ -66,12 +67,14 @@ def read_strips(chosen: Sequence[Mask], field: StrainField, along: str) -> Gauge
         return read_ends(chosen, field)
     for number, end in enumerate(chosen, 1):
         if missing := _missing(end, field):
-            return GaugeValue(math.nan, math.nan, f"end {number}: {missing}")
+            return GaugeValue(math.nan, math.nan, Message("end {number}: {missing}", number, missing))
     side = 1 if along == "x" else 0
     first, second = ((end & field.ok).any(axis=side, keepdims=True) for end in chosen)
     both = first & second & field.ok
     if not both.any():
-        return GaugeValue(math.nan, math.nan, "the ZOIs with a value at its two ends do not face each other")
+        return GaugeValue(
+            math.nan, math.nan, Message("the ZOIs with a value at its two ends do not face each other")
+        )
     return read_ends([end & both for end in chosen], field)
 
 
@@ -89,16 +92,19 @@ def _missing(chosen: Mask, field: StrainField) -> str:
     total = int(chosen.sum())
     if total == 0:
         grid = field.grid
-        return (
-            f"no ZOI is there; their centres reach from {grid.x[0]:g}, {grid.y[0]:g} to {grid.x[-1]:g},"
-            f" {grid.y[-1]:g} px; move the gauge there"
+        return Message(
+            "no ZOI is there; their centres reach from {x:g}, {y:g} to {x2:g}, {y2:g} px; move the gauge there",
+            grid.x[0],
+            grid.y[0],
+            grid.x[-1],
+            grid.y[-1],
         )
     status = field.status[chosen]
     lost = Counter(Status(s) for s in status[status != Status.OK].tolist())
     if total - lost.total() >= MIN_SHARE * total:
         return ""
-    words = ", ".join(f"{n} {status.name}" for status, n in lost.most_common())
-    return f"{lost.total()} of {total} ZOIs have no value ({words})"
+    words = ", ".join(Message("{n} {name}", n, status.name) for status, n in lost.most_common())
+    return Message("{total} of {total2} ZOIs have no value ({words})", lost.total(), total, words)
 
 
 def check_value(name: str, value: str) -> None:

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
 from analysis.evaluate import CONFIDENCE, Figure
 from analysis.evaluate.curve import noise
 from analysis.evaluate.figure import quantile
@@ -66,10 +67,10 @@ def doubts(found: Sequence[DataCheck]) -> list[str]:
 
 def _finding(name: str, check: Callable[[FinishedTest], str | None], test: FinishedTest) -> DataCheck:
     if name not in _WITHOUT_FORCE and not test.has_force:
-        return DataCheck(name, "not checked", "no force is known")
+        return DataCheck(name, "not checked", Message("no force is known"))
     text = check(test)
     if text is None:
-        return DataCheck(name, "not checked", "the test does not show it")
+        return DataCheck(name, "not checked", Message("the test does not show it"))
     return DataCheck(name, "doubt" if text else "good", text)
 
 
@@ -83,14 +84,17 @@ def _sign_of_force(test: FinishedTest) -> str | None:
     if follows < -_FOLLOWS:
         way = "longer" if longest > 0 else "shorter"
         sign = "negative" if np.median(stress[np.abs(stress) > np.abs(stress).max() / 2]) < 0 else "positive"
-        return (
-            f"the force is {sign} where the specimen gets {way} along {test.axis.axis}: give --load-sign -1, or"
-            " --axis where that is not the axis of the load"
+        return Message(
+            "the force is {sign} where the specimen gets {way} along {axis}: give --load-sign -1, or --axis "
+            "where that is not the axis of the load",
+            sign,
+            way,
+            test.axis.axis,
         )
     if follows > _FOLLOWS and longest < 0 and stress[np.argmax(np.abs(stress))] < 0:
-        return (
-            "the test is in compression: force and strain are negative, and the strengths of tension do not apply; if"
-            " it was tension, give --load-sign -1"
+        return Message(
+            "the test is in compression: force and strain are negative, and the strengths of tension do not "
+            "apply; if it was tension, give --load-sign -1"
         )
     return ""
 
@@ -100,13 +104,21 @@ def _modulus(test: FinishedTest) -> str | None:
     e, expected = test.figures.E.value * 1e-9, test.specimen.modulus_GPa
     if not test.figures.E.known or test.specimen.area_m2 is None:
         return None
-    ask = "is the section in mm2 and the force in N (--section, --load-unit)?"
+    ask = Message("is the section in mm2 and the force in N (--section, --load-unit)?")
     if expected is not None:
         off = abs(e / expected - 1) > _MODULUS_OFF
-        return f"E = {e:.3g} GPa where specimen.modulus_GPa is {expected:g}: {ask}" if off else ""
+        return (
+            Message("E = {e:.3g} GPa where specimen.modulus_GPa is {expected:g}: {ask}", e, expected, ask)
+            if off
+            else ""
+        )
     low, high = _MODULUS_GPa
     return (
-        "" if low <= e <= high else f"E = {e:.3g} GPa is not that of a solid, {low:g} to {high:g} GPa: {ask}"
+        ""
+        if low <= e <= high
+        else Message(
+            "E = {e:.3g} GPa is not that of a solid, {low:g} to {high:g} GPa: {ask}", e, low, high, ask
+        )
     )
 
 
@@ -116,16 +128,33 @@ def _coverage(test: FinishedTest) -> str | None:
     if not len(samples.t) or len(t) < 2:
         return None
     limit = max(_UNCOVERED_S, _UNCOVERED * float(np.median(np.diff(t))))
-    known = f"{np.count_nonzero(np.isfinite(test.curve.stress))} of {len(t)} bursts have a force"
+    known = Message(
+        "{count_nonzero} of {len} bursts have a force",
+        np.count_nonzero(np.isfinite(test.curve.stress)),
+        len(t),
+    )
     if (late := float(samples.t[0] - t[0])) > limit:
-        return f"the forces begin {late:.1f} s after the pictures ({known}): give forces for all pictures"
+        return Message(
+            "the forces begin {late:.1f} s after the pictures ({known}): give forces for all pictures",
+            late,
+            known,
+        )
     if (early := float(t[-1] - samples.t[-1])) > limit:
-        return f"the forces end {early:.1f} s before the pictures ({known}): give forces for all pictures"
+        return Message(
+            "the forces end {early:.1f} s before the pictures ({known}): give forces for all pictures",
+            early,
+            known,
+        )
     beyond = float(samples.t[-1] - t[-1])
     seen = np.abs(samples.values[samples.t <= t[-1]])
     if beyond > limit and len(seen) and np.abs(samples.values).max() > 1.01 * seen.max():
         most = samples.values[np.argmax(np.abs(samples.values))]
-        return f"the pictures end {beyond:.1f} s before the forces, which go on to {most:.4g} N; no picture shows that"
+        return Message(
+            "the pictures end {beyond:.1f} s before the forces, which go on to {most:.4g} N; no picture shows "
+            "that",
+            beyond,
+            most,
+        )
     return ""
 
 
@@ -136,12 +165,18 @@ def _lag(test: FinishedTest) -> str | None:
         return None
     if abs(lag.value) < max(LAG_MATTERS_S, _SIGMAS * _sigma(lag)):
         return ""
-    way = "behind" if lag.value > 0 else "ahead of"
+    way = "behind" if lag.value > 0 else Message("ahead of")
     total = lag.value + test.corrected_s
     text = figure_text(
         Figure(abs(lag.value), abs(lag.value) - _half(lag), abs(lag.value) + _half(lag)), 1e-3, "ms"
     )
-    return f"the force comes {text} ({CONFIDENCE:.0%}) {way} the pictures: --lag {total:.3f} corrects it"
+    return Message(
+        "the force comes {text} ({CONFIDENCE:.0%}) {way} the pictures: --lag {total:.3f} corrects it",
+        text,
+        CONFIDENCE,
+        way,
+        total,
+    )
 
 
 def _alignment(test: FinishedTest) -> str | None:
@@ -155,17 +190,20 @@ def _alignment(test: FinishedTest) -> str | None:
             math.pi / 2 if test.axis.axis == "y" else 0.0
         )
         off = math.remainder(along - angle.value, math.pi)
-        what, mend = "the gauge axial", "place it along the load"
+        what, mend = Message("the gauge axial"), Message("place it along the load")
     else:
         off, what, mend = (
             angle.value,
-            f"the axis {test.axis.axis}",
-            "turn the camera, or draw a gauge axial along the load",
+            Message("the axis {axis}", test.axis.axis),
+            Message("turn the camera, or draw a gauge axial along the load"),
         )
     if abs(off) <= _OFF_AXIS + _SIGMAS * _sigma(angle):
         return ""
-    return (
-        f"{what} is {abs(math.degrees(off)):.0f} degrees off the largest strain, and so are E and nu: {mend}"
+    return Message(
+        "{what} is {abs:.0f} degrees off the largest strain, and so are E and nu: {mend}",
+        what,
+        abs(math.degrees(off)),
+        mend,
     )
 
 
@@ -178,7 +216,11 @@ def _out_of_plane(test: FinishedTest) -> str | None:
     if -margin <= nu.value <= 0.5 + margin:
         return ""
     text = figure_text(nu)
-    return f"nu = {text} is beyond 0 to 0.5: the specimen moves towards the camera or bends; see docs/optics.md, plates"
+    return Message(
+        "nu = {text} is beyond 0 to 0.5: the specimen moves towards the camera or bends; see docs/optics.md, "
+        "plates",
+        text,
+    )
 
 
 def _reference_load(test: FinishedTest) -> str | None:
@@ -189,7 +231,11 @@ def _reference_load(test: FinishedTest) -> str | None:
     sigma = noise(samples.values) if len(samples.t) > 3 else 0.0
     if abs(force) <= max(_SIGMAS * sigma, _PRELOAD * float(np.abs(samples.values).max())):
         return ""
-    return f"the reference was taken under load: strains count from {force:.4g} N; take it before the load, or tare"
+    return Message(
+        "the reference was taken under load: strains count from {force:.4g} N; take it before the load, or "
+        "tare",
+        force,
+    )
 
 
 _CHECKS: dict[str, Callable[[FinishedTest], str | None]] = {

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from acquire.text import Message
 from live.config.cameras import BACK, FRONT
 from live.pipeline.measurement import AXIAL, TimeStep
 from live.pipeline.run_state import RunState
@@ -54,9 +55,9 @@ class JointChannels:
         """Why there is no mean of both any more; empty while there is, and before both have measured."""
         for side, state in self._states.items():
             if state.health.camera_failed:
-                return f"the camera of the {side} has failed"
+                return Message("the camera of the {side} has failed", side)
             if state.snapshot(self._clock()).figure(BURST).state in LACKING:
-                return f"the {side} gives no strains"
+                return Message("the {side} gives no strains", side)
         steps = {side: state.history.time_steps for side, state in self._states.items()}
         if not self._live or not all(steps.values()):
             return ""
@@ -64,12 +65,12 @@ class JointChannels:
         late, ahead = sorted(ends, key=lambda side: ends[side])
         limit = max(LATE_S, *(longest_gap(np.array([s.t for s in one[-3:]])) for one in steps.values()))
         if _went_on(steps[ahead], ends[late]) > limit:
-            return f"the {late} gives no strains"
+            return Message("the {late} gives no strains", late)
         joint = newest(self._states[FRONT], self._states[BACK], self._clock())
         if AXIAL in joint:
             self._last_t = joint[AXIAL].t
         since = _went_on(steps[late], self._last_t)
-        return f"no strain of both for {since:.1f} s" if since > limit else ""
+        return Message("no strain of both for {since:.1f} s", since) if since > limit else ""
 
 
 def _went_on(steps: Sequence[TimeStep], t: float) -> float:

@@ -17,6 +17,7 @@ from typing import Any, Protocol
 
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
+from acquire.text import Message
 from acquire.text.printable import printable, share_text
 from analysis.evaluate import ExtensionGauge, LineGauge
 from live.config.gauges import complete_gauges
@@ -201,7 +202,7 @@ class PageConsumer(Consumer):
     def end(self) -> str:
         """Send the last state."""
         self._broadcaster.publish(self._kind, self.state() | {"state": "ended", "recording": False})
-        return f"{self._shown} pictures shown"
+        return Message("{shown} pictures shown", self._shown)
 
     def at_peak(self) -> dict[str, Any]:
         """For the page after the test: the map and the gauges at the highest force, without one at the end."""
@@ -210,7 +211,7 @@ class PageConsumer(Consumer):
             return {"peak": None, "gauges": [], "points": self.curve.position}
         self.picture, shown = self.map.draw(m)
         self._shown += 1
-        words = "at the end" if math.isnan(self._peak_N) else "at the highest force"
+        words = Message("at the end") if math.isnan(self._peak_N) else Message("at the highest force")
         peak = shown | {"picture": f"/picture?side={self._side}&after={self._shown}"}
         return {
             "peak": peak,
@@ -334,7 +335,7 @@ def _measured(s: Snapshot) -> dict[str, Any]:
             "name": s.axial_name,
             "value": s.figure(AXIAL).value,
             "sigma": s.figure(AXIAL).sigma,
-            "assumed": "axis assumed" if s.axis_assumed else "",
+            "assumed": Message("axis assumed") if s.axis_assumed else "",
         },
         "gauges": _gauges(i, s.figures),
         "valid": s.valid,

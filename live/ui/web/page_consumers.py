@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from live.config.loading import Config
+from live.run.control import Answer, refusal
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.page_consumer import PageConsumer, RunningTest
@@ -84,12 +85,12 @@ class PageConsumers:
         """The newest picture of a camera, as JPEG; empty where there is none."""
         return self._of(query.get("side", "")).picture if self.by_name else b""
 
-    def select_map(self, request: Mapping[str, Any]) -> dict[str, str]:
+    def select_map(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Show another map, on the pictures of all cameras."""
         if not self.by_name:
-            return {"answer": "no: nothing is measured"}
-        refusal = next(filter(None, [one.select_map(request) for one in self.by_name.values()]), "")
-        return {"answer": f"no: {refusal}" if refusal else "ok"}
+            return refusal("nothing is measured")._asdict()
+        why = next(filter(None, [one.select_map(request) for one in self.by_name.values()]), "")
+        return Answer(why, refused=bool(why))._asdict()
 
     def _of(self, side: str) -> PageConsumer:
         """That of the camera that a request names, else the first."""

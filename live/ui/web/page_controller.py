@@ -24,7 +24,7 @@ from acquire.text.printable import brief, printable
 from analysis.evaluate import GAUGE_KINDS
 from live.config.loading import Config
 from live.results.maps.field_maps import FIELD_MAPS
-from live.run.control import ONCE, Controls, answer
+from live.run.control import ONCE, Answer, Controls, carry_out, refusal
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.page_consumer import PageConsumer, RunningTest
@@ -85,7 +85,7 @@ class PageController:
         self._requests: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._folder = TemporaryDirectory(prefix="phasedic-")
         self._message = ""
-        self.viewer: Callable[[int], str] = lambda port: "no: there is no viewer here"
+        self.viewer: Callable[[int], Answer] = lambda port: refusal("there is no viewer here")
         gets = {
             "/points": lambda query: self._consumers.points(query),
             "/picture": self._picture,
@@ -250,56 +250,55 @@ class PageController:
             raise HttpError(404, Message("there is no report yet"))
         return Response(self._report.read_bytes(), "text/html; charset=utf-8", REPORT_POLICY)
 
-    def _viewer(self, request: Mapping[str, Any]) -> dict[str, str]:
+    def _viewer(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Open the viewer at the actual port of the view, which may differ from the configured one."""
         port = None if self._live is None else self._live.run_state.health.view_port
         if port is None:
-            return {"answer": "no: the view is switched off or not ready yet; after a test open its view.rrd"}
-        return {"answer": self.viewer(port)}
+            why = refusal("the view is switched off or not ready yet; after a test open its view.rrd")
+            return why._asdict()
+        return self.viewer(port)._asdict()
 
-    def _command(self, request: Mapping[str, Any]) -> dict[str, str]:
+    def _command(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Run a command line."""
         line, stage = request.get("line"), request.get("stage", self.stage)
         if not isinstance(line, str):
-            return {"answer": "no: a command is a line"}
+            return refusal("a command is a line")._asdict()
         if stage != self.stage:
-            return {"answer": "no: the stage has changed meanwhile; press again"}
-        return {"answer": self._answer_to(line)}
+            return refusal("the stage has changed meanwhile; press again")._asdict()
+        return self._answer_to(line)._asdict()
 
-    def _answer_to(self, line: str) -> str:
+    def _answer_to(self, line: str) -> Answer:
         live, command = self._live, line.strip()
         if live is not None:
             # Two pages must not confirm one another: the page that asks forces the tare.
-            return answer(
-                Message("{command} {ONCE}", command, ONCE) if command in ("t", "tare") else line, live
-            )
+            return carry_out(f"{command} {ONCE}" if command in ("t", "tare") else line, live)
         if self.stage == RUN or (self.stage == SET_UP and self.sessions is None):
-            return "no: the test is being opened"
+            return refusal("the test is being opened")
         allowed = (START, QUIT) if self.stage == SET_UP else (NEXT, AGAIN, QUIT)
         if command not in allowed or self.draft is None:
-            return f"no: the commands of this stage are {', '.join(allowed)}"
+            return refusal("the commands of this stage are {allowed}", ", ".join(allowed))
         try:
             if command == START and self.sessions is not None:
                 self.sessions.ready(Path(self._folder.name))
         except PhasedicError as error:
-            return f"no: {printable(brief(error))}"
+            return refusal(printable(brief(error)))
         self._requests.put(command)
-        return "ok"
+        return Answer()
 
-    def _change(self, request: Mapping[str, Any]) -> dict[str, str]:
+    def _change(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Run a change of the set-up."""
         sessions, do = self.sessions, str(request.get("do"))
         if sessions is None:
-            return {"answer": "no: nothing is set up now"}
+            return refusal("nothing is set up now")._asdict()
         change, of_all = CHANGES.get(do), {"check": sessions.check, "save": sessions.save}
         if change is None and do not in of_all:
-            return {"answer": f"no: the changes are {', '.join((*CHANGES, *of_all))}"}
+            return refusal("the changes are {allowed}", ", ".join((*CHANGES, *of_all)))._asdict()
         try:
             if change is None:
                 of_all[do]()
             else:
                 change(sessions.of(request.get("side")), request)
         except PhasedicError as error:
-            return {"answer": f"no: {printable(brief(error))}"}
+            return refusal(printable(brief(error)))._asdict()
         sessions.refresh()
-        return {"answer": "ok"}
+        return Answer()._asdict()

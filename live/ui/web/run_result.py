@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from acquire.text import Message
 from analysis.evaluate import TensileFigures
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import sentence
@@ -67,7 +68,9 @@ def cameras_result(
         **next(iter(results.values())),
         "folder": str(folder),
         "figures": figures,
-        "troubles": [f"{side}: {text}" for side, one in results.items() for text in one["troubles"]],
+        "troubles": [
+            Message("{side}: {text}", side, text) for side, one in results.items() for text in one["troubles"]
+        ],
     }
 
 
@@ -86,19 +89,27 @@ def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str
     found = [_figure(row) for row in _rows(figures, specimen)]
     if figures.E.known and figures.elastic_strain:
         found.append(
-            {"name": "strain of E and nu", "text": figures.elastic_strain, "interval": "", "words": True}
+            {
+                "name": Message("strain of E and nu"),
+                "text": figures.elastic_strain,
+                "interval": "",
+                "words": True,
+            }
         )
     if figures.E.known:
         found.append(_interval_of_e(figures))
     return found + [
-        {"name": "of the test", "text": note, "interval": "", "words": True} for note in figures.notes
+        {"name": Message("of the test"), "text": note, "interval": "", "words": True}
+        for note in figures.notes
     ]
 
 
 def _interval_of_e(figures: TensileFigures) -> dict[str, Any]:
-    parts = figures.budget if len(figures.budget) > 1 else ("scatter", "no limits of error are stated")
+    parts = (
+        figures.budget if len(figures.budget) > 1 else ("scatter", Message("no limits of error are stated"))
+    )
     text = "; ".join(parts)
-    return {"name": "interval of E", "text": text, "interval": "", "words": True}
+    return {"name": Message("interval of E"), "text": text, "interval": "", "words": True}
 
 
 def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> list[TensileRow]:
@@ -112,7 +123,7 @@ def _figure(row: TensileRow) -> dict[str, Any]:
         return {"name": row.name, "text": None, "why": row.figure.why}
     value, between, interval = row.number.partition(" ± ")
     number, _, unit = (interval or value).partition(" ")
-    text = f"{value} {unit}".strip() if between else value
+    text = Message("{value} {unit}", value, unit).strip() if between else value
     return {
         "name": row.name,
         "text": text,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import write_picture
+from acquire.text import Message
 from live.config.cameras import camera_configs, other_cameras
 from live.config.loading import Config, from_dict, load_config, settings_in
 from live.config.rig_file import write_rig
@@ -81,12 +82,12 @@ class ConfigDraft:
         for dotted, value in changes.items():
             section, _, key = dotted.partition(".")
             if section != "gauges" and dotted not in CHANGEABLE:
-                raise ConfigError(f"{dotted} cannot be changed here; change it in {self.path}")
+                raise ConfigError("{dotted} cannot be changed here; change it in {path}", dotted, self.path)
             if value is None:
                 tree[section].pop(key, None)
             else:
                 tree[section][key] = value
-        self._config = from_dict(tree, {}, "the page")
+        self._config = from_dict(tree, {}, Message("the page"))
         self.changes |= {key: value for key, value in changes.items() if not key.startswith(TRANSIENT)}
 
     def save(self, mask: NDArray[np.bool_] | None) -> None:

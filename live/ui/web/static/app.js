@@ -66,9 +66,8 @@ async function order(button) {
   try {
     const { line, ask: question, because, yes } = button.dataset;
     if (question && !(await ask(question, because ?? "", yes))) return;
-    const answer = await command(line);
-    const risk = /^no: not tared yet: (.*); confirm it$/s.exec(answer);
-    if (risk && (await ask("Tare in mid-test?", risk[1], "Tare"))) await command("tare force");
+    const { risk } = await command(line);
+    if (risk && (await ask("Tare in mid-test?", risk, "Tare"))) await command("tare force");
   } finally {
     busy = false;
   }
@@ -98,7 +97,7 @@ document.addEventListener("keydown", (event) => {
 $("note").addEventListener("submit", async (event) => {
   event.preventDefault();
   const text = $("notetext").value.trim();
-  if (text && (await command(`note ${text}`)).startsWith("ok")) { $("notetext").value = ""; $("notetext").blur(); }
+  if (text && !(await command(`note ${text}`)).refused) { $("notetext").value = ""; $("notetext").blur(); }
 });
 $("notetext").addEventListener("keydown", (event) => { if (event.key === "Escape") event.target.blur(); });
 $("viewer").addEventListener("click", () => post("/viewer", {}));

@@ -37,19 +37,13 @@ export async function post(path, value) {
     const response = await fetch(path, {
       method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(value),
     });
-    answer = response.ok ? (await response.json()).answer : `no: ${await response.text()}`;
+    answer = response.ok ? await response.json() : { text: await response.text(), refused: true };
   } catch {
-    answer = "no: NO LINK";
+    answer = { text: "NO LINK", refused: true };
   }
-  showAnswer(answer);
+  put($("answer"), answer.text ? t(answer.text) : `${t("done")} ✓`);
+  $("answer").classList.toggle("no", answer.refused);
   return answer;
-}
-
-function showAnswer(answer) {
-  const refused = answer.startsWith("no");
-  const [, words] = /^(?:no|ok): (.*)$/s.exec(answer) ?? [];
-  put($("answer"), words ? t(words) : `${t("done")} ✓`);
-  $("answer").classList.toggle("no", refused);
 }
 
 export const command = (line) => post("/order", { line, stage: document.body.dataset.stage });

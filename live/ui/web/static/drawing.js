@@ -189,7 +189,7 @@ $("board").addEventListener("click", () => {
     event.preventDefault();
     const request = { do: "board", dictionary: last.value };
     for (const key of Object.keys(BOARD)) request[key] = form.elements[key].value === "" ? 0 : Number(form.elements[key].value);
-    if (await change(request) !== "ok") return;
+    if ((await change(request)).refused) return;
     asking = false;
     showScale();
   });

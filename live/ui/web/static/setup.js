@@ -87,8 +87,8 @@ function listGauges(names) {
     const key = el("i", { class: "key" });
     key.style.background = colourOf(k);
     input.addEventListener("change", async () => {
-      const answer = await change({ do: "gauge", name: input.value, was: name });
-      if (!answer.startsWith("ok")) input.value = name;
+      const { refused } = await change({ do: "gauge", name: input.value, was: name });
+      if (refused) input.value = name;
       input.blur();
       list.dataset.mark = "";
     });

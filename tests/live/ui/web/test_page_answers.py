@@ -70,29 +70,29 @@ def test_a_specimen_has_a_folder_of_its_name(at: PageController, tmp_path: Path)
 
 
 def test_each_stage_has_its_commands(at: PageController) -> None:
-    assert at._answer_to("start") == "no: the test is being opened", "the set-up is not open"
+    assert at._answer_to("start").line == "no: the test is being opened", "the set-up is not open"
     asked: list[Any] = []
     at.sessions = SimpleNamespace(ready=asked.append)  # type: ignore[assignment]
     assert (
-        at._answer_to(" start ") == "ok"
+        at._answer_to(" start ").line == "ok"
         and asked == [Path(at._folder.name)]
         and at._requests.get(timeout=1) == "start"
     )
-    assert at._answer_to("next") == "no: the commands of this stage are start, quit"
+    assert at._answer_to("next").line == "no: the commands of this stage are start, quit"
 
     def refuses(folder: Path) -> None:
         raise DataError("no ZOI\x1b lies in the region")
 
     at.sessions.ready = refuses  # type: ignore[assignment, method-assign, union-attr]
-    answer = at._answer_to("start")
+    answer = at._answer_to("start").line
     assert answer.startswith("no: no ZOI") and "\x1b" not in answer and at._requests.empty()
     at.sessions = None
     at.end({"figures": [1]})
-    assert at._answer_to("start") == "no: the commands of this stage are next, again, quit"
+    assert at._answer_to("start").line == "no: the commands of this stage are next, again, quit"
     for command, follows in (("next", True), ("again", True), ("quit", False)):
-        assert at._answer_to(command) == "ok" and at.after() is follows
-    assert at._command({"line": "quit", "stage": "run"})["answer"].startswith("no: the stage has changed")
-    assert at._command({"line": None})["answer"] == "no: a command is a line"
+        assert at._answer_to(command).line == "ok" and at.after() is follows
+    assert at._command({"line": "quit", "stage": "run"})["text"].startswith("the stage has changed")
+    assert at._command({"line": None})["text"] == "a command is a line"
 
 
 def test_the_next_specimen_and_the_same_again(at: PageController, tmp_path: Path) -> None:
@@ -153,15 +153,15 @@ def test_changes_are_of_the_camera_that_is_named(at: PageController, monkeypatch
     )  # fmt: skip
     at.sessions = sessions
     for request in ({"do": "undo", "side": "back"}, {"do": "check"}, {"do": "save"}):
-        assert at._change(request) == {"answer": "ok"}
+        assert not at._change(request)["refused"]
     assert done == ["session back", "refresh", "check", "refresh", "save", "refresh"]
-    assert at._change({"do": "fly"})["answer"].startswith("no: the changes are draw, ")
+    assert at._change({"do": "fly"})["text"].startswith("the changes are draw, ")
 
     def fails() -> None:
         raise DataError("not possible")
 
     sessions.save = fails
-    assert at._change({"do": "save"}) == {"answer": "no: not possible"} and len(done) == 6
+    assert at._change({"do": "save"})["text"] == "not possible" and len(done) == 6
     at.sessions = None
 
 
@@ -169,12 +169,12 @@ def test_a_page_of_a_run_alone_makes_no_report(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(page_controller, "GOODBYE_S", 0.0)
     with PageController(None, 0) as alone:
         assert alone.stage == "run" and published(alone, "stage")["alone"] is True
-        assert alone._answer_to("start") == "no: the test is being opened"
+        assert alone._answer_to("start").line == "no: the test is being opened"
         alone.end({"figures": []})
         after, stage = published(alone, "after"), published(alone, "stage")
         assert (after["again"], after["next"]) == (None, None) and "makes no report" in after["report"]
         assert stage["stage"] == "after" and stage["n"] == 1
-        assert alone._answer_to("next").startswith("no: ")
+        assert alone._answer_to("next").refused
 
 
 # -- test after test ------------------------------------------------------------------------------

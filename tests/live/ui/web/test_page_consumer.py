@@ -17,12 +17,11 @@ import pytest
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from analysis import StrainField
-from analysis.evaluate import GAUGE_KINDS, GaugeValue
+from analysis.evaluate import GaugeValue
 from live.config.loading import Config, load_config
 from live.pipeline.consumer import Consumer
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
-from live.results.maps.field_maps import FIELD_MAPS
 from live.stream.adapted import Adapted
 from live.stream.record import Matched
 from live.ui.web.broadcaster import Broadcaster
@@ -33,15 +32,7 @@ from live.ui.web.painting import RED, mark_saturated, shrunk, traffic_light
 from tests.live.made_up import make_frame, make_measurement
 from tests.live.streaming import record_of
 from tests.live.ui.waiting import until
-from tests.live.ui.web.sentences import (
-    LANGUAGES,
-    STATIC,
-    Translator,
-    catalogue,
-    of_the_devices,
-    of_the_page,
-    of_the_program,
-)
+from tests.live.ui.web.page_texts import STATIC
 
 
 def measurement() -> Measurement:
@@ -296,38 +287,6 @@ def test_the_length_of_an_elongation() -> None:
     assert elongation_length(load_config(None, {**strips, **scale})) == ("whole", pytest.approx(10.0))
     assert elongation_length(load_config(None, line | given)) == ("", 50.0)
     assert elongation_length(load_config(None, line)) == ("", None)
-
-
-def test_every_text_of_the_page_is_translated() -> None:
-    known, translator = catalogue(), Translator()
-    missing = {text for text in of_the_page() if not translator.knows(text)}
-    served = {word for kind in GAUGE_KINDS.values() for word in (kind.label, kind.hint)}
-    missing |= {text for text in {*FIELD_MAPS, *served} if text not in known}
-    assert not missing
-
-
-def test_every_message_of_the_program_is_translated() -> None:
-    translator, texts = Translator(), set(of_the_program())
-    assert len(texts) > 100 and not {text for text in texts if not translator.knows(text)}
-
-
-def test_every_message_of_a_device_or_file_is_translated() -> None:
-    translator, texts = Translator(), of_the_devices()
-    assert len(texts) > 400
-    assert not {f"{module}: {text}" for text, module in texts.items() if not translator.knows(text)}
-
-
-def test_a_pattern_with_words_that_are_not_translated_does_not_count() -> None:
-    translator = Translator()
-    assert translator.knows("burst {}") and not translator.knows("burst {} fell off the table")
-    assert translator.knows("{}: no picture for {} s") and not translator.knows("{}: the moon is {}")
-
-
-@pytest.mark.parametrize("name", LANGUAGES)
-def test_a_translation_keeps_what_is_filled_in(name: str) -> None:
-    for english, words in catalogue().items():
-        assert words.get(name), f"{english} has no {name}"
-        assert words[name].count("{}") == english.count("{}"), english
 
 
 def test_the_library_has_its_licence_and_origin() -> None:

@@ -13,9 +13,11 @@ import pytest
 from acquire.events import EventKind
 from acquire.files.picture import write_picture
 from acquire.frame import Frame
+from acquire.text.message import from_json
 from live.config.cameras import camera_configs
 from live.config.loading import Config, load_config
 from live.pipeline.run_state import RunState
+from live.run.control import Answer
 from live.setup.devices import at_rest, open_rig
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.page_controller import PageController
@@ -48,7 +50,7 @@ class PageSession:
     def post(self, path: str, value: dict[str, Any]) -> str:
         body = json.dumps(value).encode()
         answer = fetch(self.controller.server, path, method="POST", body=body)
-        return str(json.loads(answer.body)["answer"])
+        return Answer(**json.loads(answer.body, object_hook=from_json)).line
 
     def command(self, line: str) -> str:
         return self.post("/order", {"line": line})
@@ -232,7 +234,7 @@ def test_commands_during_a_run_and_after(at: PageSession) -> None:
     assert at.change(do="all") == "no: nothing is set up now"
     assert at.post("/map", {"of": "e1"}) == "ok" and at.post("/map", {"of": "x"}).startswith("no:")
     opened: list[int] = []
-    at.controller.viewer = lambda port: opened.append(port) or "ok"  # type: ignore[func-returns-value]
+    at.controller.viewer = lambda port: opened.append(port) or Answer()  # type: ignore[func-returns-value]
     assert at.post("/viewer", {}).startswith("no:"), "the view does not serve yet"
     run.run_state.health.view_port = 9999
     assert at.post("/viewer", {}) == "ok" and opened == [9999]

@@ -44,9 +44,9 @@ def test_requests_name_their_camera() -> None:
     rows = answered(both.points({"edition": "0", "count": "0"}))["rows"]
     assert rows[0][2] == pytest.approx(1e-3) and len(rows) == 1
     assert answered(both.points({"edition": "0", "count": "1"}))["rows"] == []
-    assert both.select_map({"of": "exx"}) == {"answer": "ok"}
+    assert not both.select_map({"of": "exx"})["refused"]
     assert (front.map.choice.name, back.map.choice.name) == ("exx", "exx")
-    assert both.select_map({"of": "ezz"})["answer"].startswith("no: there is no map")
+    assert both.select_map({"of": "ezz"})["text"].startswith("there is no map")
     config, states = load_config(None, {}), {}
     runs = {name: Run(config) for name in both.by_name}
     states = {name: run.run_state for name, run in runs.items()}
@@ -78,7 +78,7 @@ def test_a_place_is_two_numbers(query: dict[str, str]) -> None:
 
 def test_without_a_run_there_is_nothing_to_ask_for() -> None:
     nothing = PageConsumers(Broadcaster(), {}, {})
-    assert nothing.picture({}) == b"" and nothing.select_map({}) == {"answer": "no: nothing is measured"}
+    assert nothing.picture({}) == b"" and nothing.select_map({})["text"] == "nothing is measured"
     for ask in (nothing.points, nothing.value):
         with pytest.raises(HttpError) as refused:
             ask({})
