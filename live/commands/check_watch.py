@@ -14,10 +14,11 @@ from acquire.text.printable import printable
 from live.config.loading import Config
 from live.config.sections import DEFAULT_REFERENCE_BURST
 from live.pipeline.screen import Screen
+from live.setup.check.check_line import CheckLine
 from live.setup.check.check_list import CheckFigures
 from live.setup.check.disk import disk_lines, write_rate
 from live.setup.check.quick_check import QUICK_FRAMES, QuickCheck, QuickChecker, RollingFrames
-from live.setup.check.verdict import CheckLine, check_lines
+from live.setup.check.verdict import check_lines
 from live.setup.devices import at_rest, open_rig
 from live.setup.region import report_warnings
 from live.ui.rerun.messages import ViewSetup

@@ -105,14 +105,10 @@ def name_of(call: ast.Call) -> str:
 
 def formatted(path: Path) -> set[int]:
     """Lines of calls whose text is put together on the spot (commands of a terminal): it stays English."""
-    calls = [
-        node
-        for node in ast.walk(ast.parse(path.read_text("utf-8")))
-        if isinstance(node, ast.Call) and node.args
-    ]
-    return {
-        call.lineno for call in calls if isinstance(call.args[0], ast.JoinedStr) and name_of(call) in KEYWORDS
-    }
+    calls = [node for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Call)]
+    spoken = [call for call in calls if call.args and name_of(call) in KEYWORDS]
+    put_together = [call for call in spoken if isinstance(call.args[0], ast.JoinedStr)]
+    return {line for call in put_together for line in range(call.lineno, (call.end_lineno or 0) + 1)}
 
 
 @cache

@@ -11,8 +11,8 @@ from acquire.text import Message
 from live.config.cameras import other_cameras
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST
+from live.setup.check.check_line import CheckLine
 from live.setup.check.sample import FrameStack
-from live.setup.check.verdict import CheckLine
 
 SHORTEST_S = 600.0
 """Of a test whose length is not given."""

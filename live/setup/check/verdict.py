@@ -4,47 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from acquire.text import Message
 from analysis.quality.pattern import SPECKLE_RADIUS_PX
-from analysis.quality.steadiness import Steadiness, aliased, mains_of, strain_drifts
+from analysis.quality.steadiness import aliased, mains_of
+from live.setup.check.check_line import CheckLine, not_measured
 from live.setup.check.check_list import CheckFigures, median
+from live.setup.check.motion_lines import motion_lines
 from live.setup.check.noise_advice import advice
-from live.setup.check.sample import MIN_FRAMES
 
 MAX_SATURATED, MAX_DARK, MAX_PILED = 1e-4, 0.01, 1e-3
 MIN_LIGHT = 0.3  # of full scale, 99th percentile
 MIN_CONTRAST = 0.05  # of full scale
 MAX_FLICKER, MAX_WITHOUT_PATTERN, MIN_SHARPNESS_RATIO = 0.01, 0.02, 0.7
-MAX_DILATATION = 5e-5  # common drift of exx and eyy
 MAX_NOISE_PX = 0.05  # of one ZOI in one frame
 MAX_OVER_PREDICTED = 1.5  # measured over predicted noise
 DEFAULT_TARGET = 1e-3
 """Largest strain noise for GO without a target: half the yield strain of a steel."""
-
-
-@dataclass(frozen=True, slots=True)
-class CheckLine:
-    """One figure of the check, whether it is good enough, and what to do if it is not.
-
-    A figure that the pictures do not give (not ``measured``) is neither good nor bad.
-    """
-
-    what: str
-    value: str
-    good: bool = True
-    advice: str = ""
-    measured: bool = True
-
-    def text(self) -> str:
-        """The line as printed."""
-        mark = "ok  " if self.measured else "?   "
-        return Message("{mark}  {what:<22} {value}", mark if self.good else "LOOK", self.what, self.value) + (
-            "" if self.good or not self.advice else f"\n      -> {self.advice}"
-        )
 
 
 def check_lines(
@@ -66,7 +44,7 @@ def check_lines(
         *_camera(figures),
         *_light(figures),
         *_pattern(figures),
-        *_motion(figures, max_shift_px),
+        *motion_lines(figures, max_shift_px),
         *_load(figures),
         _floor(figures, target),
         *_gauges(figures),
@@ -79,18 +57,6 @@ def _few(f: CheckFigures) -> Iterator[CheckLine]:
             "{len}, too few for what changes in time; the pattern is that of the first", len(f.stack)
         )
         yield CheckLine("pictures", value)
-
-
-def _not_measured(f: CheckFigures, what: str) -> CheckLine:
-    return CheckLine(
-        what,
-        Message(
-            "not measured from {count_text}: it takes {MIN_FRAMES} of the still specimen",
-            f.stack.count_text,
-            MIN_FRAMES,
-        ),
-        measured=False,
-    )
 
 
 def _camera(f: CheckFigures) -> Iterator[CheckLine]:
@@ -170,12 +136,12 @@ def _light(f: CheckFigures) -> Iterator[CheckLine]:
             False,
             "less light; where this is where the camera saturates, give it (bits=... or white=...)",
         )
-    yield _not_measured(f, "flicker") if f.stack.few else _flicker(f)
+    yield not_measured(f, "flicker") if f.stack.few else _flicker(f)
     full = f.stack.camera.saturation
     shown = Message("{noise:.2f} GL of one frame, {noise2:.2%} of full scale", f.noise, f.noise / full)
     if f.stack.few:
         yield CheckLine("noise", Message("{shown}, {noise_source}", shown, _noise_source(f)))
-        yield _not_measured(f, Message("noise in time"))
+        yield not_measured(f, Message("noise in time"))
     else:
         yield CheckLine("noise", shown, f.noise > 0, "every frame is the same: is this a live picture?")
 
@@ -290,85 +256,6 @@ def _sssig(f: CheckFigures) -> CheckLine:
         px,
     )
     return CheckLine("SSSIG of a ZOI", value, px < MAX_NOISE_PX, "more contrast, larger ZOIs")
-
-
-def _motion(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
-    if f.lens:
-        yield CheckLine("lens", f.lens)
-    s = f.still
-    if f.stack.few:
-        yield from (_not_measured(f, what) for what in ("drift", "vibration"))
-        return
-    if not math.isfinite(s.drift_px):
-        yield CheckLine("drift", "not measured", f.zois.without_pattern < 1, "no ZOI can be followed")
-        return
-    pulled = [one for one in (s.exx, s.eyy) if strain_drifts(one.drift, one.sigma_drift)]
-    strain = max(pulled or (s.exx, s.eyy), key=lambda one: abs(one.drift))
-    words = Message("keep specimen and camera still")
-    if pulled:
-        words = Message(
-            "strain changes: stop the machine, take the load off, let the specimen rest, then check again"
-        )
-    yield CheckLine(
-        "drift",
-        Message(
-            "{drift_px:.4f} px and {drift:+.0f} µm/m in {seconds:.3g} s",
-            s.drift_px,
-            strain.drift * 1e6,
-            s.u.seconds,
-        ),
-        s.drift_px <= max_px and not pulled,
-        words,
-    )
-    if s.dilatation:
-        yield CheckLine(
-            "distance",
-            Message(
-                "exx and eyy drift alike, {dilatation:+.0f} µm/m: it changes by {abs:.1e} of the stand-off",
-                s.dilatation * 1e6,
-                abs(s.dilatation),
-            ),
-            abs(s.dilatation) < MAX_DILATATION,
-            "warm up the camera, clamp grips and tripod, or hang plates (docs/optics.md)",
-        )
-    across, down = s.keystone
-    if across:
-        yield CheckLine(
-            "tilt",
-            Message("strain drifts by {across:+.0f} µm/m from left to right, in x and y alike", across * 1e6),
-            abs(across) < MAX_DILATATION,
-            "clamp grips and tripod, warm up the camera, or hang plates (docs/optics.md)",
-        )
-    if down:
-        yield CheckLine(
-            "tilt",
-            Message("strain drifts by {down:+.0f} µm/m from top to bottom, in x and y alike", down * 1e6),
-            abs(down) < MAX_DILATATION,
-            "clamp grips and tripod, warm up the camera, or hang plates (docs/optics.md)",
-        )
-    shake = s.worse
-    yield CheckLine(
-        "vibration",
-        Message(
-            "{vibration}, {vibration2}",
-            _vibration(shake, 1, "px", 4),
-            _vibration(s.worse_strain, 1e6, "µm/m", 0),
-        ),
-        shake.vibration <= max_px,
-        "a stiffer tripod, a quiet floor, no fan on the bench",
-    )
-
-
-def _vibration(s: Steadiness, unit: float, name: str, digits: int) -> str:
-    """A vibration with its frequency, or its upper limit by the noise."""
-    if not s.vibration > s.noise / 2:
-        return Message("less than {noise} {name}", format(s.noise * unit, f".{digits}f"), name)
-    text = Message("{vibration} {name} rms", format(s.vibration * unit, f".{digits}f"), name)
-    if s.frequency is None:
-        return text
-    mains = mains_of(s, 1)
-    cause = Message(", as from {mains:.0f} Hz mains", mains) if mains is not None else ""
-    return Message("{text}, mainly at {frequency:.1f} Hz{cause}", text, s.frequency, cause)
 
 
 def _load(f: CheckFigures) -> Iterator[CheckLine]:

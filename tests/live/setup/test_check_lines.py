@@ -11,18 +11,18 @@ import pytest
 
 from analysis.quality.exposure import Depth, Exposure
 from analysis.quality.steadiness import Steadiness
+from live.setup.check.check_line import CheckLine
+from live.setup.check.motion_lines import motion_lines
 from live.setup.check.noise_advice import advice
 from live.setup.check.noise_floor import GaugeNoise, StrainNoise, ZoiFloor
 from live.setup.check.sample import MIN_FRAMES
 from live.setup.check.verdict import (
-    CheckLine,
     _bits,
     _camera,
     _floor,
     _gauges,
     _light,
     _load,
-    _motion,
     _pattern,
     _sharpness,
     _sssig,
@@ -82,7 +82,7 @@ def test_a_good_picture_has_no_line_to_look_at() -> None:
     figures = made()
     for part in (_camera, _light, _pattern):
         assert [line.text() for line in part(figures) if not line.good or not line.measured] == []
-    assert all(line.good for line in _motion(figures, 0.05))
+    assert all(line.good for line in motion_lines(figures, 0.05))
     assert found(_camera(figures))["automatic controls"].value == "none"
 
 
@@ -192,20 +192,20 @@ def test_the_weakest_gradients_give_the_noise_of_a_place() -> None:
     ],
 )  # fmt: skip
 def test_motion_has_its_numbers_and_limits(name: str, value: Any, what: str, good: bool, shown: str) -> None:
-    line = found(_motion(made(**{f"still__{name}": value}), 0.05))[what]
+    line = found(motion_lines(made(**{f"still__{name}": value}), 0.05))[what]
     assert line.good == good and line.value.startswith(shown)
 
 
 def test_what_does_not_drift_has_no_line_of_its_own() -> None:
-    assert list(found(_motion(made(), 0.05))) == ["drift", "vibration"]
-    assert list(found(_motion(made(lens="a lens"), 0.05))) == ["lens", "drift", "vibration"]
-    both = found(_motion(made(still__keystone=(1e-5, 1e-5)), 0.05))
+    assert list(found(motion_lines(made(), 0.05))) == ["drift", "vibration"]
+    assert list(found(motion_lines(made(lens="a lens"), 0.05))) == ["lens", "drift", "vibration"]
+    both = found(motion_lines(made(still__keystone=(1e-5, 1e-5)), 0.05))
     assert list(both) == ["drift", "tilt", "vibration"]
 
 
 @pytest.mark.parametrize(("share", "good"), [(0.99, True), (1.0, False)])
 def test_motion_that_is_not_known_is_bad_only_without_any_pattern(share: float, good: bool) -> None:
-    (line,) = _motion(made(still__drift_px=math.nan, zois__without_pattern=share), 0.05)
+    (line,) = motion_lines(made(still__drift_px=math.nan, zois__without_pattern=share), 0.05)
     assert (line.what, line.value, line.good) == ("drift", "not measured", good)
 
 
@@ -276,7 +276,7 @@ def test_without_any_noise_the_zois_are_too_few() -> None:
 
 def test_pictures_that_are_few_leave_open_what_changes_in_time() -> None:
     figures = made(stack__few=True)
-    open_lines = [line for line in (*_light(figures), *_motion(figures, 0.05)) if not line.measured]
+    open_lines = [line for line in (*_light(figures), *motion_lines(figures, 0.05)) if not line.measured]
     assert [line.what for line in open_lines] == ["flicker", "noise in time", "drift", "vibration"]
     assert all(
         line.good and line.value.endswith(f"it takes {MIN_FRAMES} of the still specimen")
@@ -338,7 +338,7 @@ def test_a_strain_that_is_clear_is_told_before_a_larger_one_of_noise() -> None:
         Steadiness(3e-5, 0, 0, None, 4.0, None, 1e-6),
         Steadiness(5e-5, 0, 0, None, 4.0, None, 2e-5),
     )
-    line = found(_motion(made(still__exx=clear, still__eyy=noise), 0.05))["drift"]
+    line = found(motion_lines(made(still__exx=clear, still__eyy=noise), 0.05))["drift"]
     assert (
         not line.good
         and "+30 µm/m" in line.value

@@ -24,6 +24,7 @@ from live.cli import main
 from live.commands import check_watch as check_watch
 from live.commands.check_watch import RenewedLines, blur_line, card, peak_line
 from live.config.loading import load_config
+from live.setup.check.check_line import CheckLine
 from live.setup.check.check_list import examine
 from live.setup.check.quick_check import (
     RENEW_EVERY,
@@ -34,7 +35,6 @@ from live.setup.check.quick_check import (
     _same_region,
 )
 from live.setup.check.sample import take
-from live.setup.check.verdict import CheckLine
 from live.setup.region import Region
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.fakes import ListCamera, frame

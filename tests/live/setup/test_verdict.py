@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 
 from analysis.quality.steadiness import Steadiness
+from live.setup.check.check_line import CheckLine
 from live.setup.check.check_list import automatic_controls, table_lines
+from live.setup.check.motion_lines import _vibration
 from live.setup.check.noise_advice import reaching
 from live.setup.check.noise_floor import StrainNoise, ZoiFloor
 from live.setup.check.stillness import PictureStillness
-from live.setup.check.verdict import CheckLine, _flicker, _sharpness, _vibration
+from live.setup.check.verdict import _flicker, _sharpness
 from live.setup.region import Region
 from live.setup.specimen_drawing import FAIR, GOOD, POOR, Overlay, _Drawing
 from tests.live.made_up import make_grid

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from acquire.frame import CameraInfo, Frame
 from acquire.text.printable import printable
+from live.setup.check.check_line import CheckLine
 from live.setup.check.check_list import CheckFigures
 from live.setup.check.sample import FrameStack
-from live.setup.check.verdict import CheckLine
 from live.ui.web.painting import traffic_light
 
 GOOD, BAD = 50e-6, 1000e-6

@@ -18,10 +18,11 @@ from acquire.text import Message
 from acquire.text.printable import brief, printable
 from live.config.sections import DEFAULT_REFERENCE_BURST
 from live.pipeline.latency import OUTPUT
+from live.setup.check.check_line import CheckLine
 from live.setup.check.check_list import CheckFigures, examine
 from live.setup.check.disk import disk_lines, write_rate
 from live.setup.check.quick_check import QuickChecker
-from live.setup.check.verdict import CheckLine, check_lines
+from live.setup.check.verdict import check_lines
 from live.setup.compiling import compile_ahead
 from live.setup.dry_run import picture_kinds
 from live.ui.web.setup.camera_preview import MAX_BYTES, RECENT, CameraPreview

@@ -1,0 +1,92 @@
+"""Lines of a check on what moves: drift, distance, tilt, vibration."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from acquire.text import Message
+from analysis.quality.steadiness import Steadiness, mains_of, strain_drifts
+from live.setup.check.check_line import CheckLine, not_measured
+from live.setup.check.check_list import CheckFigures
+
+MAX_DILATATION = 5e-5  # common drift of exx and eyy
+
+
+def motion_lines(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
+    if f.lens:
+        yield CheckLine("lens", f.lens)
+    s = f.still
+    if f.stack.few:
+        yield from (not_measured(f, what) for what in ("drift", "vibration"))
+        return
+    if not math.isfinite(s.drift_px):
+        yield CheckLine("drift", "not measured", f.zois.without_pattern < 1, "no ZOI can be followed")
+        return
+    pulled = [one for one in (s.exx, s.eyy) if strain_drifts(one.drift, one.sigma_drift)]
+    strain = max(pulled or (s.exx, s.eyy), key=lambda one: abs(one.drift))
+    words = Message("keep specimen and camera still")
+    if pulled:
+        words = Message(
+            "strain changes: stop the machine, take the load off, let the specimen rest, then check again"
+        )
+    yield CheckLine(
+        "drift",
+        Message(
+            "{drift_px:.4f} px and {drift:+.0f} µm/m in {seconds:.3g} s",
+            s.drift_px,
+            strain.drift * 1e6,
+            s.u.seconds,
+        ),
+        s.drift_px <= max_px and not pulled,
+        words,
+    )
+    if s.dilatation:
+        yield CheckLine(
+            "distance",
+            Message(
+                "exx and eyy drift alike, {dilatation:+.0f} µm/m: it changes by {abs:.1e} of the stand-off",
+                s.dilatation * 1e6,
+                abs(s.dilatation),
+            ),
+            abs(s.dilatation) < MAX_DILATATION,
+            "warm up the camera, clamp grips and tripod, or hang plates (docs/optics.md)",
+        )
+    across, down = s.keystone
+    if across:
+        yield CheckLine(
+            "tilt",
+            Message("strain drifts by {across:+.0f} µm/m from left to right, in x and y alike", across * 1e6),
+            abs(across) < MAX_DILATATION,
+            "clamp grips and tripod, warm up the camera, or hang plates (docs/optics.md)",
+        )
+    if down:
+        yield CheckLine(
+            "tilt",
+            Message("strain drifts by {down:+.0f} µm/m from top to bottom, in x and y alike", down * 1e6),
+            abs(down) < MAX_DILATATION,
+            "clamp grips and tripod, warm up the camera, or hang plates (docs/optics.md)",
+        )
+    shake = s.worse
+    yield CheckLine(
+        "vibration",
+        Message(
+            "{vibration}, {vibration2}",
+            _vibration(shake, 1, "px", 4),
+            _vibration(s.worse_strain, 1e6, "µm/m", 0),
+        ),
+        shake.vibration <= max_px,
+        "a stiffer tripod, a quiet floor, no fan on the bench",
+    )
+
+
+def _vibration(s: Steadiness, unit: float, name: str, digits: int) -> str:
+    """A vibration with its frequency, or its upper limit by the noise."""
+    if not s.vibration > s.noise / 2:
+        return Message("less than {noise} {name}", format(s.noise * unit, f".{digits}f"), name)
+    text = Message("{vibration} {name} rms", format(s.vibration * unit, f".{digits}f"), name)
+    if s.frequency is None:
+        return text
+    mains = mains_of(s, 1)
+    cause = Message(", as from {mains:.0f} Hz mains", mains) if mains is not None else ""
+    return Message("{text}, mainly at {frequency:.1f} Hz{cause}", text, s.frequency, cause)
