@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 from live.commands.signals import signals
 from live.config.loading import Config
 from live.pipeline.screen import Screen
-from live.run.control import ControlPort, Controls
+from live.run.control import ControlPort
 from live.run.keyboard import listen
+from live.run.live_run import LiveRun
 from live.run.outcome import INTERRUPTED, StopSignal
 from live.ui.rerun.view import has_display
 
@@ -21,18 +22,18 @@ if TYPE_CHECKING:
 
 
 @contextlib.contextmanager
-def attended(config: Config, screen: Screen, stop: StopSignal) -> Iterator[Callable[[Controls], None]]:
+def attended(config: Config, screen: Screen, stop: StopSignal) -> Iterator[Callable[[LiveRun], None]]:
     """Signals end a test by ``stop``; what is yielded attaches keyboard and remote commands to one that has begun."""
     ports = config.operate
     with contextlib.ExitStack() as stack:
         port = ControlPort(ports.orders, ports.token_file, screen) if ports.orders else None
 
-        def attach(controls: Controls) -> None:
-            keyboard = listen(controls, sys.stdin, screen)
+        def attach(live: LiveRun) -> None:
+            keyboard = listen(live, sys.stdin, screen)
             if keyboard is not None:
                 stack.callback(keyboard.close)
             if port is not None:
-                port.open(controls)
+                port.open(live, live.folder)
 
         if port is not None:
             stack.callback(port.close)

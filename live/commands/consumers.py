@@ -48,7 +48,7 @@ def signals_of(
             if out is not None:
                 opened.callback(out.end)
                 outputs.append(out)
-                screen.print(out.name)
+                screen.print(f"{out.name}: strains and forces {out.to_whom}; it takes no commands")
         opened.pop_all()
     means = ActionMeans(screen.bell, about.end, outputs)
     alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]

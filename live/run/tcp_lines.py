@@ -1,4 +1,4 @@
-"""A TCP server of lines: it answers the lines of its clients and sends lines to all, and never waits for a client."""
+"""A server of lines, by TCP or a unix socket: it answers its clients, sends lines to all, and never waits for one."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ class Client:
         self.taken = self.skipped = 0
         self._unfinished, self._unsent = b"", b""
         connection.setblocking(False)
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        with contextlib.suppress(OSError):  # a unix socket has none
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
 
     def receive(self) -> list[str]:
@@ -118,7 +119,8 @@ class LineServer:
         greeting: str = "",
     ) -> None:
         self._listening, self._token, self._answer, self._greeting = listening, token, answer, greeting
-        self.port: int = listening.getsockname()[1]
+        name = listening.getsockname()
+        self.port: int = name[1] if isinstance(name, tuple) else 0
         self.served = self.taken = self.skipped = 0
         self._clients: dict[int, Client] = {}
         self._lock = threading.RLock()
@@ -165,14 +167,14 @@ class LineServer:
 
     def _accept(self, selector: selectors.BaseSelector) -> None:
         try:
-            connection, (host, port, *_) = self._listening.accept()
+            connection, peer = self._listening.accept()
         except OSError:  # closed again, or no file descriptor is left: then a pause before the next try
             time.sleep(_PAUSE_S)
             return
         if len(self._clients) >= MAX_CLIENTS:
             connection.close()
             return
-        client = Client(connection, f"{host}:{port}", self._token)
+        client = Client(connection, str(peer), self._token)
         self._clients[client.fileno()] = client
         selector.register(client, selectors.EVENT_READ)
         self.served += 1

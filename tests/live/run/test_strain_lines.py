@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import math
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from acquire.events import Event, EventKind
+from acquire.load_sample import LoadSample
 from live.config.listen_address import ListenAddress
+from live.config.sections import SpecimenConfig
+from live.pipeline.channel_values import ChannelValues
+from live.pipeline.run_state import RunState
 from live.run import strain_output
 from live.run.strain_output import LineFormat, SerialOut, TcpOut, UdpOut, _number, _rounded
-from tests.live.made_up import make_measurement
+from tests.live.made_up import START, make_measurement
 from tests.live.run.test_strain_output import readings
 
 
@@ -112,6 +118,76 @@ def test_lines_that_are_posted_go_out_in_order_with_the_next_event() -> None:
         out.event(Event(1.0, EventKind.ALARM, "alarm", "ALARM", "warning"))
     assert sent == ["one", "two"]
     out.end()
+
+
+def test_who_reads_an_output_is_said() -> None:
+    lines = LineFormat(readings(), ("frame",), "json")
+    outs = [
+        TcpOut(ListenAddress.parse("0").listen("it"), token, lines) for token in ("", "a-word-of-sixteen")
+    ]
+    outs += [UdpOut("127.0.0.1", 9, lines)]  # type: ignore[list-item]
+    assert [out.to_whom for out in outs] == [
+        "to every user of this machine", "to programs with the token", "to whoever listens there, unencrypted",
+    ]  # fmt: skip
+    for out in outs:
+        out.end()
+
+
+class Clocked:
+    """The lines of a live test at its own time, and the times at which an output sends."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = START
+        self.state = RunState.new(1.0, specimen=SpecimenConfig(axis="y"))
+        self.state.health.state = "REC"
+        self.sent: list[tuple[float, dict[str, Any]]] = []
+        values = ChannelValues(START, self.state.snapshot, clock=lambda: self.now)
+        channels = ("time_s", "frame", "axial", "age_s", "state", "force_N", "lost_share", "eyy")
+        monkeypatch.setattr(strain_output, "time", SimpleNamespace(monotonic=lambda: self.now))
+        self.out = UdpOut("127.0.0.1", 9, LineFormat(values, channels, "json"))
+        self.out.send = lambda line: self.sent.append((self.now, json.loads(line)))  # type: ignore[method-assign]
+
+    def measure(self, number: int, strain: float) -> None:
+        m = make_measurement(number, strain)
+        self.state.history.add(m.time_step)
+        self.out.measurement(m)
+
+    def until(self, t: float) -> None:
+        """As the consumer's thread does, with wake-ups that are 50 ms late."""
+        while (then := self.now + self.out.idle() + 0.05) < t:
+            self.now = then
+        self.now = t
+
+
+def test_a_heartbeat_repeats_the_last_measurement_with_its_age(monkeypatch: pytest.MonkeyPatch) -> None:
+    test = Clocked(monkeypatch)
+    test.state.loads.append(LoadSample(START, 800.0))
+    test.until(START + 1.0)
+    assert {line["axial"] for _, line in test.sent} == {None} and len(test.sent) >= 3
+    test.sent.clear()
+    test.measure(10, 1e-3)
+    test.until(START + 1.3)
+    test.state.loads.append(LoadSample(START + 1.3, 900.0))
+    test.until(START + 2.5)
+    first = test.sent[0][1]
+    for at, line in test.sent:
+        repeated = {name: line[name] for name in ("time_s", "frame", "axial", "lost_share", "eyy")}
+        assert repeated == {name: first[name] for name in repeated} and line["axial"] == 1e-3
+        assert line["age_s"] == pytest.approx(at - START - first["time_s"])
+        assert line["force_N"] == (800.0 if at <= START + 1.3 else 900.0)
+    test.sent.clear()
+    test.until(START + 5.0)
+    assert test.sent[-1][1]["axial"] is None and test.sent[-1][1]["frame"] is None
+    assert test.sent[-1][1]["state"] == "old" and test.sent[-1][1]["age_s"] > 2
+
+
+def test_a_line_comes_at_least_every_half_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    test = Clocked(monkeypatch)
+    for k in range(1, 8):
+        test.measure(4 * k, 1e-3)
+        test.until(START + 0.4 + 0.7 * k)
+    times = [at for at, _ in test.sent]
+    assert max(later - earlier for earlier, later in pairwise(times)) <= 0.5
 
 
 @pytest.mark.parametrize(
