@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import tempfile
+import threading
 import webbrowser
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from live.commands.signals import signals
@@ -41,8 +44,26 @@ def attended(config: Config, screen: Screen, stop: StopSignal) -> Iterator[Calla
         yield attach
 
 
-def open_page(controller: PageController, screen: Screen) -> None:
-    """Open the page if there is a display, and print its address."""
-    if has_display() and webbrowser.open(controller.address):
-        screen.print("the page opens in the browser")
-    screen.print(f"the page: {controller.address}")
+@contextlib.contextmanager
+def page_opened(controller: PageController, screen: Screen) -> Iterator[None]:
+    """Print the address of the page and open it if there is a display, by a file of this user alone that leads there.
+
+    The address has the token, and every user can read the command line of a browser, which may stay in the foreground.
+    """
+    with tempfile.TemporaryDirectory(prefix="phasedic-", ignore_cleanup_errors=True) as folder:
+        if has_display():
+            way = Path(folder, "page.html")
+            way.touch(0o600)
+            way.write_text(
+                f'<meta http-equiv="refresh" content="0; url={controller.address}">', encoding="ascii"
+            )
+            threading.Thread(target=_open, args=(way.as_uri(), screen), name="browser", daemon=True).start()
+        screen.print(f"the page: {controller.address}")
+        yield
+
+
+def _open(address: str, screen: Screen) -> None:
+    with contextlib.suppress(webbrowser.Error):
+        if webbrowser.open(address):
+            return
+    screen.print("no browser opens here; open the address of the page in yours")
