@@ -13,6 +13,7 @@ from acquire.hdf5.damage import (
     probe,
     read_superblock,
     reason,
+    still_reading,
 )
 from acquire.hdf5.declared import (
     Declared,
@@ -77,6 +78,7 @@ __all__ = [
     "read_superblock",
     "reason",
     "set_attributes",
+    "still_reading",
     "storable",
     "stored_rows",
     "to_json",

@@ -9,6 +9,7 @@ are another file that can be made again.
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 import re
 import uuid
@@ -252,8 +253,19 @@ class Session(Closing):
         return self._parts[at], number - starts[at]
 
     def load_samples(self) -> list[LoadSample]:
-        """All load samples, with their raw lines."""
-        return [sample for part in self._parts for sample in part.load_samples()]
+        """All load samples, with their raw lines; 280 bytes of memory each."""
+        return list(self.each_load_sample())
+
+    def each_load_sample(self, low: float = -math.inf, high: float = math.inf) -> Iterator[LoadSample]:
+        """The load samples from ``low`` to ``high`` (monotonic s), one by one, read by the piece."""
+        for part in self._parts:
+            for piece in part.load_pieces(low, high):
+                yield from piece.samples()
+
+    def load_curve(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Times (N,) in monotonic s and forces (N,) in N of all load samples."""
+        times, forces = zip(*(part.load_curve() for part in self._parts), strict=True)
+        return np.concatenate(times), np.concatenate(forces)
 
     def events(self) -> list[Event]:
         """All events."""
