@@ -16,11 +16,11 @@ import socket
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from acquire.errors import DeviceError, PhasedicError
-from acquire.events import Event
+from acquire.events import Event, Level
 from acquire.serial_line.ports import LineSettings, open_port
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
@@ -32,6 +32,8 @@ EVERY_S = 0.4
 """After this time without a measurement comes a heartbeat: every 0.5 s with what a busy machine adds."""
 _OF_NOW = ("age_s", "force_N", "force_age_s", "stress_MPa")
 """Channels of a heartbeat that are not those of the last measurement."""
+AGAIN_S = 5.0
+MISSED = "a reader does not read, or is not there: it misses lines; end it, or let it read faster"
 REOPEN_S = 1.0
 """A lost serial port is opened again at this interval."""
 
@@ -90,6 +92,8 @@ class StrainOut(Consumer, ABC):
     """One output; ``send`` takes a line without its end, and ``to_whom`` names those who get it."""
 
     to_whom: str
+    tell: Callable[[str, Level], None] = staticmethod(lambda text, level: None)
+    _lossy = False
     policy = Policy.NEWEST
     queue_size = 2
     timeout_s = 2.0
@@ -97,11 +101,11 @@ class StrainOut(Consumer, ABC):
     def __init__(self, name: str, lines: LineFormat) -> None:
         self.name, self._lines = name, lines
         self._posted: deque[str] = deque()
-        self._next = -math.inf  # when a heartbeat is due
+        self._next = self._missed_t = -math.inf  # when a heartbeat is due, and when a line was missed
 
     def measurement(self, measurement: Measurement) -> None:
         """Send its line."""
-        self.send(self._lines.of(measurement))
+        self._put(self._lines.of(measurement))
         self._next = time.monotonic() + EVERY_S
 
     def idle(self) -> float:
@@ -109,7 +113,7 @@ class StrainOut(Consumer, ABC):
         now = time.monotonic()
         if now >= self._next:
             self._next = now + EVERY_S
-            self.send(self._lines.heartbeat())
+            self._put(self._lines.heartbeat())
         return self._next - now
 
     def post(self, line: str) -> None:
@@ -119,11 +123,22 @@ class StrainOut(Consumer, ABC):
     def event(self, event: Event) -> None:
         """Send the queued lines."""
         while self._posted:
-            self.send(self._posted.popleft())
+            self._put(self._posted.popleft())
+
+    def _put(self, line: str) -> None:
+        """Send a line; a reader that misses some is an error until all have come for ``AGAIN_S``."""
+        arrived, now = self.send(line), time.monotonic()
+        if not arrived and not self._lossy:
+            self.tell(MISSED, "error")
+        elif arrived and self._lossy and now > self._missed_t + AGAIN_S:
+            self.tell("all lines are read again", "info")
+        self.lost = self.lost or not arrived
+        self._missed_t = self._missed_t if arrived else now
+        self._lossy = now <= self._missed_t + AGAIN_S
 
     @abstractmethod
-    def send(self, line: str) -> None:
-        """Send a line."""
+    def send(self, line: str) -> bool:
+        """Send a line; False where one reader or more misses it."""
 
 
 class TcpOut(StrainOut):
@@ -139,9 +154,9 @@ class TcpOut(StrainOut):
         """Listen."""
         self._server.start()
 
-    def send(self, line: str) -> None:
+    def send(self, line: str) -> bool:
         """To all clients; those that do not read are skipped."""
-        self._server.send(line)
+        return self._server.send(line)
 
     def end(self) -> str:
         """Close the connections."""
@@ -163,13 +178,15 @@ class UdpOut(StrainOut):
         self._socket.setblocking(False)
         self._sent = self._skipped = 0
 
-    def send(self, line: str) -> None:
+    def send(self, line: str) -> bool:
         """Send a datagram; one that the system refuses is counted."""
         try:
             self._socket.sendto(line.encode() + b"\n", self._to)
-            self._sent += 1
         except OSError:
             self._skipped += 1
+            return False
+        self._sent += 1
+        return True
 
     def end(self) -> str:
         """Close the socket."""
@@ -195,7 +212,7 @@ class SerialOut(StrainOut):
         self._sent = self._skipped = 0
         self._sent_heading = False
 
-    def send(self, line: str) -> None:
+    def send(self, line: str) -> bool:
         """Write; a port that takes nothing for half a second is lost, and opened again a second later."""
         if not self._sent_heading and self._lines.heading:
             line = f"{self._lines.heading}\n{line}"
@@ -204,8 +221,9 @@ class SerialOut(StrainOut):
         if self._port is not None and self._written(line.encode() + b"\n"):
             self._sent_heading = True
             self._sent += 1
-        else:
-            self._skipped += 1
+            return True
+        self._skipped += 1
+        return False
 
     def _written(self, data: bytes) -> bool:
         try:

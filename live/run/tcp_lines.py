@@ -132,13 +132,12 @@ class LineServer:
         """Begin to listen."""
         self._thread.start()
 
-    def send(self, line: str) -> None:
-        """Send a line to all clients; one that does not read is skipped and counted."""
+    def send(self, line: str) -> bool:
+        """Send a line to all clients; one that does not read is skipped and counted: then False."""
         data = line.encode() + b"\n"
         with self._lock:
-            for client in list(self._clients.values()):
-                if client.authorized:
-                    self._send(client, data)
+            taken = [self._send(one, data) for one in list(self._clients.values()) if one.authorized]
+        return all(taken)
 
     def close(self) -> None:
         """Close all connections."""
@@ -209,11 +208,11 @@ class LineServer:
             return True
         return client.send(self._answer(line).encode() + b"\n")
 
-    def _send(self, client: Client, data: bytes) -> None:
+    def _send(self, client: Client, data: bytes) -> bool:
         try:
-            client.send(data)
+            return client.send(data)
         except OSError:
-            return  # the server's thread finds it closed, and drops it
+            return True  # the server's thread finds it closed, and drops it
 
     def _drop(self, client: Client) -> None:
         if self._clients.pop(client.fileno(), None) is not None:
