@@ -104,7 +104,8 @@ class RotatingWriter(Closing):
         if self._writer.bytes_written < self._limit:
             return
         self._info = dataclasses.replace(self._info, part=self._info.part + 1)
-        following = SessionWriter(part_path(self._first, self._info.part), self._info)
+        first = self._writer.folder / self._first.name
+        following = SessionWriter(part_path(first, self._info.part), self._info)
         self._finished_bytes += self._writer.bytes_written
         full, self._writer = self._writer, following
         full.close()
