@@ -1,34 +1,36 @@
 """A controller of your own: it holds the strain rate of a machine with the strain that phasedic sends over TCP.
 
-It reads lines of JSON from the strain output, drives the machine with a PID on the strain, and ends the test over
-the control port. ``python -m examples.strain_rate`` runs it with a simulated machine, as compliant as real ones: at
-yield, the share of the crosshead travel that reaches the specimen jumps. For your machine, rewrite ``Machine.drive``.
+It reads lines of JSON from the strain output, drives the machine with a PID on the strain, stops it where the strain is
+not known or no line comes (``stop_machine``), and ends the test over the socket for commands. ``python -m
+examples.strain_rate`` runs it with a simulated machine, as compliant as real ones: at yield, the share of the crosshead
+travel that reaches the specimen jumps. For your machine, rewrite ``Machine.drive``.
 """
 
 from __future__ import annotations
 
-import json
 import socket
 import sys
 import threading
-from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
+from examples.stop_machine import NotAlive, values
 from live.commands.consumers import standard_consumers
+from live.config.listen_address import SOCKET
 from live.config.loading import load_config
-from live.run.control import ControlPort
+from live.run.control import SOCKET_NAME, ControlPort
 from live.run.live_run import LiveRun, run_live
 from live.run.outcome import Outcome
 from live.ui.terminal.screen import TerminalScreen
 
-STRAIN_PORT, CONTROL_PORT, MACHINE_PORT = 5610, 5611, 5612
+STRAIN_PORT, MACHINE_PORT = 5610, 5612
 
 
 class Lines:
-    """A TCP connection for lines of text."""
+    """A connection for lines of text, and answers."""
 
-    def __init__(self, port: int) -> None:
-        self._socket = socket.create_connection(("127.0.0.1", port), 10)
+    def __init__(self, connection: socket.socket) -> None:
+        self._socket = connection
         self._lines = self._socket.makefile("rw", encoding="utf-8", newline="\n")
 
     def ask(self, line: str) -> str:
@@ -36,9 +38,6 @@ class Lines:
         self._lines.write(line + "\n")
         self._lines.flush()
         return self._lines.readline().strip()
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._lines)
 
     def close(self) -> None:
         self._lines.close()
@@ -49,7 +48,7 @@ class Machine:
     """The machine: a speed, 1/s of the free length."""
 
     def __init__(self, port: int) -> None:
-        self._lines = Lines(port)
+        self._lines = Lines(socket.create_connection(("127.0.0.1", port), 10))
 
     def drive(self, speed: float) -> None:
         if self._lines.ask(f"speed {speed:.6g}") != "ok":
@@ -84,22 +83,23 @@ class Pid:
         return max(0.0, self.rate + self.p * error + self.i * self._sum + self.d * slope)
 
 
-def control(rate: float, until: float) -> None:
+def control(rate: float, until: float, folder: Path) -> None:
     """Pull with a strain rate (1/s) until the strain is reached, then end the test."""
-    strains, machine, commands, pid = (
-        Lines(STRAIN_PORT),
-        Machine(MACHINE_PORT),
-        Lines(CONTROL_PORT),
-        Pid(rate),
-    )
+    to_phasedic = socket.socket(socket.AF_UNIX)
+    to_phasedic.connect(str(folder / SOCKET_NAME))
+    strains = socket.create_connection(("127.0.0.1", STRAIN_PORT), 10)
+    machine, commands, pid, last = Machine(MACHINE_PORT), Lines(to_phasedic), Pid(rate), -1.0
     commands.ask(f"note strain rate {rate:g} 1/s")
-    for line in strains:
-        now = json.loads(line)
-        if now["axial"] is None:
-            continue
-        if now["axial"] > until:
-            break
-        machine.drive(pid.speed(now["time_s"], now["axial"]))
+    try:
+        for now in values(strains, ["axial"]):
+            if now["axial"] > until:
+                break
+            if now["time_s"] > last:  # else a heartbeat
+                machine.drive(pid.speed(now["time_s"], now["axial"]))
+            last = now["time_s"]
+    except NotAlive as why:
+        machine.drive(0.0)
+        commands.ask(f"note the machine is stopped: {why}")
     machine.drive(0.0)
     commands.ask("quit")
     for connection in (strains, machine, commands):
@@ -121,11 +121,11 @@ def main(folder: str | None = None, rate: float = 5e-4, until: float = 4e-3) -> 
     }
     config = load_config(None, {key: value for key, value in settings.items() if value is not None})
     screen = TerminalScreen()
-    port = ControlPort(str(CONTROL_PORT), None, screen)
+    port = ControlPort(SOCKET, None, screen)
 
     def on_start(live: LiveRun) -> None:
-        port.open(live)
-        threading.Thread(target=control, args=(rate, until), daemon=True).start()
+        port.open(live, live.folder)
+        threading.Thread(target=control, args=(rate, until, live.folder), daemon=True).start()
 
     try:
         return run_live(config, screen, consumers=standard_consumers(screen), on_start=on_start)

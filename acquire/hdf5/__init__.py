@@ -13,6 +13,7 @@ from acquire.hdf5.damage import (
     probe,
     read_superblock,
     reason,
+    still_reading,
 )
 from acquire.hdf5.declared import (
     Declared,
@@ -27,7 +28,7 @@ from acquire.hdf5.declared import (
     read_scalar,
     stored_rows,
 )
-from acquire.hdf5.disk import DiskSync, FileWatch, FlushTimer, forecast, free_bytes, network_share
+from acquire.hdf5.disk import DiskSync, FileWatch, FlushTimer, forecast, free_bytes, network_share, path_of
 from acquire.hdf5.pictures import COMPRESSED, PictureReader, PictureStack, compile_loops
 from acquire.hdf5.tables import (
     NO_UNIT,
@@ -70,6 +71,7 @@ __all__ = [
     "open_datasets",
     "open_file",
     "open_group",
+    "path_of",
     "probe",
     "read_attribute",
     "read_object",
@@ -77,6 +79,7 @@ __all__ = [
     "read_superblock",
     "reason",
     "set_attributes",
+    "still_reading",
     "storable",
     "stored_rows",
     "to_json",

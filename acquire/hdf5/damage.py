@@ -16,7 +16,10 @@ import errno
 import io
 import logging
 import os
+import queue
 import subprocess
+import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +31,10 @@ from acquire.errors import DataError
 from acquire.system import python_command, python_environment
 from acquire.text import Message
 
-PROBE_S = 30.0  # HDF5 retries a bad checksum of an unfinished file for ever
+PROBE_S = 30.0  # without a sign of progress: HDF5 retries a bad checksum of an unfinished file for ever
+_EVERY_S = 1.0
+_PROGRESS = "\0"  # a line of the child
+_said = [0.0]
 
 
 def probe(path: Path, package: str, timeout_s: float | None = None, *, words: Sequence[str] = ()) -> None:
@@ -38,27 +44,50 @@ def probe(path: Path, package: str, timeout_s: float | None = None, *, words: Se
     ----------
     package : str
         Its ``__main__`` reads the file and prints what is wrong with it, exit code 4.
+    timeout_s : float or None, s
+        From one ``still_reading`` of the child to the next: a long file may take long.
 
     Raises
     ------
     DataError
         The child crashed, did not end in time, or refused the file itself.
     """
-    try:
-        done = subprocess.run(
-            python_command(package, str(path), *words), env=python_environment(), capture_output=True, text=True,
-            errors="backslashreplace", timeout=timeout_s or PROBE_S, check=False,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired as error:
-        raise DataError("{path} is damaged: reading it does not come to an end", path) from error
-    if done.returncode != 0:
-        refusal = done.stdout.strip() if done.returncode == DataError.exit_code else ""
+    said: queue.SimpleQueue[str] = queue.SimpleQueue()
+    with subprocess.Popen(
+        python_command(package, str(path), *words), env=python_environment(), stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL, text=True, errors="backslashreplace",
+    ) as child:  # fmt: skip
+
+        def listen() -> None:
+            for line in child.stdout or ():
+                said.put(line)
+            said.put("")
+
+        listener, lines = threading.Thread(target=listen, daemon=True), [""]
+        listener.start()
+        try:
+            while line := said.get(timeout=timeout_s or PROBE_S):
+                lines += [line] * (line.strip() != _PROGRESS)
+        except queue.Empty:
+            raise DataError("{path} is damaged: reading it does not come to an end", path) from None
+        finally:
+            child.kill()
+            listener.join()
+    if child.returncode != 0:
+        refusal = "".join(lines).strip() if child.returncode == DataError.exit_code else ""
         raise DataError(
             refusal
             or Message(
-                "{path} is damaged: the HDF5 library fails on it ({returncode})", path, done.returncode
+                "{path} is damaged: the HDF5 library fails on it ({returncode})", path, child.returncode
             )
         )
+
+
+def still_reading() -> None:
+    """Called by the child of ``probe`` now and then: it is no endless attempt."""
+    if time.monotonic() >= _said[0] + _EVERY_S:
+        _said[0] = time.monotonic()
+        print(_PROGRESS, flush=True)
 
 
 def reason(error: Exception) -> str:
@@ -198,7 +227,9 @@ def read_superblock(path: Path) -> Superblock:
 
 
 class PaddedFile(io.RawIOBase):
-    """A file that has lost its end, as if zeros stood there: HDF5 opens none that is shorter than it was.
+    """A file that has lost its end, of the size that it had: HDF5 opens none that is shorter.
+
+    What begins beyond the end cannot be read, and what reaches beyond it ends in zeros, which no checksum fits.
 
     Parameters
     ----------
@@ -209,7 +240,7 @@ class PaddedFile(io.RawIOBase):
 
     def __init__(self, path: Path, size: int) -> None:
         self._file = path.open("rb", buffering=0)
-        self._size, self._at = size, 0
+        self._size, self._there, self._at = size, path.stat().st_size, 0
 
     def readable(self) -> bool:
         """Always."""
@@ -225,8 +256,10 @@ class PaddedFile(io.RawIOBase):
         return self._at
 
     def readinto(self, buffer: Any) -> int:
-        """Bytes of the file, and zeros beyond its end."""
+        """Bytes of the file, then zeros; raises OSError beyond the end of what is there."""
         wanted = memoryview(buffer)[: max(self._size - self._at, 0)]
+        if wanted and self._at >= self._there:
+            raise OSError(errno.EIO, "the file is cut off before it")
         self._file.seek(self._at)
         there = self._file.readinto(wanted) or 0
         wanted[there:] = bytes(len(wanted) - there)

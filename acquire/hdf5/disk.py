@@ -6,6 +6,7 @@ for a power cut to lose little.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import math
 import os
@@ -75,6 +76,15 @@ KEPT_BYTES = 8 << 20
 _CANNOT = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP)
 
 
+def path_of(descriptor: int, path: Path) -> Path:
+    """Where the open file or folder ``path`` is now, whatever it is called since; as it was where no system tells."""
+    with contextlib.suppress(OSError):
+        now = Path(f"/proc/self/fd/{descriptor}").readlink()
+        if now.exists() and not (path.exists() and path.samefile(now)):
+            return now
+    return path
+
+
 class FileWatch:
     """Notices that a file that is written here was removed, or cut, by somebody else.
 
@@ -98,8 +108,13 @@ class FileWatch:
             raise OSError(errno.EIO, "somebody has removed it")
         if found.st_size < self._size:
             raise OSError(errno.EIO, f"somebody has cut it to {found.st_size} of {self._size} bytes")
-        if not self._path.exists():
+        if not self._path.exists() and not (self.path.exists() and self.path.name == self._path.name):
             raise FileNotFoundError(errno.ENOENT, Message("somebody has renamed it"))
+
+    @property
+    def path(self) -> Path:
+        """Where the file is now: a folder may be renamed."""
+        return path_of(self._file, self._path)
 
     def wrote(self) -> None:
         """To be called after a write."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 
 from acquire.errors import DataError
+from acquire.hdf5 import still_reading
 
 
 def main(path: str, salvage: str = "") -> int:
@@ -14,7 +15,9 @@ def main(path: str, salvage: str = "") -> int:
     try:
         with SessionPart(path, probed=True, salvage=bool(salvage)) as part:
             part.walk_pictures()
-            for read in (part.load_samples, part.events, part.clock_pairs, part.frame_counts):
+            for _ in part.load_pieces():
+                still_reading()
+            for read in (part.events, part.clock_pairs, part.frame_counts):
                 read()
     except DataError as error:
         if salvage:

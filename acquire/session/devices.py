@@ -58,7 +58,7 @@ class SessionLoadCell(_SessionDevice):
         self.info: LoadCellInfo = dataclasses.replace(info, address=address)
 
     def __iter__(self) -> Iterator[LoadSample]:
-        for sample in self._session.load_samples():
+        for sample in self._session.each_load_sample():
             if self._stopped:
                 return
             yield sample

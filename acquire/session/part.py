@@ -6,13 +6,15 @@ automatically and reported. Foreign, newer and truncated files are refused in wo
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from acquire.clock import ClockPair
 from acquire.closing import Closing
@@ -35,17 +37,17 @@ from acquire.hdf5 import (
     read_object,
     read_scalar,
     read_superblock,
-    stored_rows,
+    still_reading,
 )
-from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
+from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import layout, stored
 from acquire.session.bursts import burst_from
-from acquire.session.stored import DAMAGE, Rows, events_from, read_column, read_rows
+from acquire.session.loads import LoadPiece, LoadTable
+from acquire.session.stored import DAMAGE, events_from, read_column, read_rows
 from acquire.text import Message
 
 TEXT = Declared("S")
-_STABLE = {code: word for word, code in layout.STABLE.items()}
 UNFINISHED = Message(
     "was not closed by its writer (killed, or still recording); everything complete in it is read. "
     "'phasedic recover' makes a clean copy"
@@ -124,8 +126,9 @@ class SessionPart(Closing):
         """Look for what the writer has added since."""
         self._open_the_growing()
         frames, bursts = self._groups["frames"], self._groups["bursts"]
-        self._frames = read_rows(frames, layout.FRAME_COLUMNS, [self._images], whole=self._whole)
-        self._bursts = read_rows(bursts, layout.BURST_COLUMNS, [self._sums, self._clipped], whole=self._whole)
+        how = {"whole": self._whole, "closed": not self._follows}
+        self._frames = read_rows(frames, layout.FRAME_COLUMNS, [self._images], **how)
+        self._bursts = read_rows(bursts, layout.BURST_COLUMNS, [self._sums, self._clipped], **how)
         self.columns, self.bursts = self._frames.columns, self._bursts.columns
         self._check_order()
         self.troubles = (*self._frames.troubles, *self._bursts.troubles, *self._troubles_of_the_load())
@@ -143,7 +146,8 @@ class SessionPart(Closing):
         self._pictures = PictureReader(self._images)
         self._clipped = open_datasets(bursts, pictures["bursts"])["clipped"]
         self._sums = stored.open_sums(bursts, self.camera)
-        self._lines = open_dataset(self._groups["load"], "lines", stored.LINES)
+        lines = open_dataset(self._groups["load"], "lines", stored.LINES)
+        self._loads = LoadTable(self._groups["load"], lines, whole=self._whole, closed=not self._follows)
         self._events = open_dataset(self.entry, "events", stored.EVENTS)
         self._frame_counts = open_dataset(self.entry, "ledger", stored.LEDGER)
 
@@ -162,12 +166,9 @@ class SessionPart(Closing):
 
     def _troubles_of_the_load(self) -> tuple[str, ...]:
         try:
-            return self._samples().troubles
+            return self._loads.troubles()
         except (*DAMAGE, DataError):
             return ()  # load_samples() raises
-
-    def _samples(self) -> Rows:
-        return read_rows(self._groups["load"], layout.LOAD_COLUMNS, whole=self._whole)
 
     def __len__(self) -> int:
         return len(self._frames)
@@ -210,37 +211,20 @@ class SessionPart(Closing):
             row = {name: column[number].item() for name, column in self.bursts.items()}
             return burst_from(self._sums[place], self._clipped[place], row, self.camera.bits)
 
-    def load_samples(self) -> list[LoadSample]:
-        """All load samples with their raw lines."""
+    def load_pieces(self, low: float = -math.inf, high: float = math.inf) -> Iterator[LoadPiece]:
+        """The load samples from ``low`` to ``high`` (monotonic s), by the piece; raises DataError."""
         with _reading(self.path, Message("the load samples cannot be read"), self._advice):
-            samples = self._samples()
-            lines = self._raw_lines(samples)
-        columns = [samples.columns[name].tolist() for name in _SAMPLE]
-        return [
-            LoadSample(
-                t=t,
-                force=force,
-                unit=unit.decode("ascii", "replace"),
-                stable=_STABLE[stable],
-                flags=LoadFlag(flags),
-                raw=line,
-                device_ms=None if np.isnan(device_ms) else device_ms,
-            )
-            for t, force, unit, stable, flags, device_ms, line in zip(*columns, lines, strict=True)
-            if line is not None
-        ]
+            yield from self._loads.pieces(low, high)
 
-    def _raw_lines(self, samples: Rows) -> list[bytes | None]:
-        """The line of each sample; None where it is not in the file yet."""
-        content = read_column(self._lines, whole=self._whole).tobytes()
-        last = int(samples.places.max(initial=-1))
-        ends = read_column(self._groups["load"]["line_end"], last + 1, whole=self._whole).astype(np.int64)
-        starts = np.concatenate([[0], ends])[samples.places]
-        ends = ends[samples.places]
-        if self._whole and (np.any(ends <= starts) or ends.max(initial=0) > stored_rows(self._lines)):
-            raise ValueError("the lines of the samples do not follow one another")
-        spans = zip(starts.tolist(), ends.tolist(), strict=True)
-        return [content[start : end - 1] if end <= len(content) else None for start, end in spans]
+    def load_samples(self) -> list[LoadSample]:
+        """All load samples with their raw lines; 280 bytes of memory each."""
+        return [sample for piece in self.load_pieces() for sample in piece.samples()]
+
+    def load_curve(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Times (N,) in monotonic s and forces (N,) in N of all load samples; raises DataError."""
+        with _reading(self.path, Message("the load samples cannot be read"), self._advice):
+            times, forces = zip((np.empty(0), np.empty(0)), *self._loads.curve(), strict=True)
+        return np.concatenate(times), np.concatenate(forces)
 
     def events(self) -> list[Event]:
         """All events."""
@@ -273,13 +257,11 @@ class SessionPart(Closing):
         with _reading(self.path, Message("the index of the pictures cannot be read"), self._advice):
             for pictures in (self._images, self._sums, self._clipped):
                 pictures.id.get_num_chunks()
+                still_reading()
 
     def close(self) -> None:
         """Close the file; may be called again without effect."""
         self.file.close()
-
-
-_SAMPLE = ("monotonic_s", "force", "unit", "stable", "flags", "device_ms")
 
 
 class _reading:

@@ -9,6 +9,7 @@ are another file that can be made again.
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 import re
 import uuid
@@ -104,7 +105,8 @@ class RotatingWriter(Closing):
         if self._writer.bytes_written < self._limit:
             return
         self._info = dataclasses.replace(self._info, part=self._info.part + 1)
-        following = SessionWriter(part_path(self._first, self._info.part), self._info)
+        first = self._writer.folder / self._first.name
+        following = SessionWriter(part_path(first, self._info.part), self._info)
         self._finished_bytes += self._writer.bytes_written
         full, self._writer = self._writer, following
         full.close()
@@ -257,8 +259,19 @@ class Session(Closing):
         return self._parts[at], number - starts[at]
 
     def load_samples(self) -> list[LoadSample]:
-        """All load samples, with their raw lines."""
-        return [sample for part in self._parts for sample in part.load_samples()]
+        """All load samples, with their raw lines; 280 bytes of memory each."""
+        return list(self.each_load_sample())
+
+    def each_load_sample(self, low: float = -math.inf, high: float = math.inf) -> Iterator[LoadSample]:
+        """The load samples from ``low`` to ``high`` (monotonic s), one by one, read by the piece."""
+        for part in self._parts:
+            for piece in part.load_pieces(low, high):
+                yield from piece.samples()
+
+    def load_curve(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Times (N,) in monotonic s and forces (N,) in N of all load samples."""
+        times, forces = zip(*(part.load_curve() for part in self._parts), strict=True)
+        return np.concatenate(times), np.concatenate(forces)
 
     def events(self) -> list[Event]:
         """All events."""

@@ -103,9 +103,14 @@ def _copy(part: SessionPart, writer: SessionWriter) -> Recovered:
     for number in range(len(part.bursts["n"])):
         burst = _try(partial(part.burst, number), unreadable)
         bursts += burst is not None and writer.write_burst(burst) >= 0
-    samples = _try(part.load_samples, unreadable) or []
-    for sample in samples:
-        writer.write_load(sample)
+    samples = 0
+    try:
+        for piece in part.load_pieces():
+            for sample in piece.samples():
+                writer.write_load(sample)
+                samples += 1
+    except DataError as error:
+        unreadable.append(str(error))
     events = _try(part.events, unreadable) or []
     for event in events:
         writer.write_event(event)
@@ -115,7 +120,7 @@ def _copy(part: SessionPart, writer: SessionWriter) -> Recovered:
     frame_counts = _try(part.frame_counts, unreadable)
     if frame_counts is not None:
         writer.write_ledger(frame_counts)
-    done = Recovered(writer.path, frames, bursts, len(samples), len(events), tuple(unreadable))
+    done = Recovered(writer.path, frames, bursts, samples, len(events), tuple(unreadable))
     writer.write_event(_note(part, done))
     return done
 

@@ -160,16 +160,30 @@ class Rows:
         return len(self.places)
 
 
-def read_column(item: h5py.Dataset, n: int | None = None, missing: Any = 0, *, whole: bool) -> NDArray[Any]:
-    """The first ``n`` rows, or all that are stored; where not ``whole``, ``missing`` in place of damaged chunks."""
+def read_column(
+    item: h5py.Dataset, n: int | None = None, missing: Any = 0, *, first: int = 0, whole: bool
+) -> NDArray[Any]:
+    """The rows from ``first`` to ``n``, or to the last that is stored.
+
+    Where not ``whole``, ``missing`` stands in place of damaged chunks, and of chunks of times that are all zero: their
+    bytes were never written.
+    """
     n = _stored_rows(item, whole) if n is None else n
-    if whole:
-        return np.asarray(item[:n])
-    values = np.full(n, missing, item.dtype)
     step = item.chunks[0] if item.chunks else max(n, 1)
-    for first in range(0, n, step):
-        with contextlib.suppress(*DAMAGE):
-            values[first : first + step] = item[first : min(first + step, n)]
+    starts = np.arange(first - first % step, n, step)
+    try:
+        values = np.asarray(item[first:n])
+    except DAMAGE:
+        if whole:
+            raise
+        values = np.full(max(n - first, 0), missing, item.dtype)
+        for start in starts.tolist():
+            low, high = max(start, first), min(start + step, n)
+            with contextlib.suppress(*DAMAGE):
+                values[low - first : high - first] = item[low:high]
+    if not whole and len(values) > 1 and item.name.endswith("_s"):
+        written = np.logical_or.reduceat(values != 0, np.maximum(starts - first, 0))
+        values[~np.repeat(written, step)[first - int(starts[0]) :][: len(values)]] = missing
     return values
 
 
@@ -182,8 +196,60 @@ def _stored_rows(item: h5py.Dataset, whole: bool) -> int:
         return int(item.shape[0])
 
 
+def same_length(group: h5py.Group, items: Sequence[h5py.Dataset], *, whole: bool) -> int:
+    """The rows that all ``items`` of ``group`` have; raises DataError where ``whole`` and one has more."""
+    lengths = [_stored_rows(item, whole) for item in items]
+    n, extents = min(lengths), {len(item) for item in items}
+    if whole and {*lengths, *extents} != {n}:
+        raise DataError(
+            "{filename}: {name} has {n} to {max} rows, not one number of them in all its columns; the file is "
+            "damaged: 'phasedic recover' saves the rows that are whole",
+            group.file.filename,
+            group.name,
+            n,
+            max(extents),
+        )
+    return n
+
+
+def usable(
+    group: h5py.Group,
+    table: Mapping[str, NDArray[Any]],
+    columns: layout.Columns,
+    first: int = 0,
+    *,
+    whole: bool,
+) -> NDArray[np.bool_]:
+    """Which rows have a time and no value beyond its range; ``first`` is the number of the first of them.
+
+    Raises
+    ------
+    DataError
+        Where ``whole``, a value is beyond its range.
+    """
+    declared = {name: columns[name].declared() for name in table}
+    outside = {name: what.outside(table[name]) for name, what in declared.items()}
+    beyond = np.logical_or.reduce([*outside.values()], axis=0)
+    if whole and beyond.any():
+        raise DataError(
+            _beyond(
+                Message("{filename}: {name}", group.file.filename, group.name),
+                table,
+                outside,
+                declared,
+                first,
+            )
+        )
+    return np.asarray(~(beyond | np.isnan(table["monotonic_s"])), np.bool_)
+
+
 def read_rows(
-    group: h5py.Group, columns: layout.Columns, pictures: Sequence[h5py.Dataset] = (), *, whole: bool
+    group: h5py.Group,
+    columns: layout.Columns,
+    pictures: Sequence[h5py.Dataset] = (),
+    *,
+    whole: bool,
+    closed: bool = True,
 ) -> Rows:
     """The rows of ``group`` that are complete in all columns and in the pictures.
 
@@ -191,83 +257,99 @@ def read_rows(
 
     Parameters
     ----------
-    whole : bool
-        Nothing may be missing or beyond its range; else what is so is left out.
+    whole, closed : bool
+        Nothing may be missing or beyond its range; else what is so is left out. The writer came to the end.
 
     Raises
     ------
     DataError
         Columns are missing or of another kind; where ``whole``, also of another length or out of range.
     """
-    declared = {name: column.declared() for name, column in columns.items()}
-    held = open_datasets(group, declared)
-    lengths = [_stored_rows(item, whole) for item in (*held.values(), *pictures)]
-    n = min(lengths)
-    extents = {len(item) for item in (*held.values(), *pictures)}
-    where = Message("{filename}: {name}", group.file.filename, group.name)
-    if whole and {*lengths, *extents} != {n}:
-        raise DataError(
-            "{where} has {n} to {max} rows, not one number of them in all its columns; the file is damaged: "
-            "'phasedic recover' saves the rows that are whole",
-            where,
-            n,
-            max(extents),
-        )
+    held = open_datasets(group, {name: column.declared() for name, column in columns.items()})
+    n = same_length(group, [*held.values(), *pictures], whole=whole)
     table = {name: read_column(item, n, columns[name].missing, whole=whole) for name, item in held.items()}
-    outside = {name: what.outside(table[name]) for name, what in declared.items()}
-    beyond = np.logical_or.reduce([*outside.values()], axis=0)
-    if whole and beyond.any():
-        raise DataError(_beyond(where, table, outside, declared))
-    timeless = np.isnan(table["monotonic_s"])
-    return _chosen(table, ~(beyond | timeless), str(group.name).rpartition("/")[2], whole)
+    good = usable(group, table, columns, whole=whole)
+    odd = Oddities(str(group.name).rpartition("/")[2], closed=closed)
+    odd.add(good, table["monotonic_s"][good])
+    places = np.flatnonzero(good)
+    kept = {name: column[places] for name, column in table.items()}
+    if odd.left_out:
+        _count_as_lost(kept, table, good)
+    return Rows(kept, places, odd.words())
 
 
-def _beyond(where: str, table: Any, outside: Any, declared: Mapping[str, Declared]) -> str:
+def _beyond(where: str, table: Any, outside: Any, declared: Mapping[str, Declared], first: int) -> str:
     name = next(name for name, rows in outside.items() if rows.any())
     row = int(np.argmax(outside[name]))
     low, high = declared[name].low, declared[name].high
     return Message(
-        "{where}/{name} is {table} in row {row}, beyond {low:g} to {high:g}; the file is damaged: 'phasedic "
-        "recover' saves the other rows",
+        "{where}/{name} is {table} in row {first}, beyond {low:g} to {high:g}; the file is damaged: "
+        "'phasedic recover' saves the other rows",
         where,
         name,
         table[name][row],
-        row,
+        first + row,
         low,
         high,
     )
 
 
-def _chosen(table: dict[str, NDArray[Any]], good: NDArray[np.bool_], what: str, whole: bool) -> Rows:
-    troubles = []
-    if not whole and len(good) and not good.any():
-        troubles.append(Message("none of {len} {what} has a time, so all are left out", len(good), what))
-    if not whole:  # the last rows may not be written yet
-        good = good[: len(good) - int(np.argmax(good[::-1]))] if good.any() else good[:0]
-    places = np.flatnonzero(good)
-    columns = {name: column[places] for name, column in table.items()}
-    if left_out := len(good) - len(places):
-        troubles.append(
-            Message(
-                "{left_out} of {len} {what} have no time, or values beyond sense, and are left out",
-                left_out,
-                len(good),
-                what,
+class Oddities:
+    """What is odd about the rows of ``what``, which may come by the piece.
+
+    Where the file was not ``closed``, the last rows may not be written yet: they are not missed.
+    """
+
+    def __init__(self, what: str, *, closed: bool) -> None:
+        self._what, self._closed = what, closed
+        self._rows = self._kept = self._unwritten = self._gone = self._backwards = 0
+        self._first_back, self._last = -1, -np.inf
+
+    @property
+    def left_out(self) -> int:
+        """Rows before the last good one, or before the end, that are left out."""
+        return self._gone + self._unwritten * self._closed
+
+    def add(self, good: NDArray[np.bool_], times: NDArray[np.float64]) -> None:
+        """Rows, (N,), of which those that are ``good`` have these times."""
+        if len(times):
+            end = len(good) - int(np.argmax(good[::-1]))
+            self._gone += self._unwritten + end - len(times)
+            self._unwritten = 0
+            wrong = np.flatnonzero(np.diff(times, prepend=self._last) < 0)
+            if wrong.size and not self._backwards:
+                self._first_back = self._kept + int(wrong[0]) - 1
+            self._backwards, self._last = self._backwards + wrong.size, times[-1]
+        else:
+            end = 0
+        self._unwritten += len(good) - end
+        self._rows, self._kept = self._rows + len(good), self._kept + len(times)
+
+    def words(self) -> tuple[str, ...]:
+        """A sentence each, for a person."""
+        words, what = [], self._what
+        if not self._closed and self._rows and not self._kept:
+            words.append(Message("none of {rows} {what} has a time, so all are left out", self._rows, what))
+        if self.left_out:
+            there = self._rows - self._unwritten * (not self._closed)
+            words.append(
+                Message(
+                    "{left_out} of {there} {what} have no time, or values beyond sense, and are left out",
+                    self.left_out,
+                    there,
+                    what,
+                )
             )
-        )
-        _count_as_lost(columns, table, good)
-    steps = np.diff(columns["monotonic_s"])
-    if backwards := int(np.count_nonzero(steps < 0)):
-        first = int(np.argmax(steps < 0))
-        troubles.append(
-            Message(
-                "the times of {what} run backwards at {backwards} places, first after row {first}",
-                what,
-                backwards,
-                first,
+        if self._backwards:
+            words.append(
+                Message(
+                    "the times of {what} run backwards at {backwards} places, first after row {first_back}",
+                    what,
+                    self._backwards,
+                    self._first_back,
+                )
             )
-        )
-    return Rows(columns, places, tuple(troubles))
+        return tuple(words)
 
 
 def _count_as_lost(

@@ -258,6 +258,11 @@ class SessionWriter(Closing):
         """Room left on the disk."""
         return free_bytes(self.path)
 
+    @property
+    def folder(self) -> Path:
+        """Where the file is now."""
+        return self._watch.path.parent
+
     def close(self) -> None:
         """Write what is held and close the file; may be called again without effect.
 

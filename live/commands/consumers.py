@@ -48,11 +48,16 @@ def signals_of(
             if out is not None:
                 opened.callback(out.end)
                 outputs.append(out)
-                screen.print(out.name)
+                out.tell = partial(_emit, run_state, out.name)
+                screen.print(f"{out.name}: strains and forces {out.to_whom}; it takes no commands")
         opened.pop_all()
     means = ActionMeans(screen.bell, about.end, outputs)
     alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]
     return [*_alarm_watch(alarms, about, run_state, joint), *outputs]
+
+
+def _emit(run_state: RunState, source: str, text: str, level: Level) -> None:
+    run_state.event_log.emit(EventKind.VIEW, source, text, level)
 
 
 def _alarm_watch(
@@ -163,8 +168,7 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
     )
     rrd = about.folder / "view.rrd" if v.rrd else None
 
-    def tell(text: str, level: Level) -> None:
-        run_state.event_log.emit(EventKind.VIEW, "view", text, level)
+    tell = partial(_emit, run_state, "view")
 
     def serving(view: View) -> None:
         run_state.health.view_port = view.port

@@ -44,7 +44,10 @@ def add_options(parser: argparse.ArgumentParser, title: str, *names: str) -> Non
             words += f" (default {field.default})"
         shape = {"metavar": option.metavar} if option.metavar else {"choices": check.words}
         again: Any = {"action": "append"} if option.many else {}
-        group.add_argument(f"--{name}", dest=key, type=_reader(check.read), help=words, **shape, **again)
+        alone: Any = {"nargs": "?", "const": option.alone} if option.alone else {}
+        group.add_argument(
+            f"--{name}", dest=key, type=_reader(check.read), help=words, **shape, **again, **alone
+        )
 
 
 def _reader(read: Any) -> Any:

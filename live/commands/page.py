@@ -10,7 +10,7 @@ from typing import Any
 
 from acquire.errors import PhasedicError
 from acquire.text.printable import brief
-from live.commands.attended import open_page
+from live.commands.attended import page_opened
 from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.init import find_devices
 from live.commands.options import OUTPUT, add_measure, add_options, overrides
@@ -52,8 +52,7 @@ def command(arguments: argparse.Namespace) -> int:
             interrupted.set()
             controller.quit()
 
-        with signals(interrupt, screen.print):
-            open_page(controller, screen)
+        with signals(interrupt, screen.print), page_opened(controller, screen):
             serve(controller, given, screen, interrupted)
     return EXIT_INTERRUPTED if interrupted.is_set() else 0
 

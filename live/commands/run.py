@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from acquire.errors import PhasedicError
-from live.commands.attended import attended, open_page
+from live.commands.attended import attended, page_opened
 from live.commands.consumers import standard_consumers
 from live.commands.exit_codes import EXIT_WORDS, LOSS
 from live.commands.options import add_measure, add_options, configured, overrides
@@ -77,8 +77,7 @@ def command(arguments: argparse.Namespace) -> int:
         return finish(outcome, screen, verbose=arguments.verbose)
     from live.ui.web.page_controller import PageController
 
-    with PageController(None) as controller:
-        open_page(controller, screen)
+    with PageController(None) as controller, page_opened(controller, screen):
         return run_with_page(controller, configs, screen)[1]
 
 

@@ -1,9 +1,12 @@
-"""The address at which a server listens: a local port, or an address of this machine, which needs a token."""
+"""Where a server listens: a port of this machine, with or without a token, or a socket of one user in a folder."""
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
+import os
 import socket
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -12,6 +15,8 @@ from acquire.errors import ConfigError
 
 LOOPBACK = "127.0.0.1"
 MIN_TOKEN_LENGTH = 16  # characters
+SOCKET = "socket"
+"""In place of an address: a unix socket in the folder of the run."""
 ALLOWED = "PORT, or HOST:PORT with the address of this machine, PORT from 1024 to 65535 (0: any free one)"
 
 
@@ -86,22 +91,60 @@ def _port_allowed(port: int) -> bool:
     return port == 0 or 1024 <= port <= 65535
 
 
-def read_token(address: ListenAddress, path: str | None, what: str) -> str:
-    """The token that a client must send first; empty if none is needed.
+def private_socket(folder: Path, name: str, what: str) -> tuple[socket.socket, Callable[[], None]]:
+    """A listening unix socket ``name`` in ``folder`` that this user alone can open, and what removes it at the end.
 
     Raises
     ------
     ConfigError
-        A token is needed and there is none, or it is too short.
+        It cannot be made there.
+    """
+    family = getattr(socket, "AF_UNIX", None)
+    if family is None:
+        raise ConfigError(f"{what}: this system has no unix sockets; give [HOST:]PORT and a token file")
+    found, at = (
+        socket.socket(family),
+        os.open(folder, os.O_RDONLY),
+    )  # that folder, whatever its name becomes
+
+    def remove() -> None:
+        with contextlib.suppress(OSError):
+            os.unlink(name, dir_fd=at)
+        os.close(at)
+
+    try:
+        found.bind(min(str(folder / name), os.path.relpath(folder / name), key=len))  # up to 107 bytes
+        os.chmod(name, 0o600, dir_fd=at)
+        found.listen()  # nobody can connect before
+    except OSError as error:
+        found.close()
+        os.close(at)
+        raise ConfigError(
+            f"{what}: {folder / name} cannot be made ({error.strerror or error}); choose another --out, or give PORT"
+        ) from None
+    found.setblocking(False)
+    return found, remove
+
+
+def read_token(address: ListenAddress, path: str | None, what: str, *, commands: bool = False) -> str:
+    """The token that a client must send first; empty if none is needed: to read, on this machine.
+
+    Raises
+    ------
+    ConfigError
+        A token is needed and there is none, it is too short, or others can read it.
     """
     if path is None:
-        if address.is_loopback:
+        if address.is_loopback and not commands:
             return ""
+        who = "every user" if address.is_loopback else "other machines"
         raise ConfigError(
-            f"{what}: {address.host} can be reached from other machines; give token_file, a file with a word of"
-            f" {MIN_TOKEN_LENGTH} letters or more, or listen at {LOOPBACK}"
+            f"{what}: {who} can reach {address.host}; give token_file, a file of yours alone with a word of"
+            f" {MIN_TOKEN_LENGTH} letters, or {'--orders alone' if commands else LOOPBACK}"
         )
     try:
+        if os.name == "posix" and Path(path).stat().st_mode & 0o077:
+            raise ConfigError(f"{what}: {path}: other users can read the token; make a new one, of mode 600")
         token = Path(path).read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{what}: {path}: no token can be read ({error})") from None

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from live.config.listen_address import SOCKET
 from live.config.values import (
     ADDRESSES,
     AUTO,
@@ -16,6 +17,7 @@ from live.config.values import (
     LISTEN_ADDRESS,
     LOAD_ADDRESS,
     NAMES,
+    ORDERS,
     POINT,
     RECORD_MODE,
     RECTANGLE,
@@ -202,11 +204,13 @@ class RecordConfig:
 class OperateConfig:
     """[operate]"""
 
-    orders: str | None = key(LISTEN_ADDRESS, None,
-        "TCP port for remote commands, one per line (on 127.0.0.1 unless HOST is given)",
-        Option("orders", "[HOST:]PORT"))
+    orders: str | None = key(ORDERS, None,
+        "take commands of other programs, one per line: on a unix socket of your own in the run's folder, or on a TCP"
+        " port (on 127.0.0.1 unless HOST is given) with --token-file",
+        Option("orders", "[HOST:]PORT", alone=SOCKET))
     token_file: str | None = key(TEXT, None,
-        "file with the token that a client must send first; required for addresses other than 127.0.0.1",
+        "file of mode 600 with the token that a client must send first; required for commands by TCP, and for addresses"
+        " other than 127.0.0.1",
         Option("token-file", "FILE", expert=True))
 
 

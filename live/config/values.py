@@ -15,7 +15,7 @@ from acquire.bounds import NotAllowed, as_integer, as_number
 from acquire.errors import ConfigError
 from acquire.record_mode import RECORD_MODES, RecordMode
 from acquire.text import Message
-from live.config.listen_address import ListenAddress
+from live.config.listen_address import SOCKET, ListenAddress
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +56,8 @@ class Option:
         Only ``--help-all`` shows it.
     many : bool
         May be given several times.
+    alone : str
+        The value of the option without a word; empty where it needs one.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Option:
     on: bool = False
     expert: bool = False
     many: bool = False
+    alone: str = ""
 
 
 def key(check: Check, default: Any, help_text: str, option: Option | None = None) -> Any:
@@ -287,6 +290,8 @@ LOAD_ADDRESS = Check(_load_address)
 """Of a load cell: none is none: too."""
 LISTEN_ADDRESS = Check(_listen_address)
 """PORT or HOST:PORT of a server."""
+ORDERS = Check(lambda value: SOCKET if value == SOCKET else _listen_address(value))
+"""Of a server, or the word for a unix socket."""
 FLAG = Check(_flag)
 BOX = length(Check(_box, _read_box), whole=True)
 """x, y, width, height in whole px."""

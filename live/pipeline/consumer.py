@@ -58,6 +58,8 @@ class Consumer:
         Whether its failure makes the test one that finished with loss (exit code 5).
     timeout_s : float or None, s
         How long the end of a test waits for it; None: as long as it takes.
+    lost : bool
+        Something that it gives did not arrive; set by the consumer.
     """
 
     name: str = "consumer"
@@ -66,6 +68,7 @@ class Consumer:
     blocks: bool = True
     critical: bool = False
     timeout_s: float | None = None
+    lost: bool = False
 
     def begin(self) -> None:
         """Once, before anything else, on the consumer's thread."""
@@ -152,7 +155,8 @@ class ConsumerReport:
         What ``Consumer.end`` returned.
     failed : str
         Why it stopped early; empty where it did not.
-    critical : bool
+    critical, lost : bool
+        As of ``Consumer``.
     """
 
     name: str
@@ -161,6 +165,7 @@ class ConsumerReport:
     summary: str = ""
     failed: str = ""
     critical: bool = False
+    lost: bool = False
 
     def line(self) -> str:
         """One line for a person."""

@@ -16,6 +16,7 @@ from acquire.clock import ClockPair
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind
 from acquire.load_cell import LoadLog
+from acquire.load_sample import LoadSample
 from acquire.session import Session
 from live.config.loading import Config, from_dict, settings_in
 from live.pipeline.measure import NewReference
@@ -25,6 +26,8 @@ from live.replay.source import ReplayRequest, ReplaySource, Window, Work
 
 LIVE_ONLY = ("output", "record", "operate", "strain_out", "alarm")
 """Sections of the configuration that a replay leaves out."""
+BESIDE_S = 10.0
+"""Load samples so long after the last that is measured are read: a burst may reach beyond it."""
 
 
 def session_path(source: str) -> Path | None:
@@ -79,14 +82,10 @@ def session_source(session: Session, request: ReplayRequest, config: Config, pat
             "--as-measured takes the references of the run; leave --reference out, or --as-measured"
         )
     loads = LoadLog(config.load.max_gap_s, config.load.lag_s)
-    sign = config.load.sign
-    samples = tuple(replace(s, force=sign * s.force) if sign < 0 else s for s in session.load_samples())
-    for sample in samples:
-        loads.append(sample)
+    sign, window = config.load.sign, Window.of(request, session.start_monotonic)
     events = tuple(_turned(event) if sign < 0 else event for event in session.events())
     for event in events:
         loads.take_event(event)
-    loads.close()
     references = [e for e in events if e.kind is EventKind.REFERENCE and not e.data.get("renewed")]
     stored = open_store(session, path)
     if request.reference is not None:
@@ -95,7 +94,11 @@ def session_source(session: Session, request: ReplayRequest, config: Config, pat
         reference, after = stored.burst(references[-1].data), int(references[-1].data["last"])
     else:
         reference, after = stored.first_burst(config.measure.reference_burst or 1)
-    window = Window.of(request, session.start_monotonic)
+    last_t = max(window.high, reference.t) + config.load.max_gap_s + abs(config.load.lag_s) + BESIDE_S
+    samples = _Loads(session, last_t, sign)
+    for sample in samples:
+        loads.append(sample)
+    loads.close()
     if request.as_measured:
         found = _measured_then(stored, events, window)
     else:
@@ -117,6 +120,19 @@ def session_source(session: Session, request: ReplayRequest, config: Config, pat
         found.times,
         words=words,
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Loads:
+    """The load samples up to a time (monotonic s), read from the file each time."""
+
+    session: Session
+    last_t: float
+    sign: int
+
+    def __iter__(self) -> Iterator[LoadSample]:
+        for sample in self.session.each_load_sample(high=self.last_t):
+            yield replace(sample, force=-sample.force) if self.sign < 0 else sample
 
 
 def _turned(event: Event) -> Event:

@@ -108,7 +108,7 @@ class ReplaySource:
     loads: LoadLog
     start: ClockPair
     events: tuple[Event, ...] = ()
-    samples: tuple[LoadSample, ...] = ()
+    samples: Iterable[LoadSample] = ()
     expected: int | None = None
     times: NDArray[np.float64] | None = None
     count: PictureCount | None = None

@@ -108,6 +108,13 @@ class RunFolder(Closing):
         return [] if session is None else self._recorded(session.load_samples, [])
 
     @cached_property
+    def load_curve(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Times (N,) in s since the start and forces (N,) in N of all load samples; empty without a recording."""
+        session, none = self.session, (np.empty(0), np.empty(0))
+        times, forces = none if session is None else self._recorded(session.load_curve, none)
+        return times - self.start_monotonic, forces
+
+    @cached_property
     def frame_counts(self) -> dict[str, Any] | None:
         """The frame counts of the recording; None where there are none."""
         session = self.session

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import time
-from pathlib import Path
 
 from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind
+from acquire.hdf5 import path_of
 from acquire.text import Message
 from live.pipeline.consumer import Compose, RunInfo
 from live.pipeline.latency import LatencyMonitor
@@ -64,6 +65,8 @@ class CameraRun(Subscriber):
     ----------
     outputs : Outputs
     source : CameraSource
+    folder : Path
+        Of the files; at the end where it is then, if it has been renamed.
     """
 
     takes = (Waiting, Measurement)
@@ -79,6 +82,8 @@ class CameraRun(Subscriber):
         consumers: Compose,
     ) -> None:
         self.name, self._prepared, self._run_state = name, prepared, run_state
+        self.folder = prepared.folder
+        self._held = os.open(self.folder, os.O_RDONLY) if os.name == "posix" else -1
         self._screen, self._stop, self._stream = screen, stop, stream
         self._recording: PreTriggerBuffer | None = None
         self._has_recorded = self._hinted = False
@@ -159,11 +164,6 @@ class CameraRun(Subscriber):
     def run_state(self) -> RunState:
         """Events, counts, loads and history so far."""
         return self._run_state
-
-    @property
-    def folder(self) -> Path:
-        """Of the files."""
-        return self._prepared.folder
 
     @property
     def has_measured(self) -> bool:
@@ -305,6 +305,9 @@ class CameraRun(Subscriber):
         self._run_state.event_log.emit(EventKind.STOP, "phasedic", Message("the test ends: {reason}", reason))
         if self._recording is not None:
             self._recording.close({"stop_reason": reason})
+        self.folder = path_of(self._held, self.folder)
+        if self._held >= 0:
+            os.close(self._held)
 
     @property
     def exit_code(self) -> int:
@@ -326,5 +329,5 @@ class CameraRun(Subscriber):
     def outcome(self) -> Outcome:
         """The result, after it has ended."""
         run, state, code = self._prepared, self._run_state, self.exit_code
-        test = finished(run.folder, run.config, state, code, reference_force(state.event_log.events()))
-        return Outcome(run.folder, run.config, state, self.outputs, run.rig, run.plan.grid, code, test)
+        test = finished(self.folder, run.config, state, code, reference_force(state.event_log.events()))
+        return Outcome(self.folder, run.config, state, self.outputs, run.rig, run.plan.grid, code, test)

@@ -1,6 +1,6 @@
 """The commands of the operator: one line, one command, one answer.
 
-The same commands from the keyboard, the TCP port and the page::
+The same commands from the keyboard, the port or socket for commands, and the page::
 
     start, stop             begin and end recording (a run begins recording unless it is armed)
     reference               take a new reference from the next frames
@@ -19,7 +19,10 @@ from __future__ import annotations
 
 import math
 import queue
+import socket
 from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from acquire.errors import Spoken
@@ -27,7 +30,7 @@ from acquire.events import Event, EventKind, Level
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.text import Message
 from acquire.text.printable import printable
-from live.config.listen_address import ListenAddress, read_token
+from live.config.listen_address import SOCKET, ListenAddress, private_socket, read_token
 from live.pipeline.screen import Screen
 from live.run.tcp_lines import LineServer
 
@@ -47,6 +50,7 @@ COMMANDS = Message(
     "short: s, r, t, t!, u, p, n TEXT, a, q"
 )
 WHAT = "the port for commands"
+SOCKET_NAME = "orders.sock"
 _SHORT = {"s": "start", "r": "reference", "t": "tare", "t!": "tare force", "u": "tare undo", "a": "alarm off",
           "n": "note", "q": "quit"}  # fmt: skip
 _COMMANDS = {
@@ -279,14 +283,14 @@ def _in_one_line(text: object) -> str:
 
 
 class ControlPort:
-    """Takes commands over TCP, from ``open`` to ``close``: a line in, an answer out.
+    """Takes commands of other programs, from ``open`` to ``close``: a line in, an answer out.
 
     Parameters
     ----------
     where : str
-        ``PORT`` or ``HOST:PORT``.
+        ``SOCKET``: a unix socket of this user alone in the folder of the run; else ``PORT`` or ``HOST:PORT``.
     token_file : str or None
-        File with the token that a client must send first; needed beyond this machine.
+        File with the token that a client of a port must send first; whoever may command may end the run.
     screen : Screen
         Shows the address.
 
@@ -297,24 +301,27 @@ class ControlPort:
     """
 
     def __init__(self, where: str, token_file: str | None, screen: Screen) -> None:
-        address = ListenAddress.parse(where)
-        self._token, self._screen = read_token(address, token_file, WHAT), screen
-        self._host, self._listening = address.host, address.listen(WHAT)
-        self._server: LineServer | None = None
+        self._screen, self._token, self._closing = screen, "", ExitStack()
+        self._listening: socket.socket | None = None
+        if where != SOCKET:
+            address = ListenAddress.parse(where)
+            self._token, self._host = read_token(address, token_file, WHAT, commands=True), address.host
+            self._listening = self._closing.enter_context(address.listen(WHAT))
 
-    def open(self, controls: Controls) -> int:
-        """Begin to take commands; the port."""
-        self._server = LineServer(self._listening, self._token, lambda line: answer(line, controls))
-        self._server.start()
-        token = Message(" (with a token)") if self._token else ""
-        self._screen.print(
-            Message("commands are taken at {host}:{port}{token}", self._host, self._server.port, token)
-        )
-        return self._server.port
+    def open(self, controls: Controls, folder: Path) -> int:
+        """Begin to take commands, on a socket in ``folder`` where there is no port; the port, or 0."""
+        listening, where = self._listening, Message("{folder} (of this user alone)", folder / SOCKET_NAME)
+        if listening is None:
+            listening, remove = private_socket(folder, SOCKET_NAME, WHAT)
+            self._closing.callback(remove)
+        server = LineServer(listening, self._token, lambda line: answer(line, controls))
+        server.start()
+        self._closing.callback(server.close)
+        if self._token:
+            where = Message("{host}:{port} (with a token)", self._host, server.port)
+        self._screen.print(Message("commands are taken at {where}", where))
+        return server.port
 
     def close(self) -> None:
         """Take no more commands; again without effect."""
-        if self._server is not None:
-            self._server.close()
-            self._server = None
-        self._listening.close()
+        self._closing.close()

@@ -245,7 +245,9 @@ def run_cameras(
         if len(cameras) == 1:
             folder = next(iter(prepared.values())).folder
         runs = _run(cameras, _from_one_zero(prepared), states, folder, stop, on_start)
-        return OutcomeOfTest(folder, {name: run.outcome() for name, run in runs.items()})
+        outcomes = {name: run.outcome() for name, run in runs.items()}
+        where = next(iter(outcomes.values())).folder
+        return OutcomeOfTest(where if len(runs) == 1 else where.parent, outcomes)
 
 
 def _folders(cameras: Mapping[str, CameraOfTest]) -> tuple[Path, dict[str, Config]]:

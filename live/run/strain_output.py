@@ -1,6 +1,7 @@
 """Strain output: every measurement as a line of JSON or CSV to TCP clients, by UDP, or to a serial port.
 
-While nothing is measured a line says so, twice a second, without strains and with their age and state.
+A heartbeat tells a controller that phasedic is alive: a line at least every 0.5 s, the last measurement with its age
+of now, or without strains where none is live.
 
 Each output has its own thread and takes the newest measurement: one that stalls skips and counts, and
 delays neither the measurement nor another output.
@@ -15,11 +16,11 @@ import socket
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from acquire.errors import DeviceError, PhasedicError
-from acquire.events import Event
+from acquire.events import Event, Level
 from acquire.serial_line.ports import LineSettings, open_port
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
@@ -27,8 +28,12 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.snapshot import AXIAL
 from live.run.tcp_lines import LineServer
 
-EVERY_S = 0.5
-"""While nothing is measured a line says so at this interval."""
+EVERY_S = 0.4
+"""After this time without a measurement comes a heartbeat: every 0.5 s with what a busy machine adds."""
+_OF_NOW = ("age_s", "force_N", "force_age_s", "stress_MPa")
+"""Channels of a heartbeat that are not those of the last measurement."""
+AGAIN_S = 5.0
+MISSED = "a reader does not read, or is not there: it misses lines; end it, or let it read faster"
 REOPEN_S = 1.0
 """A lost serial port is opened again at this interval."""
 
@@ -50,20 +55,27 @@ class LineFormat:
 
     def __init__(self, values: ChannelValues, channels: Sequence[str], form: str) -> None:
         self._values, self._channels, self._json = values, tuple(channels), form == "json"
+        self._last: dict[str, float] = {}
         self.heading = "" if self._json else ",".join(channels)
 
     def of(self, measurement: Measurement | None) -> str:
         """The line, without its end, of now where nothing is measured; an unknown value is null in JSON, nan in CSV."""
-        values: dict[str, float | str] = {**self._values.read(measurement), **self._values.states}
+        values = self._values.read(measurement)
+        self._last = self._last if measurement is None else values
+        return self._line({**values, **self._values.states})
+
+    def heartbeat(self) -> str:
+        """The line of now: the last measurement and its age while it is live, else no strains."""
+        now, last = self._values.read(), self._last
+        if last and self._values.now.figure(AXIAL).known:
+            now = now | last | {name: now[name] for name in _OF_NOW if name in now}
+        return self._line({**now, **self._values.states})
+
+    def _line(self, values: Mapping[str, float | str]) -> str:
         if not self._json:
             return ",".join(_number(values.get(channel, math.nan)) for channel in self._channels)
         rounded = {channel: _rounded(values.get(channel, math.nan)) for channel in self._channels}
         return json.dumps(rounded, separators=(",", ":"))
-
-    def of_nothing(self) -> str:
-        """The line that is sent while no strain is live; empty while one is."""
-        line = self.of(None)
-        return "" if self._values.now.figure(AXIAL).known else line
 
 
 def _number(value: float | str) -> str:
@@ -77,8 +89,11 @@ def _rounded(value: float | str) -> float | str | None:
 
 
 class StrainOut(Consumer, ABC):
-    """One output; ``send`` takes a line without its end."""
+    """One output; ``send`` takes a line without its end, and ``to_whom`` names those who get it."""
 
+    to_whom: str
+    tell: Callable[[str, Level], None] = staticmethod(lambda text, level: None)
+    _lossy = False
     policy = Policy.NEWEST
     queue_size = 2
     timeout_s = 2.0
@@ -86,21 +101,20 @@ class StrainOut(Consumer, ABC):
     def __init__(self, name: str, lines: LineFormat) -> None:
         self.name, self._lines = name, lines
         self._posted: deque[str] = deque()
-        self._next = -math.inf  # when a line may say that nothing is measured
+        self._next = self._missed_t = -math.inf  # when a heartbeat is due, and when a line was missed
 
     def measurement(self, measurement: Measurement) -> None:
         """Send its line."""
-        self.send(self._lines.of(measurement))
+        self._put(self._lines.of(measurement))
         self._next = time.monotonic() + EVERY_S
 
     def idle(self) -> float:
-        """Say now and then that nothing is measured: a client must not take the last line for the present."""
+        """Send a heartbeat when it is due: a client must not take the last line for the present."""
         now = time.monotonic()
         if now >= self._next:
             self._next = now + EVERY_S
-            if line := self._lines.of_nothing():
-                self.send(line)
-        return EVERY_S
+            self._put(self._lines.heartbeat())
+        return self._next - now
 
     def post(self, line: str) -> None:
         """Queue a line, from any thread; the next event sends it."""
@@ -109,11 +123,22 @@ class StrainOut(Consumer, ABC):
     def event(self, event: Event) -> None:
         """Send the queued lines."""
         while self._posted:
-            self.send(self._posted.popleft())
+            self._put(self._posted.popleft())
+
+    def _put(self, line: str) -> None:
+        """Send a line; a reader that misses some is an error until all have come for ``AGAIN_S``."""
+        arrived, now = self.send(line), time.monotonic()
+        if not arrived and not self._lossy:
+            self.tell(MISSED, "error")
+        elif arrived and self._lossy and now > self._missed_t + AGAIN_S:
+            self.tell("all lines are read again", "info")
+        self.lost = self.lost or not arrived
+        self._missed_t = self._missed_t if arrived else now
+        self._lossy = now <= self._missed_t + AGAIN_S
 
     @abstractmethod
-    def send(self, line: str) -> None:
-        """Send a line."""
+    def send(self, line: str) -> bool:
+        """Send a line; False where one reader or more misses it."""
 
 
 class TcpOut(StrainOut):
@@ -123,14 +148,15 @@ class TcpOut(StrainOut):
         self._server = LineServer(listening, token, greeting=lines.heading)
         super().__init__(f"strain out (port {self._server.port})", lines)
         self.port = self._server.port
+        self.to_whom = "to programs with the token" if token else "to every user of this machine"
 
     def begin(self) -> None:
         """Listen."""
         self._server.start()
 
-    def send(self, line: str) -> None:
+    def send(self, line: str) -> bool:
         """To all clients; those that do not read are skipped."""
-        self._server.send(line)
+        return self._server.send(line)
 
     def end(self) -> str:
         """Close the connections."""
@@ -147,17 +173,20 @@ class UdpOut(StrainOut):
     def __init__(self, host: str, port: int, lines: LineFormat) -> None:
         super().__init__(f"strain out (udp {host}:{port})", lines)
         self._to = (host, port)
+        self.to_whom = "to whoever listens there, unencrypted"
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._sent = self._skipped = 0
 
-    def send(self, line: str) -> None:
+    def send(self, line: str) -> bool:
         """Send a datagram; one that the system refuses is counted."""
         try:
             self._socket.sendto(line.encode() + b"\n", self._to)
-            self._sent += 1
         except OSError:
             self._skipped += 1
+            return False
+        self._sent += 1
+        return True
 
     def end(self) -> str:
         """Close the socket."""
@@ -177,12 +206,13 @@ class SerialOut(StrainOut):
     def __init__(self, line: LineSettings, lines: LineFormat) -> None:
         super().__init__(f"strain out ({line.url})", lines)
         self._settings = line
+        self.to_whom = "to the device there"
         self._port: Any = open_port(line)
         self._lost = -float("inf")
         self._sent = self._skipped = 0
         self._sent_heading = False
 
-    def send(self, line: str) -> None:
+    def send(self, line: str) -> bool:
         """Write; a port that takes nothing for half a second is lost, and opened again a second later."""
         if not self._sent_heading and self._lines.heading:
             line = f"{self._lines.heading}\n{line}"
@@ -191,8 +221,9 @@ class SerialOut(StrainOut):
         if self._port is not None and self._written(line.encode() + b"\n"):
             self._sent_heading = True
             self._sent += 1
-        else:
-            self._skipped += 1
+            return True
+        self._skipped += 1
+        return False
 
     def _written(self, data: bytes) -> bool:
         try:

@@ -1,4 +1,4 @@
-"""A TCP server of lines: it answers the lines of its clients and sends lines to all, and never waits for a client."""
+"""A server of lines, by TCP or a unix socket: it answers its clients, sends lines to all, and never waits for one."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ class Client:
         self.taken = self.skipped = 0
         self._unfinished, self._unsent = b"", b""
         connection.setblocking(False)
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        with contextlib.suppress(OSError):  # a unix socket has none
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
 
     def receive(self) -> list[str]:
@@ -118,7 +119,8 @@ class LineServer:
         greeting: str = "",
     ) -> None:
         self._listening, self._token, self._answer, self._greeting = listening, token, answer, greeting
-        self.port: int = listening.getsockname()[1]
+        name = listening.getsockname()
+        self.port: int = name[1] if isinstance(name, tuple) else 0
         self.served = self.taken = self.skipped = 0
         self._clients: dict[int, Client] = {}
         self._lock = threading.RLock()
@@ -130,13 +132,12 @@ class LineServer:
         """Begin to listen."""
         self._thread.start()
 
-    def send(self, line: str) -> None:
-        """Send a line to all clients; one that does not read is skipped and counted."""
+    def send(self, line: str) -> bool:
+        """Send a line to all clients; one that does not read is skipped and counted: then False."""
         data = line.encode() + b"\n"
         with self._lock:
-            for client in list(self._clients.values()):
-                if client.authorized:
-                    self._send(client, data)
+            taken = [self._send(one, data) for one in list(self._clients.values()) if one.authorized]
+        return all(taken)
 
     def close(self) -> None:
         """Close all connections."""
@@ -165,14 +166,14 @@ class LineServer:
 
     def _accept(self, selector: selectors.BaseSelector) -> None:
         try:
-            connection, (host, port, *_) = self._listening.accept()
+            connection, peer = self._listening.accept()
         except OSError:  # closed again, or no file descriptor is left: then a pause before the next try
             time.sleep(_PAUSE_S)
             return
         if len(self._clients) >= MAX_CLIENTS:
             connection.close()
             return
-        client = Client(connection, f"{host}:{port}", self._token)
+        client = Client(connection, str(peer), self._token)
         self._clients[client.fileno()] = client
         selector.register(client, selectors.EVENT_READ)
         self.served += 1
@@ -207,11 +208,11 @@ class LineServer:
             return True
         return client.send(self._answer(line).encode() + b"\n")
 
-    def _send(self, client: Client, data: bytes) -> None:
+    def _send(self, client: Client, data: bytes) -> bool:
         try:
-            client.send(data)
+            return client.send(data)
         except OSError:
-            return  # the server's thread finds it closed, and drops it
+            return True  # the server's thread finds it closed, and drops it
 
     def _drop(self, client: Client) -> None:
         if self._clients.pop(client.fileno(), None) is not None:

@@ -117,7 +117,7 @@ class Adapted(Subscriber):
             self._close()
         return ConsumerReport(
             self._consumer.name, dict(self._taken), dict(self._dropped), self._summary, self._failed,
-            self._consumer.critical,
+            self._consumer.critical, self._consumer.lost,
         )  # fmt: skip
 
     @property

@@ -468,7 +468,10 @@ def test_the_first_bytes_of_a_file_tell_its_size_and_whether_it_is_finished(tmp_
         read_superblock(path)
     with PaddedFile(path, 60) as padded:
         assert padded.read() == content[:47] + bytes(13)
-        assert padded.seek(-3, os.SEEK_END) == 57 and padded.read() == bytes(3)
+        assert padded.seek(-15, os.SEEK_END) == 45 and padded.read() == content[45:47] + bytes(13)
+        assert padded.seek(-3, os.SEEK_END) == 57
+        with pytest.raises(OSError, match="cut off before it"):
+            padded.read()
         assert padded.seek(5) == 5 and padded.seek(2, os.SEEK_CUR) == 7 and padded.read(2) == content[7:9]
     with pytest.raises(DataError, match="is no regular file"):
         read_superblock(tmp_path)

@@ -224,6 +224,27 @@ def test_recover_saves_what_is_whole_of_a_malformed_session(session: Path, tmp_p
             np.testing.assert_array_equal(back.frame(number).image, whole.frame(number).image)
 
 
+@pytest.mark.parametrize("tenths", range(3, 10))
+def test_of_a_session_that_is_cut_no_padding_is_taken_for_a_value(
+    session: Path, tmp_path: Path, tenths: int
+) -> None:
+    content = session.read_bytes()
+    session.write_bytes(content[: len(content) * tenths // 10])
+    try:
+        done = recover(session, tmp_path / "clean.h5")
+    except DataError:
+        return  # its description is beyond the cut
+    assert not [words for words in done.unreadable if "run backwards" in words]
+    with Session.open(done.path) as back, Session.open(RECORDED / "session.h5") as whole:
+        assert back.recovered is None
+        known = {one.t: one for one in whole.load_samples()}
+        assert all(known[one.t] == one for one in back.load_samples())
+        pictures = {one.index: one for one in whole.frames()}
+        for one in back.frames():
+            assert one.t == pictures[one.index].t
+            np.testing.assert_array_equal(one.image, pictures[one.index].image)
+
+
 # -- results ------------------------------------------------------------------------------------
 
 

@@ -11,6 +11,7 @@ import json
 import logging
 import signal
 import subprocess
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -82,11 +83,25 @@ class WorkerProcess:
                 python_command("live.replay.batch.worker"),
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                errors="backslashreplace",
                 env=_LEAN | python_environment() | dict.fromkeys(ONE_THREAD, "1"),
                 text=True,
                 encoding="utf-8",
             )
-        self.pid = self._process.pid
+        self.pid, self._said = self._process.pid, deque[str](maxlen=1)
+        self._listener = threading.Thread(target=self._pass_on, daemon=True)
+        self._listener.start()
+
+    def _pass_on(self) -> None:
+        for line in self._process.stderr or ():
+            self._said.extend([line.strip()] * bool(line.strip()))
+            sys.stderr.write(line)
+
+    def why(self) -> str:
+        """How it ended, after ``end``: its last words, or the signal."""
+        killed = f"signal {-self._process.returncode}" if self._process.returncode < 0 else ""
+        return "; ".join([*self._said, *filter(None, [killed])]) or f"exit code {self._process.returncode}"
 
     def is_ready(self) -> bool:
         """Its first message: whether all loops are compiled; False where it died before."""
@@ -128,13 +143,16 @@ class WorkerProcess:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        self._listener.join(_END_TIMEOUT_S)
+        if self._process.stderr is not None and not self._listener.is_alive():
+            self._process.stderr.close()
 
 
 class Pool:
     """Performs ``tasks`` with ``workers`` processes; ``on_progress`` and ``on_done`` are called from threads.
 
-    A task whose worker died three times gives a failed row; other tasks are not affected. The processes come
-    from ``processes``, which the caller closes.
+    A task whose worker died three times gives a failed row; other tasks are not affected. Where the first three workers
+    die before one has measured anything, all tasks fail. The processes come from ``processes``, closed by the caller.
     """
 
     def __init__(
@@ -149,6 +167,8 @@ class Pool:
         self._waiting, self._deaths = deque(tasks), dict.fromkeys((task.title for task in tasks), 0)
         self._on_progress, self._on_done = on_progress, on_done
         self._stopped = threading.Event()
+        self._first_deaths: int | None = 0  # None once a worker has measured something
+        self._hopeless = ""
         self._workers: set[WorkerProcess] = set()
         self._lock = threading.Lock()
         n = min(workers, len(tasks))
@@ -175,15 +195,27 @@ class Pool:
         worker: WorkerProcess | None = None
         try:
             while (task := self._next()) is not None:
+                if self._hopeless:
+                    self._on_done(task, failed(task.title, task.source, self._hopeless, 1))
+                    continue
                 worker = worker or self._new()
-                row = worker.perform(task, self._on_progress) if worker is not None else None
+                row = worker.perform(task, self._progressed) if worker is not None else None
                 if row is None:
                     self._end(worker)
-                    worker, row = None, self._after_death(task)
+                    row, worker = (
+                        self._after_death(task, worker.why() if worker else "it cannot be started"),
+                        None,
+                    )
+                else:
+                    self._first_deaths = None
                 if row is not None:
                     self._add(self._on_done(task, row))
         finally:
             self._end(worker)
+
+    def _progressed(self, task: Task, progress: TaskProgress) -> None:
+        self._first_deaths = None
+        self._on_progress(task, progress)
 
     def _next(self) -> Task | None:
         with self._lock:
@@ -214,14 +246,18 @@ class Pool:
         with self._lock:
             self._workers.discard(worker)
 
-    def _after_death(self, task: Task) -> BatchRow | None:
+    def _after_death(self, task: Task, why: str) -> BatchRow | None:
         """Queue the task again, last of all, and return None; a failed row after ``MAX_DEATHS``."""
         if self._stopped.is_set():
             return None
-        self._deaths[task.title] += 1
-        if self._deaths[task.title] < MAX_DEATHS:
-            with self._lock:
+        with self._lock:
+            self._deaths[task.title] += 1
+            if self._first_deaths is not None:
+                self._first_deaths += 1
+                if self._first_deaths >= MAX_DEATHS:
+                    self._hopeless = f"no worker can work here, {MAX_DEATHS} died at once: {why[:80]}"
+            if self._deaths[task.title] < MAX_DEATHS:
                 self._waiting.append(task)
-            return None
-        words = f"its worker died {MAX_DEATHS} times; is there memory enough for --workers?"
+                return None
+        words = f"its worker died {MAX_DEATHS} times ({why[:80]}); is there memory enough for --workers?"
         return failed(task.title, task.source, words, 1)

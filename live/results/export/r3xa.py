@@ -27,15 +27,15 @@ def write_r3xa(job: ExportJob, path: Path) -> None:
     with new_folder(path) as folder:
         with (folder / "means.csv").open("x", encoding="utf-8", newline="\n") as file:
             means(job, file, notes=False)
-        samples = job.run.load_samples
-        if samples:
+        loaded = len(job.run.load_curve[0]) > 0
+        if loaded:
             with (folder / "load.csv").open("x", encoding="utf-8", newline="\n") as file:
-                load_table(job.run, samples, file)
+                load_table(job.run, file)
         (folder / _FIELDS).mkdir()
         for k, row in job.steps():
             with (folder / _FIELDS / _table(k)).open("x", encoding="utf-8", newline="\n") as file:
                 field_table(job, row, file)
-        text = json.dumps(describe(job, path, bool(samples)), indent=1, ensure_ascii=False)
+        text = json.dumps(describe(job, path, loaded), indent=1, ensure_ascii=False)
         (folder / "r3xa.json").write_text(text + "\n", encoding="utf-8")
 
 

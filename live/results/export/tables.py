@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.load_sample import LoadSample
 from live.results.export.atomic_file import new_file, new_folder
 from live.results.export.job import ExportJob
 from live.results.quantities import mean_name, quantity_of
@@ -76,10 +75,10 @@ def field_table(job: ExportJob, number: int, file: TextIO) -> None:
     _rows(file, [*_positions(job), *_values(job, number)])
 
 
-def load_table(run: RunFolder, samples: Sequence[LoadSample], file: TextIO) -> None:
+def load_table(run: RunFolder, file: TextIO) -> None:
     """All readings of the load cell, seconds since the start of the test."""
     _line(file, ["time_s", "force_N"])
-    _rows(file, [[s.t - run.start_monotonic for s in samples], [s.force for s in samples]])
+    _rows(file, run.load_curve)
 
 
 def _long(job: ExportJob, file: TextIO) -> None:

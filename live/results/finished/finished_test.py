@@ -97,11 +97,8 @@ class FinishedTest:
     def of_folder(cls, run: RunFolder) -> FinishedTest:
         """A finished run, from its files."""
         t, corrected = run.strain.time_s, run.section("load").get("lag_s")
-        recorded = run.load_samples
-        samples = Track(
-            np.array([sample.t - run.start_monotonic for sample in recorded], np.float64),
-            np.array([sample.force for sample in recorded], np.float64),
-        )
+        samples = Track(*run.load_curve)
+        recorded = len(samples.t) > 0
         at_bursts = Track(np.asarray(t, np.float64), run.force)
         return cls(
             run.curve,

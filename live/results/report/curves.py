@@ -120,12 +120,7 @@ def gauge_strains(run: RunFolder) -> Plot | None:
 
 def force(run: RunFolder) -> Plot | None:
     """Force against time, with every reading of the load cell where a session has them; None without force."""
-    samples = run.load_samples
-    if samples:
-        t = np.array([s.t - run.start_monotonic for s in samples])
-        f = np.array([s.force for s in samples])
-    else:
-        t, f = run.strain.time_s, run.force
+    t, f = run.load_curve if len(run.load_curve[0]) else (run.strain.time_s, run.force)
     if not np.isfinite(f).any():
         return None
     unit = force_unit(f)

@@ -251,10 +251,9 @@ def _curves(run: RunFolder) -> Iterator[Parcel]:
     yield rows_message(Kind.MEANS, zip(t, *columns, strict=True))
     for name, gauge in run.gauges.items():
         yield rows_message(Kind.GAUGE, zip(t, gauge.value, gauge.sigma, strict=True), name)
-    loads = [(t[row], run.force[row]) for row in range(run.strain.n)]
-    if run.load_samples:
-        loads = [(sample.t - run.start_monotonic, sample.force) for sample in run.load_samples]
-    yield rows_message(Kind.LOADS, (row for row in loads if math.isfinite(row[1])))
+    times, forces = run.load_curve if len(run.load_curve[0]) else (t, run.force)
+    known = np.isfinite(forces)
+    yield rows_message(Kind.LOADS, zip(times[known].tolist(), forces[known].tolist(), strict=True))
 
 
 def _points(run: RunFolder, start: int, stop: int) -> list[tuple[float, float]]:

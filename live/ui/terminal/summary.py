@@ -112,7 +112,7 @@ def trouble_lines(
     """The frame counts, the outputs that lost something (all if ``verbose``), and the last warning or error."""
     yield run_state.frame_counts.line()
     yield from (
-        f"  {report.line()}" for report in reports if verbose or report.failed or any(report.dropped.values())
+        f"  {one.line()}" for one in reports if verbose or one.failed or one.lost or any(one.dropped.values())
     )
     warnings = run_state.event_log.events("warning", "error")
     if warnings:

@@ -75,14 +75,14 @@ class RequestGuard:
         return hmac.compare_digest(text.encode(), self.token.encode())
 
     def check_host(self, headers: Message) -> None:
-        """Raise ``HttpError`` unless the request is for this address and not sent by a page of another site."""
+        """Raise ``HttpError`` unless the request is for this address."""
         if headers.get("Host", "") != self.host:
             raise HttpError(403, "this is not the address of the page")
-        if headers.get("Sec-Fetch-Site", "same-origin") not in ("same-origin", "none"):
-            raise HttpError(403, "requested by a page of another site")
 
     def check_cookie(self, headers: Message) -> None:
-        """Raise ``HttpError`` unless the cookie contains the token."""
+        """Raise ``HttpError`` unless the cookie contains the token and no page of another site sends the request."""
+        if headers.get("Sec-Fetch-Site", "same-origin") not in ("same-origin", "none"):
+            raise HttpError(403, "requested by a page of another site")
         try:
             morsel = SimpleCookie(headers.get("Cookie", "")).get(self._cookie_name)
         except CookieError:

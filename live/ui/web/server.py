@@ -301,15 +301,16 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(_file(parts.path))
 
     def _log_in(self, token: str) -> None:
-        """Put the token into a cookie, and remove it from the address, where others could read it."""
+        """Put the token into a cookie, and remove it from the address, where others could read it.
+
+        A page of its own does so: to a redirection of the file that opened it, no browser sends the cookie.
+        """
         guard = self.server.page.guard
         if not guard.is_token(token):
             raise HttpError(403, "a wrong token; open the address that phasedic has printed")
-        self.send_response(303)
-        self.send_header("Location", "/")
-        self.send_header("Set-Cookie", guard.cookie)
-        self.send_header("Content-Length", "0")
-        self.end_headers()
+        self._send(
+            Response(b'<meta http-equiv="refresh" content="0; url=/">', _TYPES["html"]), cookie=guard.cookie
+        )
 
     def _post(self) -> None:
         page = self.server.page
@@ -351,12 +352,14 @@ class _Handler(BaseHTTPRequestHandler):
         finally:
             broadcaster.remove(subscriber)
 
-    def _send(self, response: Response, status: int = 200) -> None:
-        self._head(status, response.kind, response.policy, len(response.content))
+    def _send(self, response: Response, status: int = 200, cookie: str = "") -> None:
+        self._head(status, response.kind, response.policy, len(response.content), cookie)
         self.wfile.write(response.content)
 
-    def _head(self, status: int, kind: str, policy: str, length: int | None) -> None:
+    def _head(self, status: int, kind: str, policy: str, length: int | None, cookie: str = "") -> None:
         self.send_response(status)
+        if cookie:
+            self.send_header("Set-Cookie", cookie)
         self.send_header("Content-Type", kind)
         if length is not None:
             self.send_header("Content-Length", str(length))

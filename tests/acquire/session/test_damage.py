@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -47,6 +48,29 @@ def test_a_damaged_unfinished_file_is_tried_in_a_child_with_a_time_limit(
     monkeypatch.setattr(child, "PROBE_S", 2.0)
     with pytest.raises(DataError):
         Session.open(path)
+
+
+@pytest.mark.parametrize(
+    ("script", "refused"),
+    [
+        ("for _ in range(6): time.sleep(1.0); said[0] = 0.0; still_reading()", ""),
+        ("time.sleep(60)", "does not come to an end"),
+        ("said[0] = 0.0; still_reading(); time.sleep(60)", "does not come to an end"),
+        ("said[0] = 0.0; still_reading(); print('why'); sys.exit(4)", "^why$"),
+        ("sys.exit(3)", r"the HDF5 library fails on it \(3\)"),
+    ],
+)
+def test_a_long_file_may_take_long_as_long_as_its_reading_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, refused: str
+) -> None:
+    """A recording of 75 minutes at 1 kHz needs more than the limit, and is whole."""
+    head = "import sys, time\nfrom acquire.hdf5.damage import still_reading, _said as said\n"
+    monkeypatch.setattr(child, "python_command", lambda *words: [sys.executable, "-c", head + script])
+    if refused:
+        with pytest.raises(DataError, match=refused):
+            child.probe(tmp_path / "session.h5", "none", timeout_s=1.5)
+    else:
+        child.probe(tmp_path / "session.h5", "none", timeout_s=5.0)
 
 
 @pytest.mark.parametrize("start", [math.nan, math.inf, 2e12])
@@ -143,7 +167,11 @@ def test_of_a_file_cut_to_half_the_frames_that_are_there_are_saved(tmp_path: Pat
     with pytest.raises(DataError, match=r"is truncated: .* or save what is there with 'phasedic recover'"):
         Session.open(path)
     done = recover(path)
-    assert 200 < done.frames < 400 and any(f"{600 - done.frames} of 600 frames" in s for s in done.unreadable)
+    assert 200 < done.frames < 400 and done.load_samples == 512
+    assert not any("run backwards" in words for words in done.unreadable), "padding is no time"
+    counts = [found for words in done.unreadable if (found := re.match(r"(\d+) of \d+ frames", words))]
+    assert sum(int(found[1]) for found in counts) == 600 - done.frames
+    assert any(words.startswith("88 of 600 load have no time") for words in done.unreadable)
     with Session.open(done.path) as back:
         assert len(back) == done.frames
         for k, found in enumerate(back.frames()):

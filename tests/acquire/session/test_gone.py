@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import fcntl
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,11 @@ import pytest
 
 from acquire.errors import DataError
 from acquire.hdf5 import damage
-from acquire.session import Session
+from acquire.session import RotatingWriter, Session
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import FrameCounts
 from live.run.recorder import Recorder
-from tests.acquire.session.fixtures import frame, writer
+from tests.acquire.session.fixtures import frame, info, writer
 
 
 def renamed(path: Path) -> None:
@@ -52,6 +53,20 @@ def test_the_next_frame_is_refused_and_those_before_are_lost(
         with pytest.raises(DataError, match=words):
             session.write_frame(frame(3))
         assert session.is_gone and session.unflushed_frames == lost
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no other system tells the name of an open file")
+def test_a_folder_that_is_renamed_takes_the_recording_along(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    size = frame(0).image.nbytes
+    with RotatingWriter(tmp_path / "run" / "session.h5", info(), 2 * size) as session:
+        session.write_frame(frame(0))
+        (tmp_path / "run").rename(tmp_path / "other")
+        for number in range(1, 5):
+            session.write_frame(frame(number))
+    with Session.open(tmp_path / "other" / "session.h5") as back:
+        assert back.recovered is None and back.indices.tolist() == [frame(k).index for k in range(5)]
+    assert len(list((tmp_path / "other").iterdir())) == 3 and not (tmp_path / "run").exists()
 
 
 def test_it_is_noticed_at_the_end_where_nothing_came_any_more(path: Path) -> None:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import tracemalloc
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from acquire.addresses import parse_address
 from acquire.clock import ClockPair
@@ -17,9 +20,10 @@ from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
-from acquire.session import Session
+from acquire.session import Session, loads
 from acquire.session.devices import open_session_camera, open_session_load
 from acquire.session.layout import FORMAT_VERSION, image_dtype
+from acquire.session.stored import read_column
 from acquire.session.writer import FLUSH_S
 from tests.acquire.session.fixtures import CAMERA, LOAD, START, frame, sample, writer
 from tests.clock import Clock
@@ -53,6 +57,64 @@ def test_frames_come_back_bit_equal(path: Path) -> None:
         assert [f.index for f in back.frames(1, 3)] == [8, 9]
         assert back.times.tolist() == [f.t for f in frames]
         assert back.indices.tolist() == [f.index for f in frames]
+
+
+@pytest.mark.parametrize("size", [1, 4, 5, 100])
+def test_load_samples_are_read_by_the_piece(path: Path, monkeypatch: pytest.MonkeyPatch, size: int) -> None:
+    monkeypatch.setattr(loads, "PIECE", size)
+    samples = [sample(k) for k in range(23)]
+    with writer(path) as session:
+        for one in samples:
+            session.write_load(one)
+        session.flush()
+        path.with_name("killed.h5").write_bytes(path.read_bytes())
+    for file in (path, path.with_name("killed.h5")):
+        with Session.open(file) as back:
+            for a, b in zip(samples, back.load_samples(), strict=True):
+                assert_same_sample(a, b)
+            low, high = samples[6].t, samples[17].t
+            for a, b in zip(samples[6:18], back.each_load_sample(low, high), strict=True):
+                assert_same_sample(a, b)
+            assert list(back.each_load_sample(high + 1e6)) == []
+            times, forces = back.load_curve()
+            np.testing.assert_array_equal(times, [one.t for one in samples])
+            np.testing.assert_array_equal(forces, [one.force for one in samples])
+
+
+def test_of_other_times_no_load_sample_is_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with writer(path) as session:
+        for k in range(40):
+            session.write_load(sample(k))
+    read: list[tuple[str, int]] = []
+
+    def noted(item: h5py.Dataset, n: int, missing: object, *, first: int, whole: bool) -> NDArray[Any]:
+        read.append((item.name.rpartition("/")[2], n - first))
+        return read_column(item, n, missing, first=first, whole=whole)
+
+    with Session.open(path) as back:
+        monkeypatch.setattr(loads, "PIECE", 10)
+        monkeypatch.setattr(loads, "read_column", noted)
+        monkeypatch.setattr(loads.LoadTable, "_raw_lines", lambda self, rows, ends: [b""] * len(rows))
+        assert len(list(back.each_load_sample(high=sample(3).t))) == 4
+    assert {count for name, count in read if name == "force"} == {10}
+    assert sum(count for name, count in read if name == "force") == 10
+
+
+def test_a_load_curve_is_no_list_of_objects(path: Path) -> None:
+    n = 20_000
+    with writer(path) as session:
+        for k in range(n):
+            session.write_load(LoadSample(START.monotonic + k, float(k), raw=b"%d N" % k))
+    peaks = []
+    with Session.open(path) as back:
+        for read in (back.load_curve, lambda: sum(1 for _ in back.each_load_sample()), back.load_samples):
+            tracemalloc.start()
+            found = read()
+            peaks.append(tracemalloc.get_traced_memory()[1])
+            tracemalloc.stop()
+            del found
+    curve, one_by_one, objects = peaks
+    assert curve < objects / 4 and one_by_one < objects / 1.3
 
 
 def test_eight_bit_frames(path: Path) -> None:

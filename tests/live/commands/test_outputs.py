@@ -20,6 +20,7 @@ from live.results.sides.channels import JointChannels
 from tests.live.made_run import UTC_START
 from tests.live.made_up import CAMERA, START, make_grid
 
+SAID = "an output: strains and forces to all; it takes no commands"
 LINE = {"gauges.mid": {"kind": "line", "start": [20, 20], "end": [20, 70]}}
 
 
@@ -36,7 +37,7 @@ class Said(Screen):
 class Out:
     """A strain output that only keeps what it was made of."""
 
-    name, ended = "an output", False
+    name, to_whom, ended = "an output", "to all", False
 
     def __init__(self, *made: Any) -> None:
         self.made = made
@@ -70,7 +71,7 @@ def test_each_output_is_opened_at_its_address(monkeypatch: pytest.MonkeyPatch) -
     tcp, udp, serial = found
     assert (tcp.made[0], tcp.made[1]) == ((OUTPUT_NAME, 5006), "")
     assert udp.made[:2] == ("127.0.0.1", 5005)
-    assert serial.made[0] == LineSettings("/dev/ttyUSB1", 9600) and screen.lines == ["an output"] * 3
+    assert serial.made[0] == LineSettings("/dev/ttyUSB1", 9600) and screen.lines == [SAID] * 3
     usual = signals_of(
         about(load_config(None, {"strain_out.serial": "/dev/ttyUSB1"})), RunState.new(1.0), Said(), None
     )

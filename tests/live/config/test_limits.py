@@ -164,6 +164,7 @@ def test_a_hysteresis_is_not_below_zero(hysteresis: float) -> None:
         ("lens.box", [0, 0, 0.1, 0.1], [0, -0.1, 0.1, 0.1]),
         ("strain_out.channels", ["axial"] * 64, ["axial"] * 65),
         ("strain_out.channels", ["axial"], []),
+        ("operate.orders", "socket", "sockets"),
         ("operate.orders", "0", "1023"),
         ("operate.orders", "1024", "65536"),
         ("operate.orders", "192.168.0.1:65535", "here:65535"),

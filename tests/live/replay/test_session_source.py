@@ -89,7 +89,8 @@ def source(
     samples = [LoadSample(START + t, 10.0 * t + 100.0) for t in (0.0, 0.2, 0.4, 0.6, 1.4)]
     tare = Event(START + 0.5, EventKind.TARE, "a cell", "", "info", {"step_N": 100.0})
     session: Any = Recorded(
-        load_samples=lambda: iter(samples), events=lambda: iter((*events, tare)), mode=RecordMode.parse(mode),
+        each_load_sample=lambda high: (one for one in samples if one.t <= high),
+        events=lambda: iter((*events, tare)), mode=RecordMode.parse(mode),
         start_monotonic=START, start_utc="now", camera=CAMERA,
     )  # fmt: skip
     given = {"overrides": {}, "as_measured": False} | asked
@@ -108,7 +109,22 @@ def test_forces_have_the_lag_the_gap_and_the_tares_of_the_recording(monkeypatch:
     assert found.loads.zero_at(START + 0.4) == 0.0 and found.loads.zero_at(START + 0.6) == 100.0
     wide, _ = source(monkeypatch, settings={"load.max_gap_s": 1.0})
     assert wide.loads.force_at(START + 0.9) == pytest.approx(109.0)
-    assert wide.loads.force_at(START + 0.2) == pytest.approx(102.0) and len(wide.samples) == 5
+    assert wide.loads.force_at(START + 0.2) == pytest.approx(102.0) and len(list(wide.samples)) == 5
+
+
+def test_of_the_load_what_comes_after_the_window_and_the_reference_is_not_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "BESIDE_S", 0.1)
+    asked = {"settings": {"load.max_gap_s": 0.3}, "end_s": 0.1, "events": EVENTS[:1]}
+    found, _ = source(monkeypatch, **asked)
+    until = max(START + 0.1, found.reference.t) + 0.4
+    assert [one.t for one in found.samples] == [
+        START + t for t in (0.0, 0.2, 0.4, 0.6, 1.4) if START + t <= until
+    ]
+    assert len(found.loads) == len(list(found.samples)) < 5
+    turned, _ = source(monkeypatch, **{**asked, "settings": {"load.max_gap_s": 0.3, "load.sign": -1}})
+    assert [one.force for one in turned.samples] == [-one.force for one in found.samples]
 
 
 def test_the_reference_is_the_last_that_was_used_and_no_renewed_one(monkeypatch: pytest.MonkeyPatch) -> None:

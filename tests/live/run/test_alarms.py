@@ -19,12 +19,13 @@ from acquire.events import Event, EventKind
 from acquire.session import Session
 from hw_mocks.indicator_server import PtyPort
 from live.cli import main
+from live.config.listen_address import SOCKET
 from live.config.loading import from_dict, load_config
 from live.config.sections import AlarmConfig
 from live.pipeline.run_state import ActiveAlarms, Health
 from live.pipeline.screen import Screen
 from live.run.alarms import ACTIONS, ActionMeans, Alarm, AlarmWatch, actions_of, check_alarms
-from live.run.control import ControlPort, answer
+from live.run.control import SOCKET_NAME, ControlPort, answer
 from live.run.live_run import run_live
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.run.test_strain_output import Listener, free_port, read
@@ -287,7 +288,7 @@ def measured(lines: Iterable[str | bytes]) -> dict[str, Any]:
 def test_a_test_with_all_that_there_is(tmp_path: Path) -> None:
     folder, again, port, serial = tmp_path / "run", tmp_path / "again", free_port(), PtyPort()
     controls, listeners, answers = (
-        ControlPort("0", None, TerminalScreen(quiet=True)),
+        ControlPort(SOCKET, None, TerminalScreen(quiet=True)),
         list[Listener](),
         list[str](),
     )
@@ -296,7 +297,8 @@ def test_a_test_with_all_that_there_is(tmp_path: Path) -> None:
         if m.number == 3:
             listeners.append(Listener(port))
         if m.number == 20:
-            caller = Caller(controls.open(live))
+            controls.open(live, live.folder)
+            caller = Caller(live.folder / SOCKET_NAME)
             answers.extend(caller.ask(line) for line in ("note half way", "start", "alarm off"))
             caller.close()
 

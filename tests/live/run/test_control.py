@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import stat
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,12 @@ from hypothesis import strategies as st
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, Level
 from acquire.load_sample import LoadCellInfo, LoadSample
+from live.config.listen_address import SOCKET
 from live.run.control import (
     ENDED,
     FORCED,
     ONCE,
+    SOCKET_NAME,
     START,
     STOP,
     UNDO,
@@ -111,27 +114,62 @@ def test_a_note_cannot_command_a_terminal() -> None:
     assert live.calls == [(EventKind.NOTE, "\\x1b[2Jgone")]
 
 
-def test_orders_are_carried_out_and_answered() -> None:
+def test_orders_are_carried_out_and_answered_on_a_socket_of_this_user_alone(tmp_path: Path) -> None:
     live, said = FakeLive(), io.StringIO()
-    port = ControlPort("0", None, TerminalScreen(said))
-    caller = Caller(port.open(live))
+    port = ControlPort(SOCKET, None, TerminalScreen(said))
+    assert port.open(live, tmp_path) == 0
+    where = tmp_path / SOCKET_NAME
+    assert stat.filemode(where.stat().st_mode) == "srw-------"
+    caller = Caller(where)
     asked = [caller.ask(line) for line in ("pause", "note slipped", "nonsense", "quit")]
     assert asked[:2] == ["ok", "ok"] and asked[2].startswith("no: ") and asked[3] == "ok"
     assert live.calls == [(EventKind.PAUSE, ""), (EventKind.NOTE, "slipped"), ("stop", ENDED)]
-    assert "commands are taken at 127.0.0.1:" in said.getvalue()
+    assert f"commands are taken at {where} (of this user alone)" in said.getvalue()
     caller.close()
     port.close()
     port.close()
+    assert not where.exists()
+
+
+def test_the_socket_goes_with_its_folder_and_is_removed_there(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    port = ControlPort(SOCKET, None, TerminalScreen(quiet=True))
+    port.open(FakeLive(), tmp_path / "run")
+    (tmp_path / "run").rename(tmp_path / "elsewhere")
+    caller = Caller(tmp_path / "elsewhere" / SOCKET_NAME)
+    assert caller.ask("pause") == "ok"
+    caller.close()
+    port.close()
+    assert not list(tmp_path.glob("*/*"))
+
+
+def test_a_folder_that_takes_no_socket_is_named(tmp_path: Path) -> None:
+    folder = tmp_path / ("long" * 40)
+    folder.mkdir()
+    for place in (folder, tmp_path):
+        (place / SOCKET_NAME).touch()
+        port = ControlPort(SOCKET, None, TerminalScreen(quiet=True))
+        with pytest.raises(
+            ConfigError, match=r"the port for commands: .* cannot be made .*choose another --out"
+        ):
+            port.open(FakeLive(), place)
+        port.close()
+
+
+def test_a_port_takes_commands_with_a_token_only() -> None:
+    with pytest.raises(ConfigError, match=r"every user can reach .*token_file"):
+        ControlPort("0", None, TerminalScreen(quiet=True))
 
 
 def test_beyond_this_machine_only_with_a_token(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="token_file"):
         ControlPort("0.0.0.0:0", None, TerminalScreen(io.StringIO()))
     path = tmp_path / "token"
+    path.touch(0o600)
     path.write_text(WORD)
     live = FakeLive()
     port = ControlPort("0.0.0.0:0", str(path), TerminalScreen(io.StringIO()))
-    number = port.open(live)
+    number = port.open(live, tmp_path)
     wrong = Caller(number)
     assert wrong.ask("quit").startswith("no: ")
     wrong.close()

@@ -33,12 +33,12 @@ def server(**kinds: object) -> Iterator[LineServer]:
 class Caller:
     """A client that blocks, with lines."""
 
-    def __init__(self, port: int, receive_buffer: int = 0) -> None:
-        self.socket = socket.socket()
+    def __init__(self, port: int | Path, receive_buffer: int = 0) -> None:
+        self.socket = socket.socket(socket.AF_UNIX if isinstance(port, Path) else socket.AF_INET)
         if receive_buffer:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
         self.socket.settimeout(5)
-        self.socket.connect(("127.0.0.1", port))
+        self.socket.connect(str(port) if isinstance(port, Path) else ("127.0.0.1", port))
         self.lines = self.socket.makefile("r", encoding="utf-8", newline="\n")
 
     def ask(self, text: str) -> str:
@@ -156,13 +156,21 @@ def test_beyond_this_machine_only_with_a_token(tmp_path: Path) -> None:
     assert read_token(here, None, "it") == ""
     with pytest.raises(ConfigError, match="token_file"):
         read_token(everywhere, None, "it")
+    with pytest.raises(ConfigError, match=r"every user can reach 127\.0\.0\.1; give token_file"):
+        read_token(here, None, "it", commands=True)
     path = tmp_path / "token"
+    path.touch(0o600)
     for bad in ("", "short", "two words that are long"):
         path.write_text(bad)
         with pytest.raises(ConfigError, match="16 letters"):
             read_token(everywhere, str(path), "it")
     path.write_text(WORD + "\n")
-    assert read_token(everywhere, str(path), "it") == WORD
+    assert read_token(everywhere, str(path), "it") == read_token(here, str(path), "it") == WORD
+    for others in (0o640, 0o604, 0o622):
+        path.chmod(others)
+        with pytest.raises(ConfigError, match="other users can read the token; make a new one, of mode 600"):
+            read_token(here, str(path), "it")
+    path.chmod(0o600)
     with pytest.raises(ConfigError, match="no token"):
         read_token(here, str(tmp_path / "none"), "it")
 

@@ -46,6 +46,14 @@ def test_only_this_host(host: str) -> None:
         GUARD.check_host(headers(Host=host))
 
 
+@pytest.mark.parametrize("site", ["cross-site", "same-site", ""])
+def test_only_this_site(site: str) -> None:
+    cookie = f"phasedic_8080={TOKEN}"
+    GUARD.check_cookie(headers(Cookie=cookie, Sec_Fetch_Site="same-origin"))
+    with pytest.raises(HttpError):
+        GUARD.check_cookie(headers(Cookie=cookie, Sec_Fetch_Site=site))
+
+
 @pytest.mark.parametrize("length", ["1000001", "9" * 13, "-1", "1e3", ""])
 def test_the_length_of_what_is_posted(length: str) -> None:
     kind = {"Origin": "http://127.0.0.1:8080", "Content_Type": "application/json"}

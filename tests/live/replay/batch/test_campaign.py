@@ -213,6 +213,9 @@ class Dying:
 
     kill = end
 
+    def why(self) -> str:
+        return "signal 9"
+
 
 def test_a_task_whose_worker_dies_is_tried_three_times_after_all_others() -> None:
     processes, rows = Dying("a"), dict[str, BatchRow]()
@@ -228,6 +231,9 @@ def test_a_task_whose_worker_dies_is_tried_three_times_after_all_others() -> Non
     assert pool.wait(0.1)
     assert processes.tried == ["a", "b", "z", "c", "a", "a"]
     assert (processes.taken, processes.ended) == (3, 3), "a new one after each death"
-    assert rows["a"].values["error"] == "its worker died 3 times; is there memory enough for --workers?"
+    assert (
+        rows["a"].values["error"]
+        == "its worker died 3 times (signal 9); is there memory enough for --workers?"
+    )
     assert rows["z"].is_well and rows["a"].values["exit_code"] == 1
     pool.close()

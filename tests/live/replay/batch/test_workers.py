@@ -155,7 +155,7 @@ def test_no_worker_can_be_started_any_more(tmp_path: Path, caplog: pytest.LogCap
     pool = Pool(tasks, 2, lambda task, progress: None, lambda task, row: rows.append(row) or (), Empty(0))
     assert pool.wait(LONG_S)
     assert len(rows) == 3
-    assert all("memory enough" in str(row.values["error"]) for row in rows)
+    assert all("3 died at once: it cannot be started" in str(row.values["error"]) for row in rows)
     assert "too many" in caplog.text
 
 
@@ -229,3 +229,73 @@ def test_a_worker_of_a_cluster_reports_its_progress_every_two_seconds(
     found = worker.perform_on_worker(line, str(tmp_path), "topic")
     assert found["test"] == "0001" and Path.cwd() == before
     assert sent == [("topic", ["a#0001", k, 9, 10 * k]) for k in (0, 2, 4)]
+
+
+DIES = """import os, sys
+print("Traceback (most recent call last):", file=sys.stderr)
+print("ImportError: libsomething.so.3: cannot open shared object file", file=sys.stderr)
+print(file=sys.stderr)
+sys.exit(1)"""
+
+
+def dying(monkeypatch: pytest.MonkeyPatch, script: str) -> None:
+    monkeypatch.setattr(
+        "live.replay.batch.worker_processes.python_command", lambda module: [sys.executable, "-c", script]
+    )
+
+
+@pytest.mark.parametrize("workers", [1, 4])
+def test_where_every_worker_dies_at_once_it_stops_with_the_error_of_the_worker(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], workers: int
+) -> None:
+    dying(monkeypatch, DIES)
+    tasks = [Task(str(k), str(tmp_path), "nothing.h5", key="key") for k in range(12)]
+    rows: list[BatchRow] = []
+    processes = Counted(0)
+    pool = Pool(
+        tasks, workers, lambda task, progress: None, lambda task, row: rows.append(row) or (), processes
+    )
+    while not pool.wait(0.05):
+        pass
+    pool.close()
+    assert len(processes.taken) < 3 + workers, "those that had begun"
+    assert sorted(int(str(row.values["test"])) for row in rows) == list(range(12))
+    words = {str(row.values["error"]) for row in rows}
+    assert words == {
+        "no worker can work here, 3 died at once: ImportError: libsomething.so.3: cannot open shared object file"
+    }
+    assert capfd.readouterr().err.count("ImportError") == len(processes.taken), "it is passed on"
+
+
+def test_how_a_worker_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    for script, why in (
+        ("import os; os.kill(os.getpid(), 9)", "signal 9"),
+        ("import os; os.write(2, b'no memory\\n'); os.kill(os.getpid(), 9)", "no memory; signal 9"),
+        ("raise SystemExit(7)", "exit code 7"),
+    ):  # fmt: skip
+        dying(monkeypatch, script)
+        worker = WorkerProcess()
+        worker._process.wait(LONG_S)
+        worker.end()
+        assert worker.why() == why
+
+
+def test_a_task_that_kills_its_worker_stops_no_others_once_one_was_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = """import json, os, sys
+for line in sys.stdin:
+    if json.loads(line)["name"] != "0": os.kill(os.getpid(), 9)
+    print(json.dumps({"row": {"test": "0", "outcome": "measured"}}), flush=True)"""
+    dying(monkeypatch, script)
+    tasks = [Task(str(k), str(tmp_path), "nothing.h5", key="key") for k in range(3)]
+    rows: list[BatchRow] = []
+    processes = Counted(0)
+    pool = Pool(tasks, 1, lambda task, progress: None, lambda task, row: rows.append(row) or (), processes)
+    while not pool.wait(0.05):
+        pass
+    pool.close()
+    words = [str(row.values.get("error")) for row in rows[1:]]
+    assert len(processes.taken) == 6 and all(
+        one == "its worker died 3 times (signal 9); is there memory enough for --workers?" for one in words
+    )

@@ -220,7 +220,7 @@ def test_the_settings_and_the_words_of_a_finished_run(tmp_path: Path) -> None:
         means, *_, loads = playback._curves(run)
         assert rows_of(means)[3][3:5] == (run.strain.values["eyy"][3], run.strain.values["sigma_eyy"][3])
         assert [row[0] for row in rows_of(loads)][:3] == pytest.approx([0.0, 0.1, 0.2], abs=1e-9)
-        run.__dict__["load_samples"] = []
+        run.__dict__["load_curve"] = (np.empty(0), np.empty(0))
         run.strain.values["force_N"][1] = np.nan
         *_, loads = playback._curves(run)
         assert [row[0] for row in rows_of(loads)][:2] == pytest.approx([0.0, 0.2])

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import itertools
+import webbrowser
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import cv2
 import numpy as np
 import pytest
 
+from live.commands.attended import page_opened
 from live.config.loading import load_config
 from live.setup.pictures import read_mask
+from live.ui.terminal.screen import TerminalScreen
 from live.ui.web.authorization import RequestGuard
+from live.ui.web.page_controller import PageController
 from tests.live.setup.test_scale import CHARUCO, seen
+from tests.live.ui.waiting import until
 from tests.live.ui.web.browser import Page, Program
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
@@ -69,6 +75,22 @@ def test_from_nothing_to_a_report(browser: Any, tmp_path: Path, start: Callable[
         "requests another host"
     )
     assert not [one for one in page.errors if "ERR_" not in one], page.errors
+
+
+def test_a_browser_comes_to_the_page_by_the_file_that_it_is_given(
+    browser: Any, start: Callable[..., Program], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = start("page", "--camera", CAMERA, "--load", "sim:", "--no-view", "--no-rrd", "--page-port", "0")
+    given: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", lambda address: given.append(address) or True)
+    monkeypatch.setenv("DISPLAY", ":99")
+    screen, controller = TerminalScreen(quiet=True), SimpleNamespace(address=program.address)
+    with page_opened(cast(PageController, controller), screen):
+        until(lambda: given)
+        page = Page(browser.new_context().new_page())
+        page.page.goto(given[0])
+        page.until(lambda: bool(page.text("region")), "the specimen is found")
+    assert page.page.url == program.address.partition("?")[0]
 
 
 def set_up(page: Page, folder: Path) -> None:

@@ -1,0 +1,119 @@
+"""The load samples of a file, read by the piece: a day of them is larger than memory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.hdf5 import open_datasets, stored_rows
+from acquire.load_sample import LoadFlag, LoadSample
+from acquire.session import layout
+from acquire.session.stored import Oddities, Rows, read_column, same_length, usable
+
+PIECE = 1 << 16
+"""Samples that are read at once."""
+_STABLE = {code: word for word, code in layout.STABLE.items()}
+_SAMPLE = ("monotonic_s", "force", "unit", "stable", "flags", "device_ms")
+_CURVE = ("monotonic_s", "force")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadPiece:
+    """Samples in a row: their columns (``layout.LOAD_COLUMNS``), and the line of each; None where it is not there."""
+
+    rows: Rows
+    lines: Sequence[bytes | None]
+
+    def samples(self) -> Iterator[LoadSample]:
+        """Each whose line is there."""
+        columns = [self.rows.columns[name].tolist() for name in _SAMPLE]
+        for t, force, unit, stable, flags, device_ms, line in zip(*columns, self.lines, strict=True):
+            if line is not None:
+                ms = None if math.isnan(device_ms) else device_ms
+                yield LoadSample(
+                    t, force, unit.decode("ascii", "replace"), _STABLE[stable], LoadFlag(flags), line, ms
+                )
+
+
+class LoadTable:
+    """The group ``load`` of a file, with its raw ``lines``; ``whole`` and ``closed`` as of ``stored.read_rows``."""
+
+    def __init__(self, group: h5py.Group, lines: h5py.Dataset, *, whole: bool, closed: bool) -> None:
+        self._group, self._lines, self._whole, self._closed = group, lines, whole, closed
+
+    def pieces(self, low: float = -math.inf, high: float = math.inf) -> Iterator[LoadPiece]:
+        """The samples from ``low`` to ``high`` (monotonic s); of other times nothing but these is read.
+
+        Raises
+        ------
+        DataError, or what ``stored.DAMAGE`` names
+            They cannot be read.
+        """
+        held, n = self._opened()
+        for first in range(0, n, PIECE):
+            last = min(first + PIECE, n)
+            times = self._read(held["monotonic_s"], "monotonic_s", first, last)
+            wanted = (times >= low) & (times <= high)
+            if not wanted.any():
+                continue
+            table = {"monotonic_s": times}
+            table |= {
+                name: self._read(held[name], name, first, last) for name in held if name != "monotonic_s"
+            }
+            good = usable(self._group, table, layout.LOAD_COLUMNS, first, whole=self._whole) & wanted
+            places = np.flatnonzero(good)
+            rows = Rows({name: column[places] for name, column in table.items()}, places + first)
+            yield LoadPiece(rows, self._raw_lines(rows, held["line_end"]))
+
+    def curve(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Times (monotonic s) and forces (N) of all samples, by the piece; raises as ``pieces``."""
+        held, n = self._opened()
+        for first in range(0, n, PIECE):
+            table = {name: self._read(held[name], name, first, min(first + PIECE, n)) for name in _CURVE}
+            good = usable(self._group, table, layout.LOAD_COLUMNS, first, whole=self._whole)
+            yield table["monotonic_s"][good], table["force"][good]
+
+    def troubles(self) -> tuple[str, ...]:
+        """What is left out or odd, for a person; of a whole file by the times alone. Raises as ``pieces``."""
+        (held, n), odd = self._opened(), Oddities("load", closed=self._closed)
+        names = ("monotonic_s",) if self._whole else tuple(held)
+        for first in range(0, n, PIECE):
+            table = {name: self._read(held[name], name, first, min(first + PIECE, n)) for name in names}
+            good = usable(self._group, table, layout.LOAD_COLUMNS, first, whole=self._whole)
+            odd.add(good, table["monotonic_s"][good])
+        return odd.words()
+
+    def _opened(self) -> tuple[dict[str, h5py.Dataset], int]:
+        held = open_datasets(self._group, {name: one.declared() for name, one in layout.LOAD_COLUMNS.items()})
+        return held, same_length(self._group, [*held.values()], whole=self._whole)
+
+    def _read(self, item: h5py.Dataset, name: str, first: int, last: int) -> NDArray[Any]:
+        missing = layout.LOAD_COLUMNS[name].missing
+        return read_column(item, last, missing, first=first, whole=self._whole)
+
+    def _raw_lines(self, rows: Rows, line_end: h5py.Dataset) -> list[bytes | None]:
+        """The line of each sample; None where it is not in the file yet."""
+        if not len(rows):
+            return []
+        first, last = int(rows.places[0]), int(rows.places[-1]) + 1
+        before = read_column(line_end, last, first=max(first - 1, 0), whole=self._whole).astype(np.int64)
+        every = before if first else np.concatenate([[0], before])
+        starts, ends = every[rows.places - first], every[rows.places - first + 1]
+        there = stored_rows(self._lines)
+        if self._whole and (np.any(ends <= starts) or ends.max(initial=0) > there):
+            raise ValueError("the lines of the samples do not follow one another")
+        ends = np.where((starts >= 0) & (ends > starts) & (ends <= there), ends, -1)
+        if not (ends >= 0).any():
+            return [None] * len(rows)
+        begin = int(starts[ends >= 0].min())
+        content = read_column(self._lines, int(ends.max()), first=begin, whole=self._whole).tobytes()
+        return [
+            content[start - begin : end - begin - 1] if end >= 0 else None
+            for start, end in zip(starts.tolist(), ends.tolist(), strict=True)
+        ]
