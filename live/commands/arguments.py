@@ -20,6 +20,8 @@ from live.commands.exit_codes import EXIT_CODES
 EXAMPLES = {
     "run": "phasedic run --camera '/dev/video0?format=Y12&fps=30' --load '/dev/ttyUSB0?protocol=ascii&unit=N' --report",
     "demo": "phasedic demo --specimen hole",
+    "examples": "phasedic examples first-hour",
+    "docs": "phasedic docs troubleshooting",
     "init": "phasedic init --camera '/dev/video0?format=Y12&fps=30' --section 20,2",
     "scale": "phasedic scale --camera /dev/video0 --points 100,200,900,200 --length 25",
     "lens": "phasedic lens 'board/*.png' --checkerboard 9x6 --square 10 --out lens.toml",
@@ -63,6 +65,10 @@ class Entry:
 COMMANDS = {
     "run": Entry("live.commands.run", "measure live and record the session"),
     "demo": Entry("live.commands.demo", "measure a simulated tensile test and compare with its truth"),
+    "examples": Entry(
+        "live.commands.examples", "copy examples to try: pictures of two tests, Python, devices of your own"
+    ),
+    "docs": Entry("live.commands.docs", "show a page of the documentation, or list them"),
     "page": Entry("live.commands.page", "set up, measure and evaluate in the browser"),
     "replay": Entry("live.commands.replay", "measure a recorded session or a folder of pictures"),
     "batch": Entry("live.commands.batch", "replay many sessions or folders of pictures in parallel"),

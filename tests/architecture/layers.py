@@ -68,10 +68,11 @@ LAYERS = {
     "live.cli": "acquire.errors acquire.printable live.commands.arguments live.commands.environment"
     " live.commands.exit_codes live.commands.signals live.commands.streams",
 }
-# One module opens the simulated devices. The demo compares with their truth.
+# One module opens the simulated devices. The demo compares with their truth; the examples have simulated pictures.
 EXCEPTIONS = {
     "live.setup.devices": "hw_mocks",
     "live.commands.demo": "hw_mocks",
+    "live.commands.examples": "hw_mocks",
 }
 
 # Library -> the packages that alone import it.
