@@ -1,7 +1,7 @@
 """A controller of your own: it holds the strain rate of a machine with the strain that phasedic sends over TCP.
 
 It reads lines of JSON from the strain output, drives the machine with a PID on the strain, and ends the test over
-the control port. ``python -m examples.strain_rate`` runs it with a simulated machine, as compliant as real ones: at
+the control port. ``python strain_rate.py`` runs it with a simulated machine, as compliant as real ones: at
 yield, the share of the crosshead travel that reaches the specimen jumps. For your machine, rewrite ``Machine.drive``.
 """
 
@@ -14,12 +14,7 @@ import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from live.commands.consumers import standard_consumers
-from live.config.loading import load_config
-from live.run.control import ControlPort
-from live.run.live_run import LiveRun, run_live
-from live.run.outcome import Outcome
-from live.ui.terminal.screen import TerminalScreen
+from phasedic import ControlPort, LiveRun, Outcome, TerminalScreen, run
 
 STRAIN_PORT, CONTROL_PORT, MACHINE_PORT = 5610, 5611, 5612
 
@@ -119,7 +114,7 @@ def main(folder: str | None = None, rate: float = 5e-4, until: float = 4e-3) -> 
         "strain_out.channels": ["time_s", "axial"],
         "output.dir": folder,
     }
-    config = load_config(None, {key: value for key, value in settings.items() if value is not None})
+    config = {key: value for key, value in settings.items() if value is not None}
     screen = TerminalScreen()
     port = ControlPort(str(CONTROL_PORT), None, screen)
 
@@ -128,7 +123,7 @@ def main(folder: str | None = None, rate: float = 5e-4, until: float = 4e-3) -> 
         threading.Thread(target=control, args=(rate, until), daemon=True).start()
 
     try:
-        return run_live(config, screen, consumers=standard_consumers(screen), on_start=on_start)
+        return run(config, screen=screen, on_start=on_start)
     finally:
         port.close()
 

@@ -47,6 +47,6 @@ def notebook(cells: list[str]) -> str:
         {"cell_type": "markdown", "metadata": {}, "source": cells[0].strip('" \n')}
     ]
     for cell in cells[1:]:
-        made = {"cell_type": "code", "metadata": {}, "execution_count": None, "outputs": []}
+        made: dict[str, Any] = {"cell_type": "code", "metadata": {}, "execution_count": None, "outputs": []}
         parts.append(made | {"source": f"#{cell.rstrip()}"})
     return json.dumps({"cells": parts, "metadata": {}, "nbformat": 4, "nbformat_minor": 4}, indent=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-PACKAGES = ("acquire", "analysis", "hw_mocks", "live")
+PACKAGES = ("acquire", "analysis", "hw_mocks", "live", "phasedic")
 
 # Package -> what it may import besides itself. A line also covers the sub-packages that have none of
 # their own. Imports for a type checker count too.
@@ -53,6 +53,7 @@ LAYERS = {
     **ANALYSIS,
     "hw_mocks": "acquire acquire.camera acquire.load_cell",
     "live": "",  # the version
+    "phasedic": "*",  # the public names of all others
     "live.__main__": "live.cli",
     **{
         layer: " ".join(
