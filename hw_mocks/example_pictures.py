@@ -21,7 +21,7 @@ STRESSES_PA = 1e6 * np.r_[np.arange(0.0, 70.0, 5.0), 80, 100, 150, 200, 250, 285
 """Of the 20 pictures of ``shots``; the first is the reference."""
 RUBBER_NU, STRIP_STRAINS = 0.48, np.r_[np.zeros(4), np.arange(1, 9) * 0.01]
 """Strain of the twelve pictures of ``strip``; four are of the strip at rest, the fourth shifted by hand."""
-SHIFT_PX, NEARER, FILM_FRAMES = (3.4, -2.7), 1.004, 40
+SHIFT_PX, NEARER, FILM_FRAMES = (3.4, -2.7), 1.0008, 40
 BACKGROUND, RULER_PX, NOISE_GL = 0.2, 50, 1.5
 """Grey level beside the strip, part of full scale; px of 5 mm on the ruler; noise of all pictures."""
 
