@@ -108,6 +108,23 @@ def expanded(path: str) -> Path:
         raise ConfigError(f"{path}: there is no such user, so no home folder; give the whole path") from None
 
 
+def as_typed(text: str) -> str:
+    """A path that was dropped into a terminal or a field, as it would be typed: without quotes and ``file://``.
+
+    What is the name of a file or folder stays as it is.
+    """
+    if text.endswith("/") and Path(text).is_file():
+        return text.rstrip("/")
+    bare = text.strip()
+    if _is_there(text) or not bare:
+        return text
+    if len(bare) > 2 and bare[0] == bare[-1] and bare[0] in "'\"":
+        bare = bare[1:-1]
+    if bare.startswith("file://"):
+        bare = unquote(bare.removeprefix("file://"))
+    return bare if bare != text.strip() else text
+
+
 RECORDING = "session.h5"
 
 

@@ -14,7 +14,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from acquire.errors import PhasedicError
 from live.commands.exit_codes import EXIT_CODES
+from live.commands.words import understood
 
 # Shown at the end of the help of each command; a test parses them all.
 EXAMPLES = {
@@ -156,6 +158,10 @@ Command = Callable[[argparse.Namespace], int]
 def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
     """The command and its arguments; help ends the program with exit code 0, bad usage with 2."""
     parser = full_parser([word for word in argv if word in COMMANDS][:1], all_options=HELP_ALL in argv)
+    try:
+        argv = understood(argv)
+    except PhasedicError as error:
+        parser.error(str(error))
     wanted = next((word for word in argv if not word.startswith("-")), "")
     if wanted and wanted not in COMMANDS:
         near = difflib.get_close_matches(wanted, COMMANDS, 1)
