@@ -22,8 +22,10 @@ from acquire.bounds import NotAllowed, as_integer, as_number
 from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
 
-# A glob may hold a question mark too: settings are the last one followed by key=value pairs.
-_SETTINGS = re.compile(r"\?((?:[A-Za-z_]\w*=[^&?]*)(?:&[A-Za-z_]\w*=[^&?]*)*)$")
+# A glob may hold a question mark too: settings are the last one followed by key=value pairs, whose values have none
+# unless they are a pattern or what a device says and takes.
+_PAIR = r"(?:(?:pattern|unstable|overload|underload|error|poll)=[^&]*|[A-Za-z_]\w*=[^&?]*)"
+_SETTINGS = re.compile(rf"\?({_PAIR}(?:&{_PAIR})*)$")
 _SCHEME = re.compile(r"^([A-Za-z][\w+.-]+):")
 
 _SAFE = "/:,@+-_.*~"  # in the value of a setting
