@@ -23,8 +23,10 @@ from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
 from acquire.text import Message
 
-# A glob may hold a question mark too: settings are the last one followed by key=value pairs.
-_SETTINGS = re.compile(r"\?((?:[A-Za-z_]\w*=[^&?]*)(?:&[A-Za-z_]\w*=[^&?]*)*)$")
+# A glob may hold a question mark too: settings are the last one followed by key=value pairs, whose values have none
+# unless they are a pattern or what a device says and takes.
+_PAIR = r"(?:(?:pattern|unstable|overload|underload|error|poll)=[^&]*|[A-Za-z_]\w*=[^&?]*)"
+_SETTINGS = re.compile(rf"\?({_PAIR}(?:&{_PAIR})*)$")
 _SCHEME = re.compile(r"^([A-Za-z][\w+.-]+):")
 
 _SAFE = "/:,@+-_.*~"  # in the value of a setting
@@ -109,6 +111,23 @@ def expanded(path: str) -> Path:
         raise ConfigError(
             "{path}: there is no such user, so no home folder; give the whole path", path
         ) from None
+
+
+def as_typed(text: str) -> str:
+    """A path that was dropped into a terminal or a field, as it would be typed: without quotes and ``file://``.
+
+    What is the name of a file or folder stays as it is.
+    """
+    if text.endswith("/") and Path(text).is_file():
+        return text.rstrip("/")
+    bare = text.strip()
+    if _is_there(text) or not bare:
+        return text
+    if len(bare) > 2 and bare[0] == bare[-1] and bare[0] in "'\"":
+        bare = bare[1:-1]
+    if bare.startswith("file://"):
+        bare = unquote(bare.removeprefix("file://"))
+    return bare if bare != text.strip() else text
 
 
 RECORDING = "session.h5"

@@ -1,6 +1,6 @@
 """Many sessions with the same settings: replayed one after the other, then compared on one page.
 
-``python -m examples.batch RUNS OUT --zoi 32 --step 8`` replays every session.h5 below RUNS. Results that exist in OUT
+``python batch.py RUNS OUT --zoi 32 --step 8`` replays every session.h5 below RUNS. Results that exist in OUT
 are not made again, so an interrupted batch can be continued.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from live.cli import main as phasedic
+from phasedic import main as phasedic
 
 MEASURED = (0, 5)  # exit codes: all well, or finished with loss
 

@@ -1,6 +1,6 @@
 """A finished run from Python, step by step: curve, maps, pictures, export, report.
 
-``python -m examples.finished_run RUN_DIR`` prints figures of the run and writes into ``RUN_DIR/from_python``.
+``python finished_run.py RUN_DIR`` prints figures of the run and writes into ``RUN_DIR/from_python``.
 """
 
 from __future__ import annotations
@@ -10,12 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from live.results.export.formats import ExportRequest, export
-from live.results.quantities import Display
-from live.results.report.report import ReportRequest, make_report
-from live.results.report.saving import save_page
-from live.results.run_folder import open_run
-from live.ui.terminal.screen import TerminalScreen
+from phasedic import (
+    Display,
+    ExportRequest,
+    ReportRequest,
+    TerminalScreen,
+    export,
+    make_report,
+    open_run,
+    save_page,
+)
 
 
 def main(folder: str) -> int:

@@ -1,6 +1,6 @@
 """Phasedic from Python, cell by cell (``# %%``: VS Code, Spyder and Jupytext open this as a notebook).
 
-``python -m examples.notebook`` runs all of it in a folder of its own.
+``python notebook.py`` runs all of it in a folder of its own.
 """
 
 # %% A test to look at: pictures of a simulated pattern, pulled in six steps, and the force of each.
@@ -27,7 +27,7 @@ lines = [f"shot_{number}.png,{1.4 * 1e6 * strain / 1e3:.3f}" for number, strain 
 (folder / "forces.csv").write_text("file,force_kN\n" + "\n".join(lines) + "\n")
 
 # %% One picture against another: arrays in, arrays out.
-from analysis import KernelSettings, PhaseKernel, Roi, ZoiGrid  # noqa: E402
+from phasedic import KernelSettings, PhaseKernel, Roi, ZoiGrid  # noqa: E402
 
 reference, deformed = (
     cv2.imread(str(folder / "shots" / f"shot_{k}.png"), cv2.IMREAD_GRAYSCALE) for k in (0, 3)
@@ -39,16 +39,19 @@ print(field)
 print(f"mean eyy {field.mean('eyy')[0] * 1e6:.0f} +- {field.mean('eyy')[1] * 1e6:.1f} um/m")
 
 # %% The whole folder, as the command line does it: phasedic replay shots --load forces.csv --section 10,2
-from live.cli import main  # noqa: E402
+from phasedic import open_run, replay  # noqa: E402
 
-arguments = ["--load", str(folder / "forces.csv"), "--section", "10,2", "--roi", "16,16,288,224"]
-quiet = ["--no-view", "--no-rrd", "--out", str(folder / "run")]
-assert main(["replay", str(folder / "shots"), *arguments, *quiet]) == 0
+settings = {
+    "specimen.width_mm": 10,
+    "specimen.thickness_mm": 2,
+    "measure.roi": (16, 16, 288, 224),
+    "view.enabled": False,
+    "view.rrd": False,
+    "output.dir": str(folder / "run"),
+}
+assert replay(folder / "shots", settings, forces=folder / "forces.csv").exit_code == 0
 
 # %% The results: columns, maps, uncertainties.
-from live.results import Strain  # noqa: E402
-from live.results.run_folder import open_run  # noqa: E402
-
 run = open_run(folder / "run")
 print(run.strain)
 assert run.stress is not None
@@ -65,14 +68,14 @@ try:
 except ImportError:
     print("xarray is not installed")
 else:
+    from phasedic import Strain
+
     with Strain.open(folder / "run" / "strain.h5") as results:
         data = results.to_xarray("eyy", "sigma_eyy")
     print(data["eyy"].mean(("y", "x")).values)
 
 # %% A page to show to others.
-from live.results.report.report import ReportRequest, make_report  # noqa: E402
-from live.results.report.saving import save_page  # noqa: E402
-from live.ui.terminal.screen import TerminalScreen  # noqa: E402
+from phasedic import ReportRequest, TerminalScreen, make_report, save_page  # noqa: E402
 
 save_page(
     make_report(run, ReportRequest(fields=("eyy",)), TerminalScreen(quiet=True)), folder / "report.html"

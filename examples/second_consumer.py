@@ -1,18 +1,13 @@
 """A consumer of your own beside results and view: it prints the largest strain of every measurement.
 
-``python -m examples.second_consumer`` runs it on a simulated test of three seconds.
+``python second_consumer.py`` runs it on a simulated test of three seconds.
 """
 
 from __future__ import annotations
 
 import sys
 
-from live.commands.consumers import standard_consumers
-from live.config.loading import load_config
-from live.pipeline.consumer import Consumer
-from live.pipeline.measurement import Measurement
-from live.run.live_run import run_live
-from live.ui.terminal.screen import TerminalScreen
+from phasedic import Consumer, Measurement, run
 
 
 class Largest(Consumer):
@@ -38,10 +33,7 @@ def main(folder: str | None = None) -> int:
         "view.rrd": False,
         "output.dir": folder,
     }
-    given = {key: value for key, value in settings.items() if value is not None}
-    screen = TerminalScreen()
-    consumers = standard_consumers(screen, [Largest()])
-    outcome = run_live(load_config(None, given), screen, consumers=consumers)
+    outcome = run({key: value for key, value in settings.items() if value is not None}, [Largest()])
     for report in outcome.outputs.reports:
         print(report.line())
     return outcome.exit_code

@@ -1,8 +1,8 @@
 """A controller of your own: it holds the strain rate of a machine with the strain that phasedic sends over TCP.
 
 It reads lines of JSON from the strain output, drives the machine with a PID on the strain, stops it where the strain is
-not known or no line comes (``stop_machine``), and ends the test over the socket for commands. ``python -m
-examples.strain_rate`` runs it with a simulated machine, as compliant as real ones: at yield, the share of the crosshead
+not known or no line comes (``stop_machine``), and ends the test over the socket for commands. ``python
+strain_rate.py`` runs it with a simulated machine, as compliant as real ones: at yield, the share of the crosshead
 travel that reaches the specimen jumps. For your machine, rewrite ``Machine.drive``.
 """
 
@@ -14,14 +14,12 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
-from examples.stop_machine import NotAlive, values
-from live.commands.consumers import standard_consumers
-from live.config.listen_address import SOCKET
-from live.config.loading import load_config
-from live.run.control import SOCKET_NAME, ControlPort
-from live.run.live_run import LiveRun, run_live
-from live.run.outcome import Outcome
-from live.ui.terminal.screen import TerminalScreen
+from phasedic import ControlPort, LiveRun, Outcome, TerminalScreen, run
+
+try:
+    from stop_machine import NotAlive, values
+except ImportError:  # imported as a package, as the tests do
+    from examples.stop_machine import NotAlive, values
 
 STRAIN_PORT, MACHINE_PORT = 5610, 5612
 
@@ -86,7 +84,7 @@ class Pid:
 def control(rate: float, until: float, folder: Path) -> None:
     """Pull with a strain rate (1/s) until the strain is reached, then end the test."""
     to_phasedic = socket.socket(socket.AF_UNIX)
-    to_phasedic.connect(str(folder / SOCKET_NAME))
+    to_phasedic.connect(str(folder / "orders.sock"))
     strains = socket.create_connection(("127.0.0.1", STRAIN_PORT), 10)
     machine, commands, pid, last = Machine(MACHINE_PORT), Lines(to_phasedic), Pid(rate), -1.0
     commands.ask(f"note strain rate {rate:g} 1/s")
@@ -119,16 +117,16 @@ def main(folder: str | None = None, rate: float = 5e-4, until: float = 4e-3) -> 
         "strain_out.channels": ["time_s", "axial"],
         "output.dir": folder,
     }
-    config = load_config(None, {key: value for key, value in settings.items() if value is not None})
+    config = {key: value for key, value in settings.items() if value is not None}
     screen = TerminalScreen()
-    port = ControlPort(SOCKET, None, screen)
+    port = ControlPort("socket", None, screen)
 
     def on_start(live: LiveRun) -> None:
         port.open(live, live.folder)
         threading.Thread(target=control, args=(rate, until, live.folder), daemon=True).start()
 
     try:
-        return run_live(config, screen, consumers=standard_consumers(screen), on_start=on_start)
+        return run(config, screen=screen, on_start=on_start)
     finally:
         port.close()
 

@@ -32,7 +32,7 @@ SATURATED = {8388607.0: LoadFlag.OVERLOAD, -8388608.0: LoadFlag.UNDERLOAD}  # of
 WIDTH_STAYS = 100  # lines in a row
 
 _LABEL = re.compile(r"[A-Za-z][\w .()\[\]/-]{0,60}[:=]", re.ASCII)
-_FIELD = re.compile(r"([-+]? *[0-9.,]+(?:[eE][-+]?[0-9]+)?)?([A-Za-z]*)")
+_FIELD = re.compile(r"([-+]? *[0-9.,]+(?:[eE][-+]?[0-9]+)?)?(?:([A-Za-z]+)\.?)?")
 _SPACED_SIGN = re.compile(r"([-+]) +(?=[0-9.])")
 _POINT_SPLIT = re.compile(r"( *[,;\t] *| +)")
 _COMMA_SPLIT = re.compile(r"( *[;\t] *| +)")

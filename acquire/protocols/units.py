@@ -8,6 +8,8 @@ G0 = 9.80665  # m/s^2, standard gravity
 
 FORCES = {
     "n": 1.0,
+    "newton": 1.0,
+    "newtons": 1.0,
     "mn": 1e-3,
     "dan": 10.0,
     "kn": 1e3,
@@ -31,14 +33,19 @@ UNITS = (*FORCES, *MASSES)
 DOUBTFUL = ("mn", "mg")  # with a capital M: milli- or mega-
 
 
+def _name(text: str) -> str:
+    """``lb.`` is lb."""
+    return text.lower().removesuffix(".")
+
+
 def is_unit(text: str) -> bool:
     """Whether ``text`` names a unit of force or mass."""
-    return text.lower() in UNITS
+    return _name(text) in UNITS
 
 
 def is_mass(text: str) -> bool:
     """Whether ``text`` names a unit of mass, which is no force unless the address allows it."""
-    return text.lower() in MASSES
+    return _name(text) in MASSES
 
 
 def newtons_per(unit: str, mass_reads_force: bool = False) -> float:
@@ -56,7 +63,7 @@ def newtons_per(unit: str, mass_reads_force: bool = False) -> float:
     ConfigError
         An unknown unit, a mass without leave, or ``MN`` and ``MG``.
     """
-    name = unit.lower()
+    name = _name(unit)
     if name in DOUBTFUL and unit.startswith("M"):
         raise ConfigError(
             "{unit} may be milli or mega; compare the display, and say gain= in newtons for one of it", unit

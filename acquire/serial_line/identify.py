@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from acquire.addresses import Options, parse_address
-from acquire.errors import DeviceError
+from acquire.errors import ConfigError, DeviceError, PhasedicError
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading, find_protocol
 from acquire.protocols.units import is_mass
 from acquire.serial_line.byte_ports import Port
+from acquire.serial_line.line_pattern import pattern_of
 from acquire.serial_line.ports import PORT_ERRORS, LineSettings, open_port
 from acquire.text import Message
 
@@ -34,10 +35,12 @@ UNASKED = (
     ("ascii", "decimal=comma"),
     ("ascii", "decimal=comma&millis=1"),
     ("hbm-aed", "decimals=0"),
+    ("lines", "preset=rinstrum"),
 )
 ASKED = ("mt-sics", "aed-standard", "mark10", "sauter", "hbm-aed", "modbus")
 ASKED_SETTINGS = {"modbus": "profile=laumas-tlb", "hbm-aed": "decimals=0"}
 SURE = 0.8  # part of the lines that must be readings
+COUNTS = 1000  # whole numbers from here on may be counts of a converter
 
 Opener = Callable[[LineSettings], Port]
 Clock = Callable[[], float]
@@ -111,14 +114,28 @@ def listen(
 
     Yields
     ------
-    speed, what was received, and the finding (None where it makes no sense)
+    speed, what was received, and the finding (None where it makes no sense); a speed that the port refuses is left out
+
+    Raises
+    ------
+    ConfigError, DeviceError
+        The port opens at no speed, or is lost.
     """
+    refused: list[PhasedicError] = []
     for baud in SPEEDS:
-        received = record_bytes(LineSettings(device, baud), seconds, opener, clock)
+        line = LineSettings(device, baud)
+        try:
+            port = opener(line)
+        except (ConfigError, DeviceError) as error:
+            refused.append(error)
+            continue
+        received = record_bytes(line, seconds, lambda _, port=port: port, clock)  # type: ignore[misc]
         finding = guess(device, baud, received, seconds)
         yield baud, received, finding
         if finding is not None:
             return
+    if len(refused) == len(SPEEDS):
+        raise refused[0]
 
 
 def guess(device: str, baud: int, received: bytes, seconds: float = LISTEN_S) -> Finding | None:
@@ -128,7 +145,20 @@ def guess(device: str, baud: int, received: bytes, seconds: float = LISTEN_S) ->
     line = LineSettings(device, baud, 7 if parity != "N" else 8, parity)
     found = [_try(line, name, settings, text, seconds) for name, settings in UNASKED]
     sure = [finding for finding in found if finding is not None and finding.score >= SURE]
-    return max(sure, key=lambda finding: finding.score) if sure else None
+    if sure:
+        return max(sure, key=lambda finding: finding.score)
+    made = pattern_of(text)
+    return proposed(line, text) if made is not None and made.labelled else None
+
+
+def proposed(line: LineSettings, received: bytes) -> Finding | None:
+    """``protocol=lines`` with a pattern made from what was received; None where lines are not alike."""
+    made = pattern_of(received)
+    if made is None:
+        return None
+    escaped = "".join(f"%{ord(one):02X}" if one in "%&'#" else one for one in made.pattern)
+    found = _try(line, "lines", f"pattern={escaped}", received, LISTEN_S)
+    return found if found is not None and found.score >= SURE else None
 
 
 def _parity(received: bytes) -> str:
@@ -153,7 +183,7 @@ def _try(line: LineSettings, name: str, settings: str, received: bytes, seconds:
         protocol=name,
         score=sum(_understood(reading) for reading in readings) / len(readings),
         lines=tuple(reading.raw for reading in readings[-3:]),
-        remark="; ".join(filter(None, [_reads(good), _remark(readings)])),
+        remark="; ".join(filter(None, [_reads(good), _remark(readings, text=name == "ascii")])),
     )
 
 
@@ -183,8 +213,12 @@ def _understood(reading: Reading) -> bool:
     return LoadFlag.ERROR not in reading.flags
 
 
-def _remark(readings: list[Reading]) -> str:
+def _remark(readings: list[Reading], *, text: bool = False) -> str:
     units = {reading.unit for reading in readings if reading.unit}
+    if not units and text and _are_counts(readings):
+        return Message(
+            "whole numbers without a unit, perhaps raw counts: phasedic load-calibrate finds gain and zero"
+        )
     if not units:
         return Message("the line names no unit: add unit=N, or the one on the display")
     masses = sorted(unit for unit in units if is_mass(unit))
@@ -193,6 +227,12 @@ def _remark(readings: list[Reading]) -> str:
             "the line says {masses}: add mass_reads_force=yes if that stands for a force", masses[0]
         )
     return ""
+
+
+def _are_counts(readings: list[Reading]) -> bool:
+    """Whether these are like the counts of a converter: whole, and large."""
+    values = [reading.value for reading in readings if not math.isnan(reading.value)]
+    return len(values) > 0 and all(value.is_integer() and abs(value) >= COUNTS for value in values)
 
 
 def questions(device: str) -> list[Question]:

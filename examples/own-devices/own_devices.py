@@ -15,13 +15,23 @@ from pathlib import Path
 
 import numpy as np
 
-from acquire.addresses import Address, Options
-from acquire.camera import CameraListing
-from acquire.closing import Closing
-from acquire.errors import DataError
-from acquire.events import Event, EventKind, EventSink, device_event
-from acquire.frame import CameraInfo, CameraSetting, Frame, frozen
-from acquire.load_sample import LoadCellInfo, LoadSample
+from phasedic import (
+    Address,
+    CameraInfo,
+    CameraListing,
+    CameraSetting,
+    Closing,
+    DataError,
+    Event,
+    EventKind,
+    EventSink,
+    Frame,
+    LoadCellInfo,
+    LoadSample,
+    Options,
+    device_event,
+    frozen,
+)
 
 LOWEST_FPS, HIGHEST_FPS = 1e-3, 1e7
 

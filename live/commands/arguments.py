@@ -14,12 +14,16 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from acquire.errors import PhasedicError
 from live.commands.exit_codes import EXIT_CODES
+from live.commands.words import understood
 
 # Shown at the end of the help of each command; a test parses them all.
 EXAMPLES = {
     "run": "phasedic run --camera '/dev/video0?format=Y12&fps=30' --load '/dev/ttyUSB0?protocol=ascii&unit=N' --report",
     "demo": "phasedic demo --specimen hole",
+    "examples": "phasedic examples first-hour",
+    "docs": "phasedic docs troubleshooting",
     "init": "phasedic init --camera '/dev/video0?format=Y12&fps=30' --section 20,2",
     "scale": "phasedic scale --camera /dev/video0 --points 100,200,900,200 --length 25",
     "lens": "phasedic lens 'board/*.png' --checkerboard 9x6 --square 10 --out lens.toml",
@@ -63,6 +67,10 @@ class Entry:
 COMMANDS = {
     "run": Entry("live.commands.run", "measure live and record the session"),
     "demo": Entry("live.commands.demo", "measure a simulated tensile test and compare with its truth"),
+    "examples": Entry(
+        "live.commands.examples", "copy examples to try: pictures of two tests, Python, devices of your own"
+    ),
+    "docs": Entry("live.commands.docs", "show a page of the documentation, or list them"),
     "page": Entry("live.commands.page", "set up, measure and evaluate in the browser"),
     "replay": Entry("live.commands.replay", "measure a recorded session or a folder of pictures"),
     "batch": Entry("live.commands.batch", "replay many sessions or folders of pictures in parallel"),
@@ -150,6 +158,10 @@ Command = Callable[[argparse.Namespace], int]
 def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
     """The command and its arguments; help ends the program with exit code 0, bad usage with 2."""
     parser = full_parser([word for word in argv if word in COMMANDS][:1], all_options=HELP_ALL in argv)
+    try:
+        argv = understood(argv)
+    except PhasedicError as error:
+        parser.error(str(error))
     wanted = next((word for word in argv if not word.startswith("-")), "")
     if wanted and wanted not in COMMANDS:
         near = difflib.get_close_matches(wanted, COMMANDS, 1)

@@ -5,7 +5,10 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
+from acquire.errors import PhasedicError
 from acquire.serial_line import identify
+from acquire.serial_line.ports import LineSettings
+from acquire.text.printable import brief
 from live.commands.exit_codes import NOT_READY
 
 PrintLine = Callable[[str], None]
@@ -19,7 +22,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace, print_line: PrintLine = print) -> int:
     """``phasedic identify DEVICE [--ask]``; 0 if a device was identified, else 6."""
+    heard: list[tuple[int, bytes]] = []
     for baud, received, finding in identify.listen(arguments.device):
+        heard.append((baud, received))
         shown = received[:60].decode("ascii", "backslashreplace")
         print_line(
             f"{baud:7} baud: {len(received)} bytes {shown!r}" if received else f"{baud:7} baud: silence"
@@ -29,6 +34,14 @@ def command(arguments: argparse.Namespace, print_line: PrintLine = print) -> int
             return 0
     if arguments.ask:
         return _ask_all(arguments.device, print_line)
+    for baud, received in heard:
+        if (finding := identify.proposed(LineSettings(arguments.device, baud), received)) is not None:
+            print_line(f"lines that no protocol knows, at {baud} baud:")
+            for one in finding.lines:
+                print_line(f"  {one.decode('ascii', 'backslashreplace')}")
+            print_line("a pattern made from them; check that it takes the right number (docs/load-cells.md):")
+            _propose(finding.address, finding.remark, print_line)
+            return NOT_READY
     print_line("nothing recognised; --ask sends queries to this port (only if no machine there can move)")
     return NOT_READY
 
@@ -40,7 +53,11 @@ def _ask_all(device: str, print_line: PrintLine) -> int:
         line = question.line
         print_line(f"  {question.data!r}  at {line.baud} {line.bytesize}{line.parity}1 ({question.protocol})")
     for question in questions:
-        finding = identify.ask(question)
+        try:
+            finding = identify.ask(question)
+        except PhasedicError as error:
+            print_line(f"  {question.protocol}: {brief(error)}")
+            continue
         print_line(f"  {question.protocol}: {'answers' if finding else 'no answer'}")
         if finding is not None:
             _propose(finding.address, finding.remark, print_line)

@@ -11,6 +11,7 @@ from live.config.values import (
     ADDRESSES,
     AUTO,
     BOX,
+    CAMERA_ADDRESS,
     COVARIANCE,
     FLAG,
     GIVEN,
@@ -45,7 +46,7 @@ DEFAULT_BURST, DEFAULT_REFERENCE_BURST = 4, 32
 class CameraConfig:
     """[camera]"""
 
-    address: str = key(TEXT, "", "address of the camera: /dev/video0?format=Y12&fps=30, sim:, files:...",
+    address: str = key(CAMERA_ADDRESS, "", "address of the camera: /dev/video0?format=Y12&fps=30, sim:, files:...",
         Option("camera", "ADDRESS"))
     back: str | None = key(TEXT, None,
         "camera behind the specimen: its rig file, whose sections camera, measure, scale, gauges and plate are those of"

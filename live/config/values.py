@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from acquire.addresses import as_typed
 from acquire.bounds import NotAllowed, as_integer, as_number
 from acquire.errors import ConfigError
 from acquire.record_mode import RECORD_MODES, RecordMode
@@ -134,6 +135,10 @@ def _text(value: Any) -> str:
     if not isinstance(value, str) or "\0" in value:
         raise NotAllowed("a text in quotes, without a zero byte")
     return value
+
+
+def _camera_address(value: Any) -> str:
+    return as_typed(_text(value))
 
 
 def _load_address(value: Any) -> str:
@@ -286,6 +291,8 @@ SIZE = Check(_size)
 TEXT = Check(_text)
 NAMES = Check(_names, lambda word: word.split(","))
 """Names; on the command line separated by commas."""
+CAMERA_ADDRESS = Check(_camera_address)
+"""Of a camera or pictures, which may have been dropped with quotes."""
 LOAD_ADDRESS = Check(_load_address)
 """Of a load cell: none is none: too."""
 LISTEN_ADDRESS = Check(_listen_address)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-PACKAGES = ("acquire", "analysis", "hw_mocks", "live")
+PACKAGES = ("acquire", "analysis", "hw_mocks", "live", "phasedic")
 
 # Package -> what it may import besides itself. A line also covers the sub-packages that have none of
 # their own. Imports for a type checker count too.
@@ -55,6 +55,7 @@ LAYERS = {
     **ANALYSIS,
     "hw_mocks": "acquire acquire.text acquire.camera acquire.load_cell",
     "live": "",  # the version
+    "phasedic": "*",  # the public names of all others
     "live.__main__": "live.cli",
     **{
         layer: " ".join(
@@ -70,10 +71,11 @@ LAYERS = {
     "live.cli": "acquire.errors acquire.text.printable live.commands.arguments live.commands.environment"
     " live.commands.exit_codes live.commands.signals live.commands.streams",
 }
-# One module opens the simulated devices. The demo compares with their truth.
+# One module opens the simulated devices. The demo compares with their truth; the examples have simulated pictures.
 EXCEPTIONS = {
     "live.setup.devices": "hw_mocks",
     "live.commands.demo": "hw_mocks",
+    "live.commands.examples": "hw_mocks",
 }
 
 # Library -> the packages that alone import it.

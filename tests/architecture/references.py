@@ -69,5 +69,5 @@ def _stands(root: Path, found: str) -> Iterator[str]:
 
 @cache
 def _files(root: Path) -> list[str]:
-    tops = ("acquire", "analysis", "hw_mocks", "live", "tests", "docs", "examples")
+    tops = ("acquire", "analysis", "hw_mocks", "live", "phasedic", "tests", "docs", "examples")
     return [f"/{path.relative_to(root).as_posix()}" for top in tops for path in (root / top).rglob("*.py")]

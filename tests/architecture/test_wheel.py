@@ -49,6 +49,7 @@ _USED = (".py", ".toml", ".h5", ".npz", ".csv")
 """Kinds of files that the tests are made of."""
 FILES = (
     "pyproject.toml",
+    "setup.py",
     "README.md",
     "LICENSE",
     "MANIFEST.in",
@@ -126,8 +127,33 @@ def test_the_wheel_is_of_this_version_and_says_what_it_is(wheel: Path) -> None:
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_room_is_in_the_wheel(wheel: Path, package: str) -> None:
     with ZipFile(wheel) as file:
-        held = {name for name in file.namelist() if name.startswith(f"{package}/")}
+        names = {
+            name for name in file.namelist() if not name.startswith(("phasedic/docs/", "phasedic/examples/"))
+        }
+    held = {name for name in names if name.startswith(f"{package}/")}
     assert held == files_of(package)
+
+
+def test_the_wheel_has_the_pages_and_the_examples(wheel: Path) -> None:
+    with ZipFile(wheel) as file:
+        sizes = {name: info.file_size for name in file.namelist() for info in [file.getinfo(name)]}
+    pages = {path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").rglob("*.md")}
+    examples = {name for name in files_of("examples") if not name.rpartition("/")[2].startswith("__")}
+    held = {name for name in sizes if name.startswith(("phasedic/docs/", "phasedic/examples/"))}
+    assert held == {f"phasedic/{name}" for name in pages | examples}
+    assert sum(sizes[name] for name in held) < 3_000_000
+
+
+def test_pages_and_examples_are_found_where_only_the_wheel_is(installed: Path) -> None:
+    there = {**os.environ, "PYTHONPATH": str(installed)}
+    code = (
+        "import sys; from live.cli import main; sys.exit(main(['docs']) or main(['docs', 'docs/optics.md']))"
+    )
+    run = [sys.executable, "-c", code]
+    done = subprocess.run(run, cwd=installed.parent, env=there, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "all are in" in done.stdout and str(installed / "phasedic" / "docs") in done.stdout
+    assert "# Motion off the plane" in done.stdout
 
 
 @pytest.mark.parametrize("command", [["-m", "live.cli"], ["bin/phasedic"]])

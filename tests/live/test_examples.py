@@ -6,16 +6,20 @@ import re
 import runpy
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from examples.batch import main as batch
+from examples.documents import SETTINGS, Documents
 from examples.finished_run import main as finished_run
+from examples.plain_loop import main as plain_loop
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main as phasedic
+from phasedic import run as phasedic_run
 from tests.live.made_run import PULLED, make_run
 
 
@@ -43,6 +47,27 @@ def test_the_notebook_runs_cell_by_cell(
     assert re.search(r"<StrainField 11 x 15 ZOIs, 165 of 165 with a value; mean exx -0.0018", printed)
     assert "<Strain strain.h5: 5 instants of 11 x 15 ZOIs, engineering strain>" in printed
     assert list(tmp_path.glob("phasedic-*/report.html"))
+
+
+def test_a_loop_is_left_and_the_test_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert plain_loop(until=3e-4) > 5
+    assert re.search(r"\+3\d\d \+- \d+ um/m\s*$", capsys.readouterr().out)
+    assert len(list(tmp_path.glob("runs/*/strain.h5"))) == 1
+
+
+def test_a_test_as_documents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    kept: list[tuple[str, dict[str, Any]]] = []
+    outcome = phasedic_run(SETTINGS, [Documents([lambda name, document: kept.append((name, document))])])
+    assert outcome.exit_code == 0
+    names = [name for name, _ in kept]
+    assert names[:3] == ["start", "descriptor", "event"] and names[-1] == "stop"
+    assert kept[-1][1]["num_events"] == {"primary": names.count("event")}
+    assert [document["seq_num"] for name, document in kept if name == "event"] == [*range(1, len(names) - 2)]
+    assert all(0 <= document["data"]["strain"] < 0.02 for name, document in kept if name == "event")
 
 
 def test_a_batch_measures_all_compares_them_and_goes_on(

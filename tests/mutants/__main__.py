@@ -30,6 +30,7 @@ COPIED = (
     "analysis",
     "hw_mocks",
     "live",
+    "phasedic",
     "tests",
     "examples",
     "docs",
