@@ -14,7 +14,7 @@ def main(path: str) -> int:
     try:
         with Strain.open(Path(path), probed=True) as strain:
             strain.maps("status")
-            for name in strain.names if strain.n else ():
+            for name in (*strain.names, *strain.whole_names) if strain.n else ():
                 strain.maps(name, -1)
     except DataError as error:
         print(error)

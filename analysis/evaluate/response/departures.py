@@ -1,6 +1,7 @@
 """Where each place leaves its line: local yield, first cracks, debonding, in the order in which places give in.
 
-The mean of ``WINDOW`` instants is held against the line of all before. The limit is that of a normal deviate which all
+The mean of ``WINDOW`` instants, of a thirtieth of them where there are many, is held against the line of all before.
+The limit is that of a normal deviate which all
 looks together pass at ``CHANCE`` of the places; it is never below ``LIMIT``.
 """
 
@@ -17,12 +18,12 @@ from analysis.evaluate.response.lines import ResponseLines, ResponseSums
 
 Floats = NDArray[np.float64]
 FIRST, WINDOW, LIMIT = 20, 5, 4.5
-"""Instants before the first look; instants of a look; standard deviations."""
+"""Instants before the first look; instants of a look, at least; standard deviations, at least."""
 CHANCE = 5e-5
 MANY = 0.05
 """Share of the places that leave at once, from which on what all have in common is looked at."""
 NOT_USED = -1
-_STEP, _CLEAR, _FEWEST = 0.7, 6.0, 3
+_STEP, _CLEAR, _FEWEST, _PARTS = 0.7, 6.0, 3, 30
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +54,8 @@ class Departures:
         x where the place left its line; NaN where it did not.
     seen : (...) bool
         It had a value in the last instants.
+    window : int
+        Instants of a look.
     segments : list of int
         For each instant, the intercept that it belongs to; ``NOT_USED`` where it was left out.
     """
@@ -61,6 +64,7 @@ class Departures:
         self.at = np.full(shape, np.nan)
         self.seen = np.zeros(shape, np.bool_)
         self.segments: list[int] = []
+        self.window = max(WINDOW, looks // _PARTS)
         self.limit = max(LIMIT, NormalDist().inv_cdf(1 - CHANCE / max(looks, 1) / 2))
         self._when = np.zeros(shape, np.intp)  # the instant at which it was found
         self._sums = ResponseSums()
@@ -77,9 +81,9 @@ class Departures:
         self.segments.append(self._segment)
         self._held.append(_Instant(len(self.segments) - 1, x, y, sigma))
         self.seen = np.any([np.isfinite(one.y) for one in self._held], axis=0)
-        if len(self._held) < WINDOW:
+        if len(self._held) < self.window:
             return
-        lines = self._sums.lines() if len(self.segments) > FIRST + WINDOW - 1 else None
+        lines = self._sums.lines() if len(self.segments) > FIRST + self.window - 1 else None
         if lines is None or self._look(lines):
             self._absorb(lines)
 
@@ -96,7 +100,7 @@ class Departures:
         """Judge the held instants; whether the oldest of them may become one of the line."""
         x = float(np.mean([one.x for one in self._held]))
         y = np.mean([one.y for one in self._held], axis=0)
-        noise = np.sum([one.sigma**2 for one in self._held], axis=0) / WINDOW**2
+        noise = np.sum([one.sigma**2 for one in self._held], axis=0) / self.window**2
         expected, variance = lines.at(x, self._segment)
         chi2 = lines.chi2[np.isfinite(lines.chi2)]
         # Noise that was stated too small, of all places alike.
@@ -107,7 +111,7 @@ class Departures:
         if np.count_nonzero(out) >= max(MANY * np.count_nonzero(np.isfinite(z)), _FEWEST):
             fate = self._fate(np.array([self._off(lines, one) for one in self._held]))
             if fate:  # the first to pass the limit did so by it
-                self.at[self._when > len(self.segments) - WINDOW] = np.nan
+                self.at[self._when > len(self.segments) - self.window] = np.nan
             if fate == "off":
                 self.segments[self._held.popleft().number] = NOT_USED
                 return False
