@@ -80,9 +80,7 @@ _RESPONSES = (
     ),
     Quantity("leaves_at_stress", "Pa", "stress where the place leaves its line; nan where it does not"),
     Quantity("leaves_at_strain", UNITLESS, "strain of the channel where the place leaves its line; else nan"),
-    Quantity(
-        "fate", UNITLESS, "0: on its line to the end, 1: left it, 2: lost before the end, 255: not measured"
-    ),
+    Quantity("fate", UNITLESS, "0: on its line to the end, 1: left it, 2: lost before the end"),
 )
 _PLACES = (
     Quantity("x", "px", "centre of the ZOI on the reference picture"),

@@ -35,9 +35,10 @@ _UNITS |= dict.fromkeys(
 )
 _UNITS["chi2"] = "chi\u00b2"
 _SHOWN = {
-    "compliance": ("µm/m per MPa", 1e12), "rate": ("µm/m per s", 1e6), "leaves_at_stress": ("MPa", 1e-6),
+    "compliance": ("µm/m/MPa", 1e12), "rate": ("µm/m/s", 1e6), "leaves_at_stress": ("MPa", 1e-6),
 }  # fmt: skip
-_FREE = ("u", "v", "iterations", "amplification", "poisson", "instants", "leaves_at_strain", "fate", *_SHOWN)
+_FREE = ("u", "v", "iterations", "amplification", "poisson", "leaves_at_strain", *_SHOWN)
+_FROM_ZERO = ("residual", "chi2", "instants", "fate")
 
 
 def shown_unit(name: str) -> tuple[str, float]:
@@ -49,7 +50,7 @@ def range_kind(name: str) -> Kind:
     """The kind of range of a map: about zero for strains, from zero for uncertainties, else over the values."""
     if name in _FREE:
         return "free"
-    return "from zero" if name.startswith("sigma") or name in ("residual", "chi2") else "about zero"
+    return "from zero" if name.startswith("sigma") or name in _FROM_ZERO else "about zero"
 
 
 class AutoRange:
@@ -138,9 +139,10 @@ class ColourScale:
     def of(cls, name: str, span: Span, unit: str = "", factor: float = 1.0) -> ColourScale:
         """The scale of the map ``name`` from ``span[0]`` to ``span[1]`` of its values.
 
-        ``unit`` and ``factor`` convert the values; without a unit, strains are in um/m or %.
+        ``unit`` and ``factor`` convert the values; without a unit, strains are in um/m or %. Those of the whole test
+        have units of their own.
         """
-        if not unit and name.removeprefix("sigma_") in _SHOWN:
+        if name.removeprefix("sigma_") in _SHOWN:
             unit, factor = shown_unit(name)
         unit = unit or _UNITS.get(name, "")
         if not unit and name not in _UNITS:

@@ -23,7 +23,6 @@ from live.results.response.rising import Channel
 from live.results.response.stored import (
     FATE,
     MEAN,
-    NOT_MEASURED,
     STRESS,
     TIME,
     fill_group,
@@ -118,7 +117,7 @@ class _Places:
         maps: dict[str, NDArray[Any]] = {
             name: lines.slope, f"sigma_{name}": lines.sigma, "chi2": lines.chi2, "instants": lines.n,
             "poisson": -beside.slope, "sigma_poisson": beside.sigma,
-            **({leaves: found[0].at} if leaves else {}), FATE: np.where(lines.n > 0, fates, NOT_MEASURED),
+            **({leaves: found[0].at} if leaves else {}), FATE: np.where(lines.n > 0, fates, np.nan),
         }  # fmt: skip
         side = gauge_length(self._strain.grid.size, window_of(self._strain))
         return maps, {

@@ -34,7 +34,6 @@ STRESS, MEAN, TIME = "stress", "mean", "time"
 CHANNELS = (STRESS, MEAN, TIME)
 """What a strain may be held against, besides a gauge by its name."""
 FATES = ("on its line to the end", "left its line", "lost before the end")
-NOT_MEASURED = 255
 _SLOPES = {STRESS: "compliance", TIME: "rate"}
 ATTRIBUTES = {
     "channel": Declared("text"), "strain": Declared("text"), "instants": Declared("int", (), 0),
@@ -61,7 +60,7 @@ def map_names(channel: str) -> tuple[str, ...]:
 
 def declared(channel: str, shape: tuple[int, int]) -> dict[str, Declared]:
     """What each map must be."""
-    return {name: Declared("u1" if name == FATE else "f4", shape) for name in map_names(channel)}
+    return {name: Declared("f4", shape) for name in map_names(channel)}
 
 
 def add_group(entry: Any, channel: str, shape: tuple[int, int]) -> None:
@@ -77,7 +76,7 @@ def add_group(entry: Any, channel: str, shape: tuple[int, int]) -> None:
     group.attrs.update(dict.fromkeys(("common", "vsg_px"), np.float64(0)))
     for name, what in declared(channel, shape).items():
         dataset = group.create_dataset(
-            name, shape, what.dtype, chunks=shape, fletcher32=True, fillvalue=_fill(name)
+            name, shape, what.dtype, chunks=shape, fletcher32=True, fillvalue=np.nan
         )
         quantity = quantity_of(name)
         dataset.attrs.update(units=quantity.unit, long_name=quantity.words)
@@ -96,10 +95,6 @@ def add_group(entry: Any, channel: str, shape: tuple[int, int]) -> None:
             name, (0, *sizes), "f4", maxshape=(None, *sizes), chunks=chunks, fletcher32=True
         )
         dataset.attrs.update(units="", long_name=words)
-
-
-def _fill(name: str) -> float:
-    return NOT_MEASURED if name == FATE else np.nan
 
 
 def read_noise(path: Path, n: int, shape: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -50,7 +50,7 @@ def _departures(strain: Strain, found: StoredResponse) -> list[str]:
     at, fate = (found.map(one)[strain.grid.active] for one in (leaves, FATE))
     unit, factor = (shown_unit(leaves)) if found.channel == STRESS else ("µm/m", 1e6)
     counts = [int(np.count_nonzero(fate == code)) for code in range(len(FATES))]
-    lost = f"; {counts[2]} were lost before" * (counts[2] > 0)
+    lost = f"; lost before: {counts[2]}" * (counts[2] > 0)
     words = f"{counts[1]} of {sum(counts)} places leave their line"
     if counts[1]:
         low, middle, high = np.nanpercentile(at, (1, 50, 99)) * factor

@@ -10,21 +10,27 @@ import h5py
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.io import loadmat
 
 from acquire.errors import ConfigError, DataError
 from analysis.field import Status, StrainField
 from analysis.field.grid import ZoiGrid
+from live.cli import main
 from live.config.loading import from_dict
 from live.config.sections import SpecimenConfig
 from live.pipeline.measurement import Measurement
 from live.results import Results, ResultsInfo, Strain
 from live.results.__main__ import main as probed
 from live.results.finished.finished_test import FinishedTest
+from live.results.report.report import ReportRequest, make_report
 from live.results.response.evaluate import respond, response_of
 from live.results.response.rising import check_channel
-from live.results.response.stored import FATE, NOT_MEASURED, map_names
+from live.results.response.stored import FATE, map_names
 from live.results.response.words import response_lines, response_title
 from live.results.run_folder import open_run
+from live.ui.rerun.playback import playback_messages, view_setup
+from live.ui.rerun.wire import Kind
+from live.ui.terminal.screen import TerminalScreen
 from tests.live.made_run import CONFIG, UTC_START
 from tests.live.made_up import CAMERA, START, make_grid, make_measurement
 
@@ -165,8 +171,8 @@ def test_a_lost_place_has_not_left_its_line(tmp_path: Path) -> None:
         fate = strain.response.map(FATE)
         assert fate[LOST] == 2 and (np.delete(fate[strain.grid.active], 0) != 1).all()
         assert strain.response.map("instants")[LOST] < strain.response.instants
-        assert (fate[~strain.grid.active] == NOT_MEASURED).all()
-        assert response_lines(strain)[1].endswith("places leave their line; 1 were lost before")
+        assert np.isnan(fate[~strain.grid.active]).all()
+        assert response_lines(strain)[1].endswith("places leave their line; lost before: 1")
 
 
 @pytest.mark.parametrize("loads", [True, False])
@@ -197,7 +203,7 @@ def test_rate_over_time(tmp_path: Path) -> None:
         known = np.isfinite(found.map("rate")) & (found.map("instants") == found.instants)
         expected = (slope * amplified(strain.grid))[known]
         np.testing.assert_allclose(found.map("rate")[known], expected, rtol=0.02)
-        assert len(response_lines(strain)) == 1 and "µm/m per s" in response_lines(strain)[0]
+        assert len(response_lines(strain)) == 1 and "µm/m/s" in response_lines(strain)[0]
 
 
 def test_a_file_that_was_left_before_the_end_is_one_without(tmp_path: Path) -> None:
@@ -222,7 +228,7 @@ def test_too_few_instants_are_told(tmp_path: Path) -> None:
 
 DAMAGED: dict[str, tuple[Callable[[h5py.Group], Any], str]] = {
     "another shape": (lambda g: _put(g, "chi2", np.zeros((2, 2), "f4")), "chi2 is float32"),
-    "another type": (lambda g: _put(g, "fate", np.zeros((5, 7), "f4")), "fate is float32"),
+    "another type": (lambda g: _put(g, "fate", np.zeros((5, 7), "u1")), "fate is uint8"),
     "a map missing": (lambda g: g.__delitem__("compliance"), "compliance is missing"),
     "a link": (lambda g: _put(g, "chi2", h5py.ExternalLink("/etc/passwd", "x")), "is a link"),
     "another channel": (lambda g: g.attrs.__setitem__("channel", "mean"), "amplification is missing"),
@@ -282,3 +288,73 @@ def test_a_channel_that_will_not_be_is_refused(
         check_channel(channel, config, forces=forces)
     for known in ("", "mean", "time", "web"):
         check_channel(known, config, forces=forces)
+
+
+@pytest.mark.parametrize("kind", ["csv", "npz", "mat", "vtk", "png"])
+def test_exports_hold_the_maps_once(stressed: Path, tmp_path: Path, kind: str) -> None:
+    out = tmp_path / "out"
+    fields = "compliance" if kind == "png" else "response"
+    assert main(["export", str(stressed), "--to", kind, "--fields", fields, "--out", str(out)]) == 0
+    with Strain.open(stressed / "strain.h5") as strain:
+        compliance, active = strain.maps("compliance", 0), strain.grid.active
+    if kind == "csv":
+        lines = [line for line in out.read_text(encoding="utf-8").splitlines() if line[0] != "#"]
+        heads, *rows = (line.split(",") for line in lines)
+        assert {"compliance_per_Pa", "leaves_at_stress_Pa", "fate"} <= {*heads} and len(rows) == active.sum()
+        values = [float(row[heads.index("compliance_per_Pa")]) for row in rows]
+        np.testing.assert_allclose(values, compliance[active], rtol=1e-6)
+        assert "# response over stress, " in out.read_text(encoding="utf-8")
+    elif kind == "npz":
+        with np.load(out) as arrays:
+            assert arrays["compliance"].shape == (1, *compliance.shape)
+            np.testing.assert_array_equal(arrays["compliance"][0], compliance)
+    elif kind == "mat":
+        np.testing.assert_array_equal(loadmat(out)["compliance"][..., 0], compliance)
+    else:
+        names = sorted(path.name for path in out.iterdir())
+        assert names == (["compliance_00000.png"] if kind == "png" else ["strain.pvd", "strain_00000.vti"])
+
+
+def test_wide_tables_have_names_that_files_may_have(stressed: Path, tmp_path: Path) -> None:
+    words = ["export", str(stressed), "--to", "csv", "--layout", "wide", "--fields", "response"]
+    assert main([*words, "--out", str(tmp_path / "wide")]) == 0
+    assert (tmp_path / "wide" / "compliance_per_Pa.csv").is_file()
+
+
+def test_all_maps_are_those_of_instants(stressed: Path, tmp_path: Path) -> None:
+    out = tmp_path / "all.npz"
+    assert main(["export", str(stressed), "--to", "npz", "--fields", "all", "--out", str(out)]) == 0
+    with np.load(out) as arrays:
+        assert "compliance" not in arrays and len(arrays["eyy"]) == len(STRAINS)
+
+
+def test_a_map_is_drawn_with_what_it_is_from(stressed: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "map.png"
+    assert main(["map", str(stressed), str(picture), "--field", "leaves_at_stress"]) == 0
+    assert picture.stat().st_size > 1000
+
+
+def test_the_report_shows_the_maps(stressed: Path, tmp_path: Path) -> None:
+    with open_run(stressed) as run:
+        html = make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html
+        plain = make_folder(tmp_path, "")
+    _, _, after = html.partition("<h2>Response of each place</h2>")
+    part = after.partition("</section>")[0]
+    assert part.count("<img ") == 5 and "compliance over stress, " in part and "VSG" in part
+    assert "places leave their line at 1" in part
+    with open_run(plain) as run:
+        assert (
+            "Response of each place" not in make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html
+        )
+
+
+def test_the_view_of_a_finished_run_has_the_maps(stressed: Path) -> None:
+    with open_run(stressed) as run:
+        setup = view_setup(run)
+        messages = list(playback_messages(run, (0, 50)))
+        assert setup.whole == tuple(n for n in map_names("stress") if n not in (FATE, "instants"))
+        (whole,) = (message for message in messages if message.kind is Kind.WHOLE)
+        assert {*setup.whole} <= {*whole.arrays}
+        np.testing.assert_array_equal(whole.arrays["compliance"], run.strain.maps("compliance", 0))
+        status = next(message for message in messages if message.kind is Kind.STATUS)
+        assert "response over stress" in status.meta["markdown"]
