@@ -80,6 +80,10 @@ _RESPONSES = (
     ),
     Quantity("leaves_at_stress", "Pa", "stress where the place leaves its line; nan where it does not"),
     Quantity("leaves_at_strain", UNITLESS, "strain of the channel where the place leaves its line; else nan"),
+    Quantity(
+        "current", UNITLESS, "share of the variance of strains at each instant that is not of the reference"
+    ),
+    Quantity("correlation", UNITLESS, "of the noises of exx and eyy, against each reference"),
     Quantity("fate", UNITLESS, "0: on its line to the end, 1: left it, 2: lost before the end"),
 )
 _PLACES = (

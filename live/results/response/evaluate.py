@@ -113,7 +113,7 @@ class _Places:
         if not used:
             raise DataError(f"the load rises at {len(over.rows)} of {self._strain.n} instants")
         lines, beside, name = slope.lines(), poisson.lines(), slope_name(over.name)
-        fates = np.where(np.isfinite(found[0].at), 1, np.where(found[0].seen, 0, 2))
+        fates = np.where(np.isfinite(found[0].at) & bool(leaves), 1, np.where(found[0].seen, 0, 2))
         maps: dict[str, NDArray[Any]] = {
             name: lines.slope, f"sigma_{name}": lines.sigma, "chi2": lines.chi2, "instants": lines.n,
             "poisson": -beside.slope, "sigma_poisson": beside.sigma,

@@ -33,7 +33,6 @@ GROUP, CURRENT, CORRELATION, FATE = "response", "current", "correlation", "fate"
 STRESS, MEAN, TIME = "stress", "mean", "time"
 CHANNELS = (STRESS, MEAN, TIME)
 """What a strain may be held against, besides a gauge by its name."""
-FATES = ("on its line to the end", "left its line", "lost before the end")
 _SLOPES = {STRESS: "compliance", TIME: "rate"}
 ATTRIBUTES = {
     "channel": Declared("text"), "strain": Declared("text"), "instants": Declared("int", (), 0),
@@ -58,43 +57,25 @@ def map_names(channel: str) -> tuple[str, ...]:
     return (*first, *((leaves,) if leaves else ()), FATE)
 
 
-def declared(channel: str, shape: tuple[int, int]) -> dict[str, Declared]:
-    """What each map must be."""
-    return {name: Declared("f4", shape) for name in map_names(channel)}
-
-
 def add_group(entry: Any, channel: str, shape: tuple[int, int]) -> None:
     """Make the group, without values, after ``strain``."""
     group = new_group(
         entry, GROUP, "NXdata", signal=slope_name(channel), title=f"Response of each place over {channel}"
     )
-    group.attrs["axes"] = ["y", "x"]
+    numbers = {"instants": 0, "first": np.nan, "last": np.nan, "common": 0.0, "vsg_px": 0.0}
     group.attrs.update(
-        channel=np.bytes_(storable(channel).encode()), strain=np.array("", "S3"), instants=np.int64(0)
+        axes=["y", "x"], channel=np.bytes_(storable(channel).encode()), strain=np.bytes_("eyy")
     )
-    group.attrs.update(dict.fromkeys(("first", "last"), np.float64(np.nan)))
-    group.attrs.update(dict.fromkeys(("common", "vsg_px"), np.float64(0)))
-    for name, what in declared(channel, shape).items():
+    group.attrs.update(numbers)
+    for name in (*map_names(channel), CURRENT, CORRELATION):
+        grows, rest = name in (CURRENT, CORRELATION), () if name == CURRENT else shape
         dataset = group.create_dataset(
-            name, shape, what.dtype, chunks=shape, fletcher32=True, fillvalue=np.nan
-        )
-        quantity = quantity_of(name)
-        dataset.attrs.update(units=quantity.unit, long_name=quantity.words)
+            name, (0,) * grows + rest, "f4", maxshape=(None,) * grows + rest, chunks=True, fletcher32=True,
+            fillvalue=np.nan,
+        )  # fmt: skip
+        dataset.attrs.update(units=quantity_of(name).unit, long_name=quantity_of(name).words)
     for name in ("x", "y"):
         group[name] = entry[f"strain/{name}"]
-    for name, sizes, chunks, words in (
-        (
-            CURRENT,
-            (),
-            (256,),
-            "share of the variance of a strain at each instant that is not of the reference",
-        ),
-        (CORRELATION, shape, (1, *shape), "correlation of the noises of exx and eyy against each reference"),
-    ):
-        dataset = group.create_dataset(
-            name, (0, *sizes), "f4", maxshape=(None, *sizes), chunks=chunks, fletcher32=True
-        )
-        dataset.attrs.update(units="", long_name=words)
 
 
 def read_noise(path: Path, n: int, shape: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -136,12 +117,10 @@ class StoredResponse:
     ----------
     channel : str
         "stress", "mean", "time" or the name of a gauge.
-    strain : "exx" or "eyy"
-        The strain of a place, along the load.
     instants : int
         In the lines, at most.
-    span : (float, float)
-        First and last of the channel in them: Pa, 1 or s.
+    first, last : float
+        Of the channel in them: Pa, 1 or s.
     common : float
         Relative standard uncertainty that all places have in common, beside their sigma.
     vsg_px : float, px
@@ -149,9 +128,9 @@ class StoredResponse:
     """
 
     channel: str
-    strain: str
     instants: int
-    span: tuple[float, float]
+    first: float
+    last: float
     common: float
     vsg_px: float
     _maps: Mapping[str, Any]
@@ -162,7 +141,7 @@ class StoredResponse:
         return tuple(self._maps)
 
     def map(self, name: str) -> NDArray[Any]:
-        """A map, (R, C), in SI units; NaN where a place has no value; ``fate`` counts ``FATES``."""
+        """A map, (R, C), in SI units; NaN where a place has no value."""
         return np.asarray(self._maps[name][()])
 
 
@@ -177,15 +156,17 @@ def read_response(entry: Any, shape: tuple[int, int]) -> StoredResponse | None:
     if GROUP not in entry:
         return None
     group = open_group(entry, GROUP)
-    a = {name: read_attribute(group, name, what) for name, what in ATTRIBUTES.items()}
-    channel = printable(as_text(a["channel"]))
-    maps = open_datasets(group, declared(channel, shape))
-    strain = as_text(a["strain"])
-    if not a["instants"]:
+    channel, strain, instants, first, last, common, vsg_px = (
+        read_attribute(group, name, what) for name, what in ATTRIBUTES.items()
+    )
+    if as_text(strain) not in ("exx", "eyy"):
+        raise DataError(
+            f"{entry.file.filename}: {GROUP}/@strain is {printable(as_text(strain))!r}; make it again"
+        )
+    channel = printable(as_text(channel))
+    maps = open_datasets(group, dict.fromkeys(map_names(channel), Declared("f4", shape)))
+    if not instants:
         return None
-    if strain not in ("exx", "eyy"):
-        raise DataError(f"{entry.file.filename}: {GROUP}/@strain is {printable(strain)!r}; make it again")
-    span = float(a["first"]), float(a["last"])
     return StoredResponse(
-        channel, strain, int(a["instants"]), span, float(a["common"]), float(a["vsg_px"]), maps
+        channel, int(instants), float(first), float(last), float(common), float(vsg_px), maps
     )

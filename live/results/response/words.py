@@ -6,7 +6,7 @@ import numpy as np
 
 from live.results.maps.scale import shown_unit
 from live.results.reader import Strain
-from live.results.response.stored import FATE, FATES, STRESS, TIME, StoredResponse, leaves_name, slope_name
+from live.results.response.stored import FATE, STRESS, TIME, StoredResponse, leaves_name, slope_name
 
 
 def response_title(strain: Strain, name: str) -> str:
@@ -32,15 +32,14 @@ def response_lines(strain: Strain) -> list[str]:
         return [f"response over {found.channel}: no place has one in {found.instants} instants"]
     low, high = np.percentile(known, (5, 95))
     beside = f", all together ± {100 * found.common:.2g} %" * (found.common > 0)
-    lines = [
-        f"response over {found.channel}, {found.instants} instants{_span(found)}: {name} {np.median(known):.4g}"
-        f" {unit}".rstrip()
-        + f" (median; 5 to 95 %: {low:.4g} to {high:.4g}), one place"
-        f" ± {np.nanmedian(sigma) * factor:.2g}{beside}; chi2 {np.nanmedian(chi2):.2f}, {_side(strain, found)}"
+    value = f"{name} {np.median(known):.4g} {unit}".rstrip()
+    across = f"; Poisson {np.nanmedian(poisson):.3f}" if np.isfinite(poisson).any() else ""
+    return [
+        f"response over {found.channel}, {found.instants} instants{_span(found)}: {value} (median; 5 to 95 %: {low:.4g}"
+        f" to {high:.4g}), one place ± {np.nanmedian(sigma) * factor:.2g}{beside}; chi2 {np.nanmedian(chi2):.2f},"
+        f" {_side(strain, found)}{across}",
+        *_departures(strain, found),
     ]
-    if np.isfinite(poisson).any():
-        lines[0] += f"; Poisson {np.nanmedian(poisson):.3f}"
-    return lines + _departures(strain, found)
 
 
 def _departures(strain: Strain, found: StoredResponse) -> list[str]:
@@ -48,19 +47,18 @@ def _departures(strain: Strain, found: StoredResponse) -> list[str]:
     if not leaves:
         return []
     at, fate = (found.map(one)[strain.grid.active] for one in (leaves, FATE))
-    unit, factor = (shown_unit(leaves)) if found.channel == STRESS else ("µm/m", 1e6)
-    counts = [int(np.count_nonzero(fate == code)) for code in range(len(FATES))]
-    lost = f"; lost before: {counts[2]}" * (counts[2] > 0)
-    words = f"{counts[1]} of {sum(counts)} places leave their line"
-    if counts[1]:
+    unit, factor = shown_unit(leaves) if found.channel == STRESS else ("µm/m", 1e6)
+    _, left, lost = (int(np.count_nonzero(fate == code)) for code in range(3))
+    words = f"{left} of {np.isfinite(fate).sum()} places leave their line"
+    if left:
         low, middle, high = np.nanpercentile(at, (1, 50, 99)) * factor
         words += f" at {middle:.4g} {unit} (median; 1 to 99 %: {low:.4g} to {high:.4g})"
-    return [words + lost]
+    return [words + f"; lost before: {lost}" * (lost > 0)]
 
 
 def _span(found: StoredResponse) -> str:
     unit, factor = {STRESS: ("MPa", 1e-6), TIME: ("s", 1.0)}.get(found.channel, ("µm/m", 1e6))
-    first, last = (value * factor for value in found.span)
+    first, last = found.first * factor, found.last * factor
     return f" from {first:.4g} to {last:.4g} {unit}"
 
 

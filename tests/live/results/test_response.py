@@ -133,8 +133,8 @@ def test_compliance_and_where_places_leave(strain: Strain) -> None:
     assert at[upper & ~gone] == pytest.approx(120e6, abs=6e6)
     assert np.isnan(at[~upper]).all() and (fate[~upper & strain.grid.active] == 0).all()
     assert (fate[upper & ~gone] == 1).all()
-    assert found.strain == "eyy" and found.channel == "stress" and found.common == 0
-    assert found.span[0] >= 7e6 and found.span[1] == pytest.approx(E_PA * STRAINS[-1], rel=0.02)
+    assert found.channel == "stress" and found.common == 0
+    assert found.first >= 7e6 and found.last == pytest.approx(E_PA * STRAINS[-1], rel=0.02)
 
 
 def test_the_maps_are_among_those_of_the_file(strain: Strain) -> None:
@@ -181,7 +181,7 @@ def test_amplification_needs_no_load(tmp_path: Path, loads: bool) -> None:
     evaluated(folder, "mean")
     with Strain.open(folder / "strain.h5") as strain:
         found = strain.response
-        assert found is not None and found.span[1] == pytest.approx(2.8e-3, rel=0.15)
+        assert found is not None and found.last == pytest.approx(2.8e-3, rel=0.15)
         truth = amplified(strain.grid)
         mean = float(np.nanmean(strain.values["eyy"][-20:] / STRAINS[-20:]))
         off = (found.map("amplification") - truth / mean) / found.map("sigma_amplification")
