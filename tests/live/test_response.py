@@ -179,3 +179,13 @@ def test_a_channel_that_is_not_there_is_refused_before_anything_is_written(
         code = int(ended.code or 0)
     assert code == 2 and words in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_few_pictures_say_that_they_do_not_show_where_places_leave(
+    shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = f"files:{shots}/shot_01*.tif?bits=12"
+    words = ["replay", source, "--response", "mean", *ZOIS, *QUIET, "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    said = capsys.readouterr().out
+    assert "where places leave their lines is not known: that takes 25 instants" in said

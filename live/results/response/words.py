@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from analysis.evaluate.response.departures import FIRST, WINDOW
 from live.results.maps.scale import shown_unit
 from live.results.reader import Strain
 from live.results.response.stored import FATE, STRESS, TIME, StoredResponse, leaves_name, slope_name
@@ -49,6 +50,8 @@ def _departures(strain: Strain, found: StoredResponse) -> list[str]:
     at, fate = (found.map(one)[strain.grid.active] for one in (leaves, FATE))
     unit, factor = shown_unit(leaves) if found.channel == STRESS else ("µm/m", 1e6)
     _, left, lost = (int(np.count_nonzero(fate == code)) for code in range(3))
+    if not left and found.instants < FIRST + WINDOW:
+        return [f"where places leave their lines is not known: that takes {FIRST + WINDOW} instants"]
     words = f"{left} of {np.isfinite(fate).sum()} places leave their line"
     if left:
         low, middle, high = np.nanpercentile(at, (1, 50, 99)) * factor
