@@ -23,7 +23,7 @@ CHANCE = 5e-5
 MANY = 0.05
 """Share of the places that leave at once, from which on what all have in common is looked at."""
 NOT_USED = -1
-_STEP, _CLEAR, _FEWEST, _PARTS = 0.7, 6.0, 3, 30
+_STEP, _CLEAR, _FEWEST, _PARTS, _WIDEST = 0.7, 6.0, 3, 30, 50
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +64,7 @@ class Departures:
         self.at = np.full(shape, np.nan)
         self.seen = np.zeros(shape, np.bool_)
         self.segments: list[int] = []
-        self.window = max(WINDOW, looks // _PARTS)
+        self.window = min(max(WINDOW, looks // _PARTS), _WIDEST)
         self.limit = max(LIMIT, NormalDist().inv_cdf(1 - CHANCE / max(looks, 1) / 2))
         self._when = np.zeros(shape, np.intp)  # the instant at which it was found
         self._sums = ResponseSums()
