@@ -32,7 +32,9 @@ def response_lines(strain: Strain) -> list[str]:
     if not known.size:
         return [f"response over {found.channel}: no place has one in {found.instants} instants"]
     low, high = np.percentile(known, (5, 95))
-    beside = f", all together ± {100 * found.common:.2g} %" * (found.common > 0)
+    # A strain that all places have in common is in that of the channel too.
+    of = " of the distance from 1" * (name == "amplification")
+    beside = f", all together ± {100 * found.common:.2g} %{of}" * (found.common > 0)
     value = f"{name} {np.median(known):.4g} {unit}".rstrip()
     across = f"; Poisson {np.nanmedian(poisson):.3f}" if np.isfinite(poisson).any() else ""
     return [

@@ -72,14 +72,17 @@ def field_of(grid: ZoiGrid, number: int, strain: float, extra: Array) -> StrainF
     )  # fmt: skip
 
 
-def make_folder(folder: Path, channel: str, knee: float = np.inf, loads: bool = True) -> Path:
+def make_folder(
+    folder: Path, channel: str, knee: float = np.inf, loads: bool = True, **specimen: float
+) -> Path:
     """A test in which the places of the upper half flow from ``knee`` on, a stress in Pa."""
     grid = make_grid()
     upper = np.indices(grid.shape)[0] < 2
+    config = CONFIG | {"specimen": CONFIG["specimen"] | specimen}
     info = ResultsInfo(
         START,
         UTC_START.isoformat(),
-        CONFIG,
+        config,
         {},
         {},
         CAMERA,
@@ -190,6 +193,18 @@ def test_amplification_needs_no_load(tmp_path: Path, loads: bool) -> None:
         assert np.isnan(found.map("leaves_at_strain")).all()
         assert response_title(strain, "amplification").startswith("amplification over mean, ")
         assert response_title(strain, "eyy") == ""
+
+
+@pytest.mark.parametrize(
+    ("channel", "words"),
+    [("stress", "all together ± 0.58 %"), ("mean", " % of the distance from 1; chi2")],
+)
+def test_what_comes_with_the_load_stands_beside(tmp_path: Path, channel: str, words: str) -> None:
+    stated = {"force_error_percent": 1.0} if channel == "stress" else {"strain_error_um_m": 20.0}
+    folder = make_folder(tmp_path, channel, knee=120e6, **stated)
+    evaluated(folder, channel)
+    with Strain.open(folder / "strain.h5") as strain:
+        assert words in response_lines(strain)[0]
 
 
 def test_rate_over_time(tmp_path: Path) -> None:
