@@ -160,6 +160,15 @@ def test_few_pictures_far_apart_show_a_knee() -> None:
     assert at.min() > 130 and at.max() < 152
 
 
+@pytest.mark.parametrize(("rate", "apart"), [(25, 0.5), (40, 0.3), (60, 0.5)])
+def test_flow_that_goes_on_slowly_is_no_step(rate: float, apart: float) -> None:
+    x = np.concatenate([np.linspace(10, 148, 90), 148 + apart * np.arange(1, 61)])
+    y = np.repeat((SLOPE * x + rate * np.maximum(x - 150, 0))[:, None], 2000, axis=1)
+    found = departures(x, measured(y))
+    assert set(found.segments) == {0}
+    assert np.isfinite(found.at).all() and np.percentile(found.at, 99) < 165
+
+
 def test_a_lost_place_has_not_left() -> None:
     y = measured(np.repeat(SLOPE * MPA[:, None], 1000, axis=1))
     y[40:, :300] = np.nan

@@ -70,7 +70,8 @@ class Departures:
         self._sums = ResponseSums()
         self._held: deque[_Instant] = deque()
         self._segment, self._reference = 0, 0
-        self._usual = 0.0, 0  # of what all have in common: sum of squares, instants
+        # Of what all have in common in the line: sum of squares, instants, the last.
+        self._usual = 0.0, 0, 0.0
 
     def add(self, x: float, y: Floats, sigma: Floats, reference: int = 0) -> None:
         """One instant; parameters as ``ResponseSums.of``."""
@@ -92,7 +93,7 @@ class Departures:
         one = self._held.popleft()
         off = np.nan if lines is None else self._off(lines, one)
         if np.isfinite(off):
-            self._usual = self._usual[0] + off**2, self._usual[1] + 1
+            self._usual = self._usual[0] + off**2, self._usual[1] + 1, off
         on = np.where(np.isnan(self.at), one.y, np.nan)
         self._sums += ResponseSums.of(one.x, on, one.sigma, self.segments[one.number])
 
@@ -135,7 +136,7 @@ class Departures:
         largest = float(np.max(np.abs(common)))
         usual = (self._usual[0] / max(self._usual[1], 1)) ** 0.5
         first = int(np.argmax(np.abs(common) > largest / 2))
-        step = abs(common[first] - (common[first - 1] if first else 0.0))
+        step = abs(common[first] - (common[first - 1] if first else self._usual[2]))
         if not (step > _STEP * largest and largest > _CLEAR * usual):
             return ""
         if first > 0:
