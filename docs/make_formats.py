@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
@@ -90,6 +91,17 @@ def strain_maps() -> str:
     return table(("`/entry/strain/...`", "type", "unit", "meaning"), rows)
 
 
+def response() -> str:
+    """The datasets of the group response."""
+    grid = ZoiGrid.cover(Roi(0, 0, 16 * (COLUMNS_OF_ZOIS + 1), 16 * (ROWS_OF_ZOIS + 1)), size=32, step=16)
+    with tempfile.TemporaryDirectory() as folder:
+        Results(Path(folder), grid, replace(_INFO, response="stress")).close()
+        with h5py.File(Path(folder) / "strain.h5") as file:
+            group = file["entry/response"]
+            rows = [row for name in group if name not in "xy" for row in _described(name, group[name])]
+    return table(("`/entry/response/...`", "type", "unit", "meaning"), rows)
+
+
 def means() -> str:
     """The columns of strain.csv."""
     names = (*COLUMNS, *_INFO.extras, "gauge_NAME", "sigma_gauge_NAME", "share_gauge_NAME")
@@ -143,6 +155,7 @@ def _text(value: object) -> str:
 
 TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
     "session": session_layout, "flags": flags, "maps": strain_maps, "means": means, "status": statuses,
+    "response": response,
 })  # fmt: skip
 PAGES = (DOCS / "session-format.md", DOCS / "strain-format.md")
 _TABLE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)

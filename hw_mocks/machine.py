@@ -292,6 +292,16 @@ class FlowCurve:
         """Axial stress, Pa, at an axial strain >= 0."""
         return np.asarray(self.E * (np.asarray(strain, float) - self.plastic_strain(strain)))
 
+    def strain_at(self, stress: ArrayLike) -> Array:
+        """Axial strain at an axial stress >= 0, Pa; Newton's rule cannot overshoot here either."""
+        total = np.asarray(stress, float)
+        ep = np.zeros_like(total)
+        for _ in range(NEWTON_STEPS):
+            decay = np.exp(-self.voce_rate * ep)
+            flow = self.yield_stress + self.voce * (1 - decay) + self.hardening * ep
+            ep = np.maximum(ep + (total - flow) / (self.voce * self.voce_rate * decay + self.hardening), 0.0)
+        return np.asarray(total / self.E + ep)
+
     def transverse(self, strain: ArrayLike) -> Array:
         """Transverse strain at an axial strain >= 0."""
         plastic = self.plastic_strain(strain)

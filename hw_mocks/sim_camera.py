@@ -325,7 +325,7 @@ def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpec
     """Open ``sim:KIND?key=value...`` on a specimen made by ``specimen_from`` of the same address.
 
     Keys, beside those of the specimen (width, height, seconds, hold, end, max_strain, E_GPa, nu,
-    yield_MPa, section_mm2, px_per_mm, n, r, neck, axis, hole, cell, overstrain, drift_x,
+    yield_MPa, yield2_MPa (of halves), section_mm2, px_per_mm, n, r, neck, axis, hole, cell, overstrain, drift_x,
     drift_y, rotation_deg, lockstep, machine, waits): fps (a number, or auto: what this machine renders with ease),
     bits, noise (% of full scale at mid-grey), fpn (%), brightness, exposure_us, radius (px), contrast (%), seed,
     buffers, offset (s), faults. Of the view (``hw_mocks.optics``): stand_off_mm (none: telecentric), distortion

@@ -9,7 +9,7 @@ displacement gradient (engineering strain along the load), about the middle of t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,7 +21,7 @@ from hw_mocks.machine import FlowCurve, Machine, PowerLaw, Programme, Pull, Test
 from hw_mocks.strain_modes import NECK_AT, Axis, Kind, StrainModes
 
 Array = NDArray[np.float64]
-KINDS: tuple[Kind, ...] = ("uniform", "hole", "woven")
+KINDS: tuple[Kind, ...] = ("uniform", "hole", "woven", "halves")
 SPECIMEN_KEYS = frozenset(
     {
         "width",
@@ -29,6 +29,7 @@ SPECIMEN_KEYS = frozenset(
         "E_GPa",
         "nu",
         "yield_MPa",
+        "yield2_MPa",
         "n",
         "r",
         "seconds",
@@ -58,7 +59,7 @@ class VirtualSpecimen:
 
     Attributes
     ----------
-    kind : "uniform" | "hole" | "woven"
+    kind : "uniform" | "hole" | "woven" | "halves"
         See ``hw_mocks.strain_modes``.
     width, height : int, px
         The field of view.
@@ -77,6 +78,9 @@ class VirtualSpecimen:
     neck_px : float, px
         Width of a neck (``StrainModes.neck``) that grows from the highest force on, while the rest rests; 0: none.
         The strain of the programme, and the stress, are then those of its middle.
+    second : FlowCurve or None
+        Of the second of two halves, where y (x) is larger; ``material`` is that of the first, whose strain is that of
+        the programme. Both have one stress.
     drift_px : (float, float), px
         Rigid displacement along x and y reached at the end of the ramp.
     rotation_rad : float, rad
@@ -99,6 +103,7 @@ class VirtualSpecimen:
     cell_px: float = 96.0
     overstrain: float = 0.6
     neck_px: float = 0.0
+    second: FlowCurve | None = None
     drift_px: tuple[float, float] = (0.0, 0.0)
     rotation_rad: float = 0.0
     nominal: bool = False
@@ -141,18 +146,23 @@ class VirtualSpecimen:
         return self.clock.elapsed(now)
 
     def axial_strain(self, t: ArrayLike) -> Array:
-        """Mean strain along the load, ``t`` seconds since the start (for the hole: remote; beside the neck)."""
+        """Mean strain along the load, ``t`` seconds since the start.
+
+        For the hole: remote; with a neck: beside it; of two halves: of the second.
+        """
         strain = self.programme.strain(t)
+        if self.second is not None:
+            return self.second.strain_at(self.material.stress(strain))
         if self.neck_px and isinstance(self.material, PowerLaw):
             return np.minimum(strain, self.material.uniform_strain)
         return strain
 
     def transverse_strain(self, t: ArrayLike) -> Array:
-        """Mean strain across the load (for the hole: remote)."""
-        return self.material.transverse(self.axial_strain(t))
+        """Mean strain across the load (for the hole: remote; of the second half)."""
+        return (self.second or self.material).transverse(self.axial_strain(t))
 
     def neck_strains(self, t: float) -> tuple[float, float]:
-        """Strains along and across the load in the middle of the neck."""
+        """Strains along and across the load in the middle of the neck, or in the first half."""
         strain = self.programme.strain(t)
         return float(strain), float(self.material.transverse(strain))
 
@@ -169,7 +179,8 @@ class VirtualSpecimen:
         progress = float(self.programme.progress(t))
         shift = (progress * self.drift_px[0], progress * self.drift_px[1])
         axial, transverse = float(self.axial_strain(t)), float(self.transverse_strain(t))
-        neck = self.neck_strains(t) if self.neck_px else (axial, transverse)
+        apart = self.neck_px or self.second is not None
+        neck = self.neck_strains(t) if apart else (axial, transverse)
         beyond = neck[0] - axial, neck[1] - transverse
         return SpecimenDeformation(self.modes, axial, transverse, progress * self.rotation_rad, shift, beyond)
 
@@ -218,7 +229,7 @@ def specimen_from(address: Address) -> VirtualSpecimen:
 def take_specimen(options: Options) -> VirtualSpecimen:
     """Take the keys of the specimen out of an address's settings; raises as ``specimen_from``."""
     kind = _kind(options.address)
-    material, clock = _take_material(options), TestClock()
+    material, clock = _take_material(options, 120.0 if kind == "halves" else 140.0), TestClock()
     return VirtualSpecimen(
         kind=kind,
         width=options.integer("width", 640, minimum=32, maximum=8192),
@@ -232,6 +243,7 @@ def take_specimen(options: Options) -> VirtualSpecimen:
         cell_px=options.number("cell", 96.0, minimum=8),
         overstrain=options.number("overstrain", 0.6, minimum=0, maximum=0.95),
         neck_px=_take_neck(options, kind, material),
+        second=_take_second(options, kind, material),
         drift_px=(options.number("drift_x", 0.0), options.number("drift_y", 0.0)),
         rotation_rad=math.radians(options.number("rotation_deg", 0.0, minimum=-45, maximum=45)),
         nominal=options.flag("lockstep"),
@@ -261,11 +273,20 @@ def _take_neck(options: Options, kind: Kind, material: FlowCurve | PowerLaw) -> 
     return width
 
 
-def _take_material(options: Options) -> FlowCurve | PowerLaw:
+def _take_second(options: Options, kind: Kind, material: FlowCurve | PowerLaw) -> FlowCurve | None:
+    strength = options.number("yield2_MPa", minimum=1e-3)
+    if kind != "halves" and strength is None:
+        return None
+    if kind != "halves" or not isinstance(material, FlowCurve):
+        raise ConfigError("{text}: yield2_MPa is of sim:halves, which have no n or r", options.address.text)
+    return replace(material, yield_stress=(160.0 if strength is None else strength) * 1e6)
+
+
+def _take_material(options: Options, yield_MPa: float) -> FlowCurve | PowerLaw:
     """Sheet metal of given n and r, where one of them is given."""
     modulus = options.number("E_GPa", 70.0, minimum=1e-3) * 1e9
     nu = options.number("nu", 0.33, minimum=0, maximum=0.5)
-    strength = options.number("yield_MPa", 140.0, minimum=1e-3) * 1e6
+    strength = options.number("yield_MPa", yield_MPa, minimum=1e-3) * 1e6
     n, r = options.number("n", minimum=0.01, maximum=0.9), options.number("r", minimum=0.05, maximum=10)
     if n is None and r is None:
         return FlowCurve(E=modulus, nu=nu, yield_stress=strength)

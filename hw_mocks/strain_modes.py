@@ -10,7 +10,10 @@ gradients, so that they are computed once for the places that matter and combine
 - woven: homogeneous plus a periodic part with over-strain where the yarns of a plain weave cross;
   its mean over a cell is the mean strain.
 
-Beside these a neck may grow: a band across the load whose strains, beyond those elsewhere, fall off as sech^2.
+- halves: homogeneous in each of two halves along the load, which flow at different stresses.
+
+Beside these a neck may grow: a band across the load whose strains, beyond those elsewhere, fall off as sech^2. The
+first half is such a part too: what it has beyond the second one falls off at its edge as tanh.
 """
 
 from __future__ import annotations
@@ -24,12 +27,13 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-Kind = Literal["uniform", "hole", "woven"]
+Kind = Literal["uniform", "hole", "woven", "halves"]
 Axis = Literal["x", "y"]
 Mode = tuple[Array, Array, Array, Array, Array, Array]  # u, v, du_dx, du_dy, dv_dx, dv_dy
 # The field is continued into the hole down to this part of its radius, where it stays finite.
 CONTINUED = 0.75
 NECK_AT = 0.2  # of the distance along the load, from the centre
+SEAM_PX = 4.0  # half the width of the seam between two halves
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +47,8 @@ class Modes:
     axial, transverse : tuple of six arrays
         u and v in px, then du_dx, du_dy, dv_dx, dv_dy.
     neck : pair of the same, or None
-        Per unit of strain that the middle of the neck has more than the rest, along and across the load.
+        Per unit of strain that the middle of the neck, or the first half, has more than the rest, along and across
+        the load.
     """
 
     dx: Array
@@ -59,7 +64,7 @@ class StrainModes:
 
     Attributes
     ----------
-    kind : "uniform" | "hole" | "woven"
+    kind : "uniform" | "hole" | "woven" | "halves"
     axis : "x" | "y"
         Direction of the load.
     x0, y0 : float, px
@@ -95,6 +100,8 @@ class StrainModes:
         else:
             pair = _uniform(along, across)
         neck = _necked(along, across, *self.neck) if self.neck[1] else None
+        if self.kind == "halves":
+            neck = _first_half(along, across)
         if self.axis == "x":
             return Modes(dx, dy, *pair, neck)
         turned = None if neck is None else (_swapped(neck[0]), _swapped(neck[1]))
@@ -116,6 +123,14 @@ def _necked(along: Array, across: Array, middle: float, width: float) -> tuple[M
     share = 1 / np.cosh(np.clip(far, -300, 300)) ** 2
     moved = width * (np.tanh(far) + math.tanh(middle / width))
     narrows = -2 / width * share * np.tanh(far) * across
+    return (moved, zero, share, zero, zero, zero), (zero, across * share, zero, zero, narrows, share)
+
+
+def _first_half(along: Array, across: Array) -> tuple[Mode, Mode]:
+    far, zero = along / SEAM_PX, np.zeros_like(along)
+    share = (1 - np.tanh(far)) / 2
+    moved = (along - SEAM_PX * (np.logaddexp(far, -far) - math.log(2))) / 2
+    narrows = -across / (2 * SEAM_PX) / np.cosh(np.clip(far, -300, 300)) ** 2
     return (moved, zero, share, zero, zero, zero), (zero, across * share, zero, zero, narrows, share)
 
 

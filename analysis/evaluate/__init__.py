@@ -4,7 +4,7 @@
 a ``curve`` by one of the ``standards``, its ``elastic`` line, its ``strengths``, its plastic ``flow``, each a
 ``figure`` with an interval; ``programme`` finds what kind of test it is, ``seen`` what of the force was seen. ``lag``
 is the delay of the load beside the frames. ``floor`` has the still phase of a test and the noise floor in it.
-``deconvolution`` removes the blur of the ZOI from a map.
+``deconvolution`` removes the blur of the ZOI from a map. ``response`` has what each place does over all instants.
 """
 
 from analysis.evaluate.area.strain import AreaStrain, Unevenness

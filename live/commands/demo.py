@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 WIDTH_MM, THICKNESS_MM = 20.0, 2.0
-SPECIMENS = ("woven", "uniform", "hole")
+SPECIMENS = ("woven", "uniform", "hole", "halves")
 RELATIVE = 0.0005  # of the strain, beside three times the predicted uncertainty
 MIN_WITHIN = 0.97  # 99 % are to be expected; of 150 values, chance takes one in a few runs below that
 FAR = 2.5  # half intervals of E: beyond it, chance takes one run in a million

@@ -28,7 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--to", required=True, choices=tuple(FORMATS), help="format")
     parser.add_argument("--out", metavar="PATH", help="new file or folder (default: in RUN/export)")
     words = (
-        "maps separated by commas, or all (default: the usual maps; for pictures and stacks the axial strain)"
+        "maps separated by commas, all, or response: those of replay --response (default: the usual maps; for pictures"
+        " and stacks the axial strain)"
     )
     parser.add_argument("--fields", metavar="NAMES", help=words)
     parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin at this time, s")

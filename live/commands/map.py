@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--field",
         default="eyy",
-        help="u, v, exx, eyy, exy, sigma_eyy, residual, status ... (default eyy)",
+        help="u, v, exx, eyy, exy, sigma_eyy, residual, status, a map of replay --response ... (default eyy)",
     )
     parser.add_argument(
         "--row",

@@ -120,6 +120,8 @@ class RunInfo:
         Takes a reason and ends a live run cleanly; None in a replay.
     deferred : bool
         Nothing reads the files in ``folder`` before the test has ended, so they need not be flushed often.
+    response : str
+        What the response of each place will be over; empty: none.
     """
 
     config: Config
@@ -129,6 +131,7 @@ class RunInfo:
     start: ClockPair
     end: Callable[[str], None] | None = None
     deferred: bool = False
+    response: str = ""
 
 
 Compose = Callable[[RunInfo, RunState], Sequence[Consumer]]

@@ -41,6 +41,8 @@ from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Work, 
 from live.results.finished.figures_file import finished
 from live.results.finished.finished_test import FinishedTest
 from live.results.folder import LOG, BurstFailures, check_folder, make_folder
+from live.results.response.evaluate import response_of
+from live.results.response.rising import check_channel
 from live.results.writer import write_results
 from live.setup.devices import open_rig
 from live.setup.pictures import with_film, with_mask
@@ -188,6 +190,7 @@ def _run(
     stored = StoredResults.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements
     bursts = _not_empty(stored.bursts() if stored else source.bursts, request, source.count)
+    check_channel(request.response, ready.plan.config, forces=len(source.loads) > 0)
     folder = make_folder(ready.plan.config.output.dir, datetime.datetime.now(datetime.UTC))
     config = _with_final_folder(with_mask(ready.plan.config, ready.plan.mask, folder), request.final_folder)
     run_state = RunState(
@@ -207,6 +210,7 @@ def _run(
         ready.plan.grid,
         source.start,
         deferred=request.final_folder is not None,
+        response=request.response,
     )
     made = with_force_watch(consumers(about, run_state), run_state)
     stream = Stream()
@@ -251,6 +255,8 @@ def _run(
     code = 130 if stopping.is_set() else 5 if lossy else 0
     at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
     test = finished(folder, config, run_state, code, at_reference)
+    if request.response:
+        lines = [*response_of(folder, test.figures, request.response), *lines]
     return Replayed(folder, run_state, config, code, test, tuple(lines), left_out)
 
 

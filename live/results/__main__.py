@@ -19,7 +19,7 @@ def main(path: str) -> int:
             for first in range(0, strain.n, PIECE):
                 strain.maps("status", slice(first, first + PIECE))
                 still_reading()
-            for name in strain.names if strain.n else ():
+            for name in (*strain.names, *strain.whole_names) if strain.n else ():
                 strain.maps(name, -1)
                 still_reading()
     except DataError as error:

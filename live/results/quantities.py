@@ -26,7 +26,7 @@ class Quantity:
     name : str
         As in ``strain.h5``, without a unit.
     unit : str
-        "px", "s", "N", "Pa", "GL" or "" (dimensionless).
+        "px", "s", "N", "Pa", "1/Pa", "1/s", "GL" or "" (dimensionless).
     words : str
         Its definition.
     """
@@ -66,6 +66,25 @@ _FIELDS = (
     Quantity("blur", "px", "standard deviation of the blur since the reference; negative: sharper"),
     Quantity("status", UNITLESS, "0 where the ZOI has a value, else the reason why it has none"),
     Quantity("iterations", UNITLESS, "iterations of the fit"),
+)
+_RESPONSES = (
+    Quantity("compliance", "1/Pa", "strain along the load over stress, slope over all instants"),
+    Quantity(
+        "amplification", UNITLESS, "strain along the load over that of the channel, slope over all instants"
+    ),
+    Quantity("rate", "1/s", "strain along the load over time, slope over all instants"),
+    Quantity("chi2", UNITLESS, "variance left by the line over that expected from the noise; about 1"),
+    Quantity("instants", UNITLESS, "instants in the line of the place"),
+    Quantity(
+        "poisson", UNITLESS, "minus the strain across the load over that along it; noise of both allowed for"
+    ),
+    Quantity("leaves_at_stress", "Pa", "stress where the place leaves its line; nan where it does not"),
+    Quantity("leaves_at_strain", UNITLESS, "strain of the channel where the place leaves its line; else nan"),
+    Quantity(
+        "current", UNITLESS, "share of the variance of strains at each instant that is not of the reference"
+    ),
+    Quantity("correlation", UNITLESS, "of the noises of exx and eyy, against each reference"),
+    Quantity("fate", UNITLESS, "0: on its line to the end, 1: left it, 2: lost before the end"),
 )
 _PLACES = (
     Quantity("x", "px", "centre of the ZOI on the reference picture"),
@@ -129,7 +148,7 @@ _INSTANTS = (
     Quantity("latency", "s", "from the stamp of the last frame of the burst to the result; nan in a replay"),
 )
 _GAUGE, _SHARE = "gauge_", "share_gauge_"
-_KNOWN = {q.name: q for q in (*_FIELDS, *_PLACES, *_INSTANTS)}
+_KNOWN = {q.name: q for q in (*_FIELDS, *_RESPONSES, *_PLACES, *_INSTANTS)}
 
 MEANS = {
     "time_s": "time", "force_N": "force", "stress_Pa": "stress", "true_stress_Pa": "true_stress",
@@ -210,7 +229,7 @@ class Display:
 
     def column(self, name: str) -> str:
         """Name and unit, for heads of columns and names of arrays: ``u_mm``, ``eyy_percent``."""
-        unit = self.unit(name).replace("%", "percent")
+        unit = self.unit(name).replace("%", "percent").replace("1/", "per_")
         plain = quantity_of(name).name
         return f"{plain}_{unit}" if unit else plain
 

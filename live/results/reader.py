@@ -38,6 +38,7 @@ from acquire.hdf5 import (
 from analysis.field import ZoiGrid
 from live.results import layout
 from live.results.quantities import Display, mean_name, quantity_of
+from live.results.response.stored import StoredResponse, read_response
 
 _log = logging.getLogger(__name__)
 _LENGTH, _POSITION = JsonField(int, 1, layout.MAX_SIDE_PX), JsonField(int, 0, layout.MAX_SIDE_PX)
@@ -64,6 +65,10 @@ class Strain(Closing):
     config, metadata, versions : dict
     values : mapping of name to (T,) array
         The columns of ``strain.csv``, ``force_N`` and the means among them.
+    names : tuple of str
+        Maps of each instant.
+    response : StoredResponse or None
+        What each place did over all instants; its maps are among those of ``maps`` too, the same at each instant.
     """
 
     def __init__(self, path: Path, file: Any, *, unfinished: bool) -> None:
@@ -83,6 +88,7 @@ class Strain(Closing):
         self.names = (*layout.MAPS, *(name for name in layout.ADDED_MAPS if name in strain))
         self._maps = open_datasets(strain, {n: layout.map_declared(n, self.grid.shape) for n in self.names})
         self._references = _references(entry, self.grid.shape)
+        self.response: StoredResponse | None = read_response(entry, self.grid.shape)
         columns = _columns(mean)
         self.n = _rows(path, [*self._maps.values(), *columns.values()], whole=not unfinished)
         self.values: dict[str, NDArray[Any]] = {name: item[: self.n] for name, item in columns.items()}
@@ -117,6 +123,11 @@ class Strain(Closing):
             file.close()
             raise DataError(f"{path}: is damaged ({error}); make it again with phasedic replay") from error
 
+    @property
+    def whole_names(self) -> tuple[str, ...]:
+        """Maps of the whole test: those of ``response``."""
+        return () if self.response is None else self.response.names
+
     def maps(self, name: str, row: int | slice = slice(None)) -> NDArray[Any]:
         """(T, R, C) maps of ``name`` (see ``names``), or the (R, C) map of one row.
 
@@ -125,14 +136,18 @@ class Strain(Closing):
         DataError
             There is no such map or row.
         """
-        if name not in self.names:
-            raise DataError(f"{self.path}: no map {name!r}; there are {', '.join(self.names)}")
+        names = (*self.names, *self.whole_names)
+        if name not in names:
+            raise DataError(f"{self.path}: no map {name!r}; there are {', '.join(names)}")
         if isinstance(row, int) and not -self.n <= row < self.n:
             there = f"no row {row}; there are {self.n}" if self.n else "holds no measurement"
             raise DataError(f"{self.path}: {there}")
         rows = range(self.n)[row]
-        dataset = self._maps[name]
         try:
+            if self.response is not None and name in self.response.names:
+                one = self.response.map(name)
+                return one if isinstance(rows, int) else np.broadcast_to(one, (len(rows), *one.shape))
+            dataset = self._maps[name]
             if isinstance(rows, int):
                 return np.asarray(dataset[rows])
             return np.asarray(dataset[rows.start : rows.stop : rows.step])

@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
 from numpy.typing import NDArray
 
 from analysis.evaluate import AreaStrain
-from analysis.field import Sums, blur_maps
+from analysis.field import PAIR_INDEX, Sums, blur_maps
 from analysis.optics import NAMES
 from live.pipeline.measurement import AXIAL, extension_along, strains_along
 
@@ -58,6 +59,8 @@ class ResultsInfo:
         A lens is corrected; rows have the strain that it made too.
     lagged : bool
         The force is corrected for a lag of the load; rows have the force as stamped too.
+    response : str
+        What the response of each place will be over; empty: none.
     """
 
     start_monotonic: float
@@ -73,6 +76,7 @@ class ResultsInfo:
     lagged: bool = False
     plates: bool = False
     lens: bool = False
+    response: str = ""
 
     @property
     def extras(self) -> tuple[str, ...]:
@@ -95,17 +99,22 @@ class StrainRow:
         One a row, in the order of the columns of ``strain.csv``.
     pattern : Sums or None
         Of the reference, by which areas weigh their ZOIs.
+    noise : (float, (R, C) array) or None
+        Share of the variance of strains that is not of the reference, and correlation of the noises of exx and eyy;
+        where a response is wanted.
     """
 
     maps: dict[str, NDArray[Any]]
     values: dict[str, float | int]
     pattern: Sums | None = None
+    noise: tuple[float, NDArray[np.float64]] | None = None
 
     @classmethod
     def of(cls, measurement: Measurement, info: ResultsInfo, axis: str = "y") -> StrainRow:
         """The row of ``measurement``, strains in the measure of ``info``; ``axis`` is that of the load."""
         maps = maps_of(measurement.field, info.strain_measure)
-        return cls(maps, _values(measurement, maps, info, axis), measurement.field.sums)
+        noise = _noise(measurement.field) if info.response else None
+        return cls(maps, _values(measurement, maps, info, axis), measurement.field.sums, noise)
 
 
 def gauge_columns(name: str) -> tuple[str, str, str]:
@@ -122,6 +131,16 @@ def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any
     maps |= {name: getattr(field, name) for name in ("residual", "status", "iterations")}
     maps |= dict(zip(BLUR, blur_maps(field), strict=True))
     return maps
+
+
+def _noise(field: StrainField) -> tuple[float, NDArray[np.float64]]:
+    """As ``StrainRow.noise``, the share of a typical ZOI; the correlation is 0 where it is not known."""
+    x, y = field.sigma("exx"), field.sigma("eyy")
+    known = field.ok & (x > 0) & (y > 0)
+    shares = (field.sigma("eyy", "current")[known] / y[known]) ** 2
+    both = np.zeros(known.shape)
+    np.divide(field.covariance[PAIR_INDEX[1, 5]], x * y, out=both, where=known)  # of du_dx and dv_dy
+    return float(np.median(shares)) if shares.size else 1.0, both
 
 
 def _values(

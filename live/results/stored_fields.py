@@ -83,7 +83,7 @@ def read_field(strain: Strain, row: int) -> StrainField:
     both = sigmas["du_dy"] ** 2 + sigmas["dv_dx"] ** 2
     covariance[PAIR_INDEX[_DU_DY, _DV_DX]] = (4 * shear**2 - both) / 2
     measure = cast(Measure, strain.strain_measure)
-    return replace(field, covariance=covariance, measure=measure, window=_window(strain))
+    return replace(field, covariance=covariance, measure=measure, window=window_of(strain))
 
 
 def stored_pattern(strain: Strain, reference: int) -> StoredPattern:
@@ -100,10 +100,10 @@ def stored_pattern(strain: Strain, reference: int) -> StoredPattern:
         np.isfinite(normal).all() and (normal[i == j] >= 0).all() and (normal[i == j] > 0).all(axis=0).any()
     ):
         raise DataError(f"{strain.path}: its normal matrices are damaged; make it again with phasedic replay")
-    return StoredPattern(normal, Places.of(strain.grid, _window(strain)))
+    return StoredPattern(normal, Places.of(strain.grid, window_of(strain)))
 
 
-def _window(strain: Strain) -> Window:
+def window_of(strain: Strain) -> Window:
     """The window of the ZOIs, on which the correlation of neighbours depends; gaussian where it is not recorded."""
     measure = strain.config.get("measure")
     name = measure.get("window") if isinstance(measure, dict) else None

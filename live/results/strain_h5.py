@@ -20,6 +20,7 @@ from acquire.errors import DataError
 from acquire.hdf5 import (
     COMPRESSED,
     FlushTimer,
+    GrowingDataset,
     PictureStack,
     RowTable,
     abandon_file,
@@ -31,6 +32,7 @@ from acquire.text.printable import counted
 from analysis.evaluate import load_axis
 from live.results import layout
 from live.results.quantities import quantity_of
+from live.results.response.stored import CORRELATION, CURRENT, GROUP, add_group
 from live.results.row import STRAINS, StrainRow, gauge_columns
 
 if TYPE_CHECKING:
@@ -95,6 +97,8 @@ class StrainWriter:
         self._values = RowTable(entry["mean"], _value_names(info))
         references = entry[layout.REFERENCES]
         self._normal, self._first_row = PictureStack(references[layout.NORMAL]), references[layout.FIRST_ROW]
+        of_response = (CURRENT, CORRELATION) if info.response else ()
+        self._noise = [GrowingDataset(entry[GROUP][name]) for name in of_response]
         self._grid = grid
         self._pattern: Sums | None = None
 
@@ -131,8 +135,12 @@ class StrainWriter:
         if row.pattern is not None and row.pattern is not self._pattern:
             self._pattern = row.pattern
             self._append_normal(normal_matrices(row.pattern, self._grid))
+            if row.noise is not None:
+                self._noise[1].append(row.noise[1][None].astype(np.float32))
         for name, stored in rounded(row.maps).items():
             self._maps[name].append(stored)
+        if row.noise is not None:
+            self._noise[0].append(np.array([row.noise[0]], np.float32))
         self._values.hold(values)
 
     def _append_normal(self, normal: NDArray[np.float32]) -> None:
@@ -228,6 +236,8 @@ def _declare(file: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
     entry["title"] = storable(str(info.metadata.get("specimen", "") or "phasedic"))
     _add_strain(entry, grid, info)
     _add_references(entry, grid.shape)
+    if info.response:
+        add_group(entry, info.response, grid.shape)
     _add_mean(entry, info)
     _add_gauges(entry, info)
     _add_notes(entry, info)

@@ -151,6 +151,7 @@ def write_results(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
         lagged=config.load.lag_s != 0,
         plates=bool(config.plate),
         lens=config.lens.focal_px is not None,
+        response=about.response,
     )
     return [
         ResultsConsumer(

@@ -24,6 +24,7 @@ SPECIMEN = {
     "E_GPa": "a number from 0.001",
     "nu": "a number from 0 to 0.5",
     "yield_MPa": "a number from 0.001",
+    "yield2_MPa": "a number from 0.001",
     "n": "a number from 0.01 to 0.9",
     "r": "a number from 0.05 to 10",
     "seconds": "a number from 0.1",

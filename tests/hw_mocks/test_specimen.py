@@ -23,6 +23,12 @@ DEFORMATIONS: dict[str, Deformation] = {
         for axis in ("x", "y")
     },
     **{
+        f"halves along {axis}": VirtualSpecimen("halves", axis=axis, second=FlowCurve(yield_stress=160e6)).at(
+            17.0
+        )
+        for axis in ("x", "y")
+    },
+    **{
         f"neck along {axis}": VirtualSpecimen(
             axis=axis, neck_px=40.0, material=PowerLaw(0.2, 1.5), programme=Programme(max_strain=0.45)
         ).at(18.5)
@@ -61,6 +67,26 @@ def test_uniform_field_has_the_mean_strains() -> None:
     np.testing.assert_allclose(dv_dy, specimen.axial_strain(15.0))
     np.testing.assert_allclose(du_dx, specimen.transverse_strain(15.0))
     assert not du_dy.any() and not dv_dx.any()
+
+
+def test_two_halves_flow_at_their_own_stress() -> None:
+    specimen = specimen_from(parse_address("sim:halves?seconds=20"))
+    y, t = [40.0, 470.0], np.linspace(2, 20, 400)
+    stress = specimen.stress(t)
+    assert stress.max() > 165e6
+    for seconds, one in zip(t, stress, strict=True):
+        du_dx, _, _, dv_dy = specimen.gradient([320.0, 320.0], y, seconds)
+        for k, flow in enumerate((120e6, 160e6)):
+            metal = FlowCurve(yield_stress=flow)
+            assert float(metal.stress(dv_dy[k])) == pytest.approx(one, rel=1e-9, abs=1.0)
+            assert du_dx[k] == pytest.approx(float(metal.transverse(dv_dy[k])), abs=1e-9)
+            assert (dv_dy[k] > one / metal.E * (1 + 1e-9)) == (one > flow * (1 + 1e-9))
+    other = specimen_from(parse_address("sim:halves?yield_MPa=50&yield2_MPa=70"))
+    assert other.material.yield_stress == 50e6 and other.second is not None
+    assert other.second.yield_stress == 70e6
+    for address in ("sim:woven?yield2_MPa=150", "sim:halves?n=0.2"):
+        with pytest.raises(ConfigError, match="yield2_MPa is of sim:halves"):
+            specimen_from(parse_address(address))
 
 
 def test_a_neck_grows_from_the_highest_force_on_while_the_rest_rests() -> None:

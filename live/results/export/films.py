@@ -18,6 +18,7 @@ from live.results.export.job import ExportJob
 from live.results.maps.painting import Levels, Painter, caption
 from live.results.maps.scale import ColourScale
 from live.results.pictures import Pictures
+from live.results.response.words import response_title
 
 # Codec of the encoders in OpenCV's wheel, and the programs that do not play it.
 _CODECS = {
@@ -131,7 +132,8 @@ def _frames(job: ExportJob, longest: int = 1280) -> Iterator[tuple[int, NDArray[
             if picture is not None and levels is None:
                 levels = Levels.of(picture)
             image = painter.over(painter.picture(picture, levels), row)
-            yield k, painter.framed(image, [caption(job.strain, row)], row)
+            title = response_title(job.strain, name) or caption(job.strain, row)
+            yield k, painter.framed(image, [title], row)
 
 
 def _images(job: ExportJob, pictures: Pictures | None) -> Generator[Any]:

@@ -63,7 +63,7 @@ class ExportRequest:
     out : Path or None
         File or folder; None: in ``export`` in the run's folder.
     fields : str or None
-        Names of maps between commas, "all", or None for the usual ones.
+        Names of maps between commas, "all", "response" (of the whole test), or None for the usual ones.
     start_s, end_s : float or None, s
         Range of time since the start of the test.
     display : Display
@@ -97,6 +97,8 @@ def export(run: RunFolder, request: ExportRequest, screen: Screen) -> Path:
     if not fields:
         raise ConfigError(f"{run.strain.path}: holds none of the usual maps; name some with --fields")
     rows = chosen_rows(run.strain, request.start_s, request.end_s)
+    if {*fields} <= {*run.strain.whole_names}:
+        rows = rows[-1:]  # they are the same at each instant
     job = ExportJob(run, fields, rows, request.display, screen, request.options)
     path = request.out or run.path / FOLDER / _name(kind, request, fields[0])
     if request.format == "mp4" and not path.suffix:

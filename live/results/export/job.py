@@ -15,6 +15,8 @@ from analysis.field import Status
 from live.pipeline.screen import Screen
 from live.results.quantities import Display
 from live.results.reader import Strain
+from live.results.response.stored import GROUP
+from live.results.response.words import response_lines
 from live.results.run_folder import RunFolder
 
 USUAL = ("u", "v", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy", "status")
@@ -116,11 +118,11 @@ class ExportJob:
         ]
         if "status" in self.fields and self.options.layout != "means":
             lines.append("status: " + ", ".join(f"{int(s)} {s.name}" for s in Status))
-        return lines
+        return lines + (response_lines(strain) if {*self.fields} & {*strain.whole_names} else [])
 
 
 def chosen_fields(strain: Strain, requested: str | None, usual: Sequence[str] = USUAL) -> tuple[str, ...]:
-    """Names of maps: ``usual`` for None, all for "all", else the names between commas.
+    """Names of maps: ``usual`` for None, all for "all", those of the whole test for "response", else those named.
 
     Raises
     ------
@@ -131,10 +133,13 @@ def chosen_fields(strain: Strain, requested: str | None, usual: Sequence[str] = 
         return tuple(name for name in usual if name in strain.names)
     if requested == "all":
         return strain.names
+    if requested == GROUP and strain.whole_names:
+        return strain.whole_names
     names = tuple(dict.fromkeys(word.strip() for word in requested.split(",")))
+    known = (*strain.names, *strain.whole_names)
     for name in names:
-        if name not in strain.names:
-            raise ConfigError(f"--fields {name}: there is no such map; there are {', '.join(strain.names)}")
+        if name not in known:
+            raise ConfigError(f"--fields {name}: there is no such map; there are {', '.join(known)}")
     return names
 
 

@@ -22,6 +22,7 @@ from analysis.field import ZoiGrid
 from live.results.maps.painting import Image, Painter
 from live.results.maps.scale import AutoRange, ColourScale, range_kind
 from live.results.reader import Strain
+from live.results.response.words import response_title
 
 DISPLACEMENTS = ("u", "v")
 MAX_MEDIAN, MAX_STEPS, MAX_SHARPENED = 51, 100, 4
@@ -113,7 +114,8 @@ def draw(strain: Strain, request: MapRequest, background: NDArray[Any] | None) -
     painter = Painter(strain, name, scale, size)
     painted = painter.over(painter.picture(background), row, values, moved=False)
     treatment = request.treatment(grid)
-    title = request.title or f"{name}, {strain.time_s[row]:.2f} s, ZOI {grid.size} px"
+    about = response_title(strain, name) or f"{name}, {strain.time_s[row]:.2f} s, ZOI {grid.size} px"
+    title = request.title or about
     return painter.framed(painted, [title, treatment] if treatment else [title], row, axes=True)
 
 
@@ -177,7 +179,9 @@ def save(image: Image, path: Path) -> None:
 
 
 def _sigma(strain: Strain, name: str, row: int) -> NDArray[Any] | None:
-    return strain.maps(f"sigma_{name}", row) if f"sigma_{name}" in strain.names else None
+    return (
+        strain.maps(f"sigma_{name}", row) if f"sigma_{name}" in (*strain.names, *strain.whole_names) else None
+    )
 
 
 def _treated(strain: Strain, request: MapRequest) -> NDArray[np.float64]:

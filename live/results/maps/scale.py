@@ -30,13 +30,27 @@ _SHRINK, _SHRINK_AFTER = 0.55, 20
 _SAMPLE = 25  # instants that give the range of a run
 _UNITS = dict.fromkeys(("u", "v", "blur", "sigma_u", "sigma_v", "sigma_blur"), "px")
 _UNITS |= {"residual": "chi\u00b2", "iterations": ""}
+_UNITS |= dict.fromkeys(
+    ("amplification", "sigma_amplification", "poisson", "sigma_poisson", "instants", "fate"), ""
+)
+_UNITS["chi2"] = "chi\u00b2"
+_SHOWN = {
+    "compliance": ("µm/m/MPa", 1e12), "rate": ("µm/m/s", 1e6), "leaves_at_stress": ("MPa", 1e-6),
+}  # fmt: skip
+_FREE = ("u", "v", "iterations", "amplification", "poisson", "leaves_at_strain", *_SHOWN)
+_FROM_ZERO = ("residual", "chi2", "instants", "fate")
+
+
+def shown_unit(name: str) -> tuple[str, float]:
+    """The unit of a map of the whole test for a person, and what its values are multiplied with."""
+    return _SHOWN.get(name.removeprefix("sigma_"), (_UNITS.get(name, ""), 1.0))
 
 
 def range_kind(name: str) -> Kind:
     """The kind of range of a map: about zero for strains, from zero for uncertainties, else over the values."""
-    if name in ("u", "v", "iterations"):
+    if name in _FREE:
         return "free"
-    return "from zero" if name.startswith("sigma") or name == "residual" else "about zero"
+    return "from zero" if name.startswith("sigma") or name in _FROM_ZERO else "about zero"
 
 
 class AutoRange:
@@ -85,7 +99,7 @@ def _wanted_span(kind: Kind, values: Floats, sigmas: Floats | None) -> Span | No
     least = _NOISE * float(np.median(noise)) if noise.size else 0.0
     if kind == "free":
         low, high = (float(v) for v in np.percentile(found, (50 - _WITHIN / 2, 50 + _WITHIN / 2)))
-        width = max(2 * least, 1e-3 * max(abs(low), abs(high)), 1e-6)
+        width = max(2 * least, 1e-3 * max(abs(low), abs(high))) or 1e-6
         margin = max(width - (high - low), 0) / 2
         return low - margin, high + margin
     largest = 1.05 * float(np.percentile(np.abs(found), _WITHIN))
@@ -125,8 +139,11 @@ class ColourScale:
     def of(cls, name: str, span: Span, unit: str = "", factor: float = 1.0) -> ColourScale:
         """The scale of the map ``name`` from ``span[0]`` to ``span[1]`` of its values.
 
-        ``unit`` and ``factor`` convert the values; without a unit, strains are in um/m or %.
+        ``unit`` and ``factor`` convert the values; without a unit, strains are in um/m or %. Those of the whole test
+        have units of their own.
         """
+        if name.removeprefix("sigma_") in _SHOWN:
+            unit, factor = shown_unit(name)
         unit = unit or _UNITS.get(name, "")
         if not unit and name not in _UNITS:
             shown = unit_for(max(abs(end) for end in span))
@@ -148,7 +165,11 @@ class ColourScale:
         picked = [rows[k] for k in np.unique(np.linspace(0, len(rows) - 1, _SAMPLE).astype(int))]
         sigma = f"sigma_{name}"
         values = np.stack([strain.maps(name, row) for row in picked])
-        sigmas = np.stack([strain.maps(sigma, row) for row in picked]) if sigma in strain.names else None
+        sigmas = (
+            np.stack([strain.maps(sigma, row) for row in picked])
+            if sigma in (*strain.names, *strain.whole_names)
+            else None
+        )
         return cls.of(name, AutoRange(range_kind(name), limit).update(values, sigmas), unit, factor)
 
     def colours(self, values: Floats, alpha: int = OPACITY) -> Image:

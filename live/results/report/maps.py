@@ -16,7 +16,9 @@ from live.results.maps.colours import number, ramp, ticks
 from live.results.maps.painting import Levels, Painter, caption
 from live.results.maps.scale import ColourScale, status_legend
 from live.results.quantities import quantity_of
-from live.results.report.page import Html, captioned, element, joined, safe
+from live.results.report.page import Html, captioned, element, joined, paragraph, safe
+from live.results.response.stored import FATE
+from live.results.response.words import response_lines, response_title
 from live.results.run_folder import RunFolder
 
 _QUALITY = 80
@@ -80,6 +82,23 @@ def maps(
     return joined(
         [element("h3", f"{name}, {scale.unit}"), bar, element("div", joined(pairs), class_="pairs")]
     )
+
+
+def whole_maps(run: RunFolder, row: int, pictures: MapPictures, longest: int) -> list[Html]:
+    """What each place did over all instants: its maps on the reference, over the picture of an early instant."""
+    found, shown = run.strain.response, []
+    for name in () if found is None else found.names:
+        values = run.strain.maps(name, row)
+        if name in (FATE, "instants", "sigma_poisson") or not np.isfinite(values).any():
+            continue
+        scale = ColourScale.of_run(run.strain, name, [row])
+        painter = Painter(run.strain, name, scale, pictures.size, longest)
+        base = painter.picture(pictures.images.get(row), pictures.levels)
+        picture = _picture(painter.over(base, row, values, moved=False), f"{name} of each place")
+        words = f"{response_title(run.strain, name)}{f', {scale.unit}' * bool(scale.unit)}; {quantity_of(name).words}"
+        shown.append(captioned(joined([picture, _bar(name, scale)], ""), words))
+    lines = [paragraph(line) for line in response_lines(run.strain)]
+    return [*lines, element("div", joined(shown), class_="plots")] if shown else lines
 
 
 def statuses(run: RunFolder, row: int, pictures: MapPictures, longest: int) -> Html:

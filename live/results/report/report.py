@@ -19,7 +19,7 @@ from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
 from live.results.report import curves
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
-from live.results.report.maps import MapPictures, map_pictures, maps, statuses
+from live.results.report.maps import MapPictures, map_pictures, maps, statuses, whole_maps
 from live.results.report.noise_floor import StillPhase, still_phase_of
 from live.results.report.page import (
     Html,
@@ -137,6 +137,7 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
         section("Virtual gauges", gauges(run)),
         section("Lag and latency", times(run, content.test)),
         section("Maps", *(maps(run, name, chosen, pictures, side) for name in fields)),
+        section("Response of each place", *whole_maps(run, min(chosen), pictures, min(side, 480))),
         section("Noise floor", *_noise_section(content)),
         *_sharpness_section(run),
         *_lens_section(run),

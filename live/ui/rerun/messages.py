@@ -61,6 +61,8 @@ class ViewSetup:
         For slow connections: smaller pictures, fewer maps.
     scale : "symmetric" | "automatic"
         Colour range of the maps: symmetric about zero, or that of the values.
+    whole : sequence of str
+        Further maps: those of the whole test, of a finished one.
     """
 
     title: str
@@ -79,6 +81,7 @@ class ViewSetup:
     gauges: Sequence[str] = ()
     light: bool = False
     scale: Literal["symmetric", "automatic"] = "symmetric"
+    whole: Sequence[str] = ()
 
 
 Row = tuple[float, ...]

@@ -24,6 +24,8 @@ from live.config.gauges import outlines
 from live.config.loading import from_dict
 from live.pipeline.screen import Screen
 from live.results.figures import figure_lines, tensile_options
+from live.results.response.stored import FATE
+from live.results.response.words import response_lines
 from live.results.run_folder import RunFolder
 from live.ui.rerun.messages import (
     STRAINS,
@@ -204,6 +206,7 @@ def view_setup(run: RunFolder) -> ViewSetup:
         with_load=bool(np.isfinite(run.force).any()),
         outlines=_outlines(run),
         gauges=tuple(run.gauges),
+        whole=tuple(name for name in run.strain.whole_names if name not in (FATE, "instants")),
     )
 
 
@@ -226,6 +229,8 @@ def playback_messages(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Parcel]
         A file cannot be read.
     """
     yield Parcel(Kind.STATUS, {"markdown": _status(run)})
+    if names := run.strain.whole_names:
+        yield Parcel(Kind.WHOLE, {}, {name: run.strain.maps(name, 0) for name in names})
     yield from _curves(run)
     yield from _events(run)
     pictures = iter(()) if run.pictures is None else run.pictures.each(rows)
@@ -273,6 +278,7 @@ def _status(run: RunFolder) -> str:
         f"gauge **{name}** {gauge.value[-1] * 1e6:+.0f} ± {gauge.sigma[-1] * 1e6:.0f} µm/m at the end"
         for name, gauge in run.gauges.items()
     ]
+    lines += response_lines(run.strain)
     values = run.strain.values
     head = f"**{run.title}**, {run.strain.n} instants, {values['n_valid'][-1]} of {values['n_zoi'][-1]} ZOIs at the end"
     return "\n\n".join([head, *(line.strip() for line in lines)])

@@ -44,6 +44,7 @@ class Kind(IntEnum):
     END = 9
     FIGURES = 10
     GAUGE = 11
+    WHOLE = 12
     SERVING = 20  # port (None: no server), rrd (None: no file)
     TROUBLE = 21  # text, lasting: whether a restart is useless
     FULL = 22  # memory_MiB: the process ends because it grew to this

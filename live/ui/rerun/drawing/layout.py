@@ -88,7 +88,7 @@ def _middle(setup: ViewSetup) -> Any:
     import rerun.blueprint as rrb
 
     axial = "eyy" if setup.axis == "y" else "exx"
-    maps = rrb.Tabs(*(_map(setup, name) for name in MAPS), active_tab=MAPS.index(axial))
+    maps = rrb.Tabs(*(_map(setup, name) for name in (*MAPS, *setup.whole)), active_tab=MAPS.index(axial))
     curve = [_curve(setup)] if setup.with_load else []
     if setup.width > _WIDE * setup.height:
         return rrb.Horizontal(

@@ -139,6 +139,8 @@ def _show(scene: ViewScene, message: Parcel) -> None:
             scene.event(event)
     elif kind is Kind.STATUS:
         scene.status(str(message.meta.get("markdown", "")))
+    elif kind is Kind.WHOLE:
+        scene.whole(message.arrays)
     elif kind is Kind.FIGURES:
         scene.figures(figures_of(message))
 

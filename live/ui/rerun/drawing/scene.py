@@ -6,10 +6,11 @@ Threads, processes and servers are elsewhere. Rates are per second of the test (
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquire.events import Event, EventKind
 from analysis.field import Status
@@ -17,6 +18,7 @@ from live.pipeline.queues import Thinned
 from live.pipeline.snapshot import Snapshot
 from live.results.maps.colours import number, ramp
 from live.results.maps.field_maps import FieldMaps, Painted
+from live.results.maps.scale import AutoRange, ColourScale, range_kind
 from live.ui.rerun.drawing.curve import MAX_POINTS, CurveDrawing
 from live.ui.rerun.drawing.large_figures import paint
 from live.ui.rerun.drawing.layout import (
@@ -92,7 +94,7 @@ class ViewScene:
         import rerun as rr
 
         self._at(self._setup.start_monotonic)
-        for name in MAPS:
+        for name in (*MAPS, *self._setup.whole):
             if name != "status":
                 self._bar(name)
         for name in STRAINS:
@@ -150,13 +152,28 @@ class ViewScene:
         if self._due:
             self._draw_maps(field, _OTHER_MAPS)
 
+    def whole(self, maps: Mapping[str, NDArray[Any]]) -> None:
+        """Draw the maps of the whole test, (R, C) each, by their names."""
+        import rerun as rr
+
+        for name in self._setup.whole:
+            values = maps[name]
+            scale = ColourScale.of(
+                name, AutoRange(range_kind(name)).update(values, maps.get(f"sigma_{name}"))
+            )
+            painted = Painted(scale.colours(values, _ALPHA), scale)
+            data = encode(".png", painted.rgba[..., [2, 1, 0, 3]], 1)
+            picture = rr.EncodedImage(contents=data, media_type="image/png", draw_order=10)
+            self._log(f"specimen/map/{name}", picture, static=True)
+            self._log(f"bar/{name}/ticks", self._ticks(painted), static=True)
+
     def _outlines(self, grid: ZoiGrid) -> None:
         """Draw the outlines of gauges and ZOIs, and place the maps."""
         import rerun as rr
 
         step = float(grid.step)
         corner = (float(grid.x[0]) + 0.5 - step / 2, float(grid.y[0]) + 0.5 - step / 2, 0.0)
-        for name in MAPS:
+        for name in (*MAPS, *self._setup.whole):
             placement = rr.Transform3D(translation=corner, scale=(step, step, 1.0))
             self._log(f"specimen/map/{name}", placement, static=True)
         lines = [[np.array(line) + 0.5 for line in lines] for lines in self._setup.outlines.values()]

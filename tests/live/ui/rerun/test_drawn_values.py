@@ -303,3 +303,18 @@ def test_wide_pictures_are_one_above_the_other() -> None:
         middle = blueprint(setup).root_container.contents[1]
         kinds[width] = [type(one).__name__ for one in middle.contents]
     assert kinds == {210: ["Spatial2DView", "Tabs", "Spatial2DView"], 212: ["Vertical", "Spatial2DView"]}
+
+
+def test_maps_of_the_whole_test_are_drawn_once() -> None:
+    scene, sink, setup = made(finished=True, whole=("leaves_at_stress", "sigma_compliance"))
+    scene.begin()
+    at = np.full(make_grid().shape, 120e6, np.float32)
+    at[2:], at[0, 0] = 160e6, np.nan
+    scene.whole({"leaves_at_stress": at, "sigma_compliance": at * np.float32(1e-21), "fate": at})
+    image = sink.image("specimen/map/leaves_at_stress")
+    assert image.shape[:2] == at.shape and image[0, 0, 3] == 0 and image[0, 1, 3] > 0
+    assert image[1, 3, 0] > image[1, 3, 2] and image[3, 3, 2] > image[3, 3, 0]  # blue is low, red is high
+    assert sink.last("bar/leaves_at_stress/ticks", "labels")[-1] == "MPa"
+    assert sink.last("bar/sigma_compliance/ticks", "labels")[-1] == "µm/m/MPa"
+    assert sink.logged["bar/sigma_compliance/ramp"] and not sink.logged["specimen/map/fate"]
+    assert blueprint(setup) is not None

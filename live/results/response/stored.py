@@ -1,0 +1,172 @@
+"""The group ``response`` of ``strain.h5``: made with the file where it is asked for, filled when the test is over.
+
+A file that was left before that holds it empty, and is read as one without.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import DataError
+from acquire.hdf5 import (
+    Declared,
+    as_text,
+    new_group,
+    open_dataset,
+    open_datasets,
+    open_file,
+    open_group,
+    read_attribute,
+    reason,
+    storable,
+)
+from acquire.text.printable import printable
+from live.results.quantities import quantity_of
+
+GROUP, CURRENT, CORRELATION, FATE = "response", "current", "correlation", "fate"
+STRESS, MEAN, TIME = "stress", "mean", "time"
+CHANNELS = (STRESS, MEAN, TIME)
+"""What a strain may be held against, besides a gauge by its name."""
+_SLOPES = {STRESS: "compliance", TIME: "rate"}
+ATTRIBUTES = {
+    "channel": Declared("text"), "strain": Declared("text"), "instants": Declared("int", (), 0),
+    "first": Declared("f8"), "last": Declared("f8"), "common": Declared("f8", (), 0), "vsg_px": Declared("f8", (), 0),
+}  # fmt: skip
+
+
+def slope_name(channel: str) -> str:
+    """Of the map of slopes over ``channel``: compliance, rate or amplification."""
+    return _SLOPES.get(channel, "amplification")
+
+
+def leaves_name(channel: str) -> str:
+    """Of the map of where places leave their lines; empty over time."""
+    return "" if channel == TIME else "leaves_at_stress" if channel == STRESS else "leaves_at_strain"
+
+
+def map_names(channel: str) -> tuple[str, ...]:
+    """All maps over ``channel``."""
+    slope, leaves = slope_name(channel), leaves_name(channel)
+    first = (slope, f"sigma_{slope}", "chi2", "instants", "poisson", "sigma_poisson")
+    return (*first, *((leaves,) if leaves else ()), FATE)
+
+
+def add_group(entry: Any, channel: str, shape: tuple[int, int]) -> None:
+    """Make the group, without values, after ``strain``."""
+    group = new_group(
+        entry, GROUP, "NXdata", signal=slope_name(channel), title=f"Response of each place over {channel}"
+    )
+    numbers = {"instants": 0, "first": np.nan, "last": np.nan, "common": 0.0, "vsg_px": 0.0}
+    group.attrs.update(
+        axes=["y", "x"], channel=np.bytes_(storable(channel).encode()), strain=np.bytes_("eyy")
+    )
+    group.attrs.update(numbers)
+    for name in (*map_names(channel), CURRENT, CORRELATION):
+        grows, rest = name in (CURRENT, CORRELATION), () if name == CURRENT else shape
+        dataset = group.create_dataset(
+            name, (0,) * grows + rest, "f4", maxshape=(None,) * grows + rest, chunks=True, fletcher32=True,
+            fillvalue=np.nan,
+        )  # fmt: skip
+        dataset.attrs.update(units=quantity_of(name).unit, long_name=quantity_of(name).words)
+    for name in ("x", "y"):
+        group[name] = entry[f"strain/{name}"]
+
+
+def read_noise(path: Path, n: int, shape: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What the writer noted: share of the variance of strains that is not of the reference at each instant, (n,), 1
+    where it is not known, and correlation of the noises of exx and eyy against each reference, (J, R, C)."""
+    with open_file(path) as file:
+        group = file["entry"][GROUP]
+        held = open_dataset(group, CURRENT, Declared("f4", (None,)))[:n].astype(np.float64)
+        both = open_dataset(group, CORRELATION, Declared("f4", (None, *shape)))[()].astype(np.float64)
+    share = np.pad(held, (0, n - len(held)), constant_values=np.nan)
+    return np.where((share > 0) & (share <= 1), share, 1.0), np.where(np.abs(both) < 1, both, 0.0)
+
+
+def fill_group(path: Path, maps: Mapping[str, NDArray[Any]], about: Mapping[str, Any]) -> None:
+    """Put the values into the group of a file that is closed.
+
+    Raises
+    ------
+    DataError
+        It cannot be written.
+    """
+    try:
+        with open_file(path, "r+", libver=("v110", "v110")) as file:
+            group = file["entry"][GROUP]
+            for name, values in maps.items():
+                group[name][...] = values
+            for name, value in about.items():
+                kept = group.attrs[name]
+                group.attrs.modify(name, np.asarray(value, kept.dtype))
+    except (OSError, RuntimeError, KeyError) as error:
+        raise DataError(f"{path}: the response cannot be written ({reason(error)})") from error
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoredResponse:
+    """What each place did over all instants.
+
+    Attributes
+    ----------
+    channel : str
+        "stress", "mean", "time" or the name of a gauge.
+    instants : int
+        In the lines, at most.
+    first, last : float
+        Of the channel in them: Pa, 1 or s.
+    common : float
+        Relative standard uncertainty that all places have in common, beside their sigma.
+    vsg_px : float, px
+        Side of the virtual strain gauge.
+    """
+
+    channel: str
+    instants: int
+    first: float
+    last: float
+    common: float
+    vsg_px: float
+    _maps: Mapping[str, Any]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the maps."""
+        return tuple(self._maps)
+
+    def map(self, name: str) -> NDArray[Any]:
+        """A map, (R, C), in SI units; NaN where a place has no value."""
+        return np.asarray(self._maps[name][()])
+
+
+def read_response(entry: Any, shape: tuple[int, int]) -> StoredResponse | None:
+    """The group of an open file; None where there is none, or it was never filled.
+
+    Raises
+    ------
+    DataError
+        It is not as declared.
+    """
+    if GROUP not in entry:
+        return None
+    group = open_group(entry, GROUP)
+    channel, strain, instants, first, last, common, vsg_px = (
+        read_attribute(group, name, what) for name, what in ATTRIBUTES.items()
+    )
+    if as_text(strain) not in ("exx", "eyy"):
+        raise DataError(
+            f"{entry.file.filename}: {GROUP}/@strain is {printable(as_text(strain))!r}; make it again"
+        )
+    channel = printable(as_text(channel))
+    maps = open_datasets(group, dict.fromkeys(map_names(channel), Declared("f4", shape)))
+    if not instants:
+        return None
+    return StoredResponse(
+        channel, int(instants), float(first), float(last), float(common), float(vsg_px), maps
+    )
