@@ -30,6 +30,12 @@ GOLDEN = math.pi * (3 - math.sqrt(5))
 MIN_SIZE = 8
 MAX_SIZE = {"spectral": 128, "phase": 64}
 """Sides of ZOIs, px. The estimator by phases needs much more time for large ones."""
+NOISE_GL = {1: 6.0, 3: 0.07, 5: 0.0045}
+"""Largest noise that is found in the pattern, which has none, by the degree of the spline, for ZOIs of ``USUAL`` px and
+more. A machine that works shows up to half of it, and a prefilter that is 2 % off in one tap twice as much."""
+USUAL = 30
+GRADIENT = 0.005
+"""Largest share by which a gradient of the reference, which makes sigma, is off; a machine that works: 0.0001."""
 ERROR_PX = {1: 0.25, 3: 0.005, 5: 0.0005}
 """Largest error of a displacement by the degree of the spline. A machine that works shows up to half of it with
 degree 1, which interpolates badly, and a twentieth with degree 5, which tests use."""
@@ -50,8 +56,11 @@ class SelfTestCase(NamedTuple):
         return self._replace(size=min(max(self.size, MIN_SIZE), MAX_SIZE[self.estimator]))
 
 
-Measure = Callable[[NDArray[np.float32], NDArray[np.float32], ZoiGrid, SelfTestCase], StrainField]
-"""Measures a deformed picture (the second) against a reference, with these settings."""
+Pixels = NDArray[np.float32]
+Floats = NDArray[np.float64]
+Measure = Callable[[Pixels, Pixels, ZoiGrid, SelfTestCase], tuple[StrainField, Pixels]]
+"""Measures a deformed picture (the second) against a reference, with these settings; and the gradients of the reference
+that sigma comes from, along x and y, (2, H, W), GL/px."""
 
 
 class KnownMotion(NamedTuple):
@@ -71,24 +80,29 @@ MOVED = KnownMotion(2.37, -1.61, 0.021, 0.008, -0.017, -0.013)
 
 
 class Errors(NamedTuple):
-    """The largest of any ZOI, of u and v in px and of the four gradients; NaN where ZOIs have no value."""
+    """The largest of any ZOI, of u and v in px and of the four gradients; NaN where ZOIs have no value.
+
+    Of what sigma is made of: the share by which gradients of the picture are off, and the noise (GL) that is found.
+    """
 
     length: float
     slope: float
     refused: int
+    gradient: float
+    noise: float
 
 
 def limits(case: SelfTestCase) -> Errors:
     """What a machine may be off: a gradient by what moves the edge of a ZOI as far as ``ERROR_PX``."""
-    length = ERROR_PX[case.interpolant]
-    return Errors(length, length / (case.size / 2), 0)
+    length, noise = ERROR_PX[case.interpolant], NOISE_GL[case.interpolant] * min(1.0, case.size / USUAL)
+    return Errors(length, length / (case.size / 2), 0, GRADIENT, noise)
 
 
 def errors_of(measure: Measure, case: SelfTestCase) -> Errors:
     """How far off a known pattern is measured."""
     inside, side = case.size + STEP, case.size + STEP + 2 * MARGIN
     grid = ZoiGrid.cover(Roi(MARGIN, MARGIN, inside, inside), case.size, STEP)
-    field = measure(picture(side, STILL), picture(side, MOVED), grid, case)
+    field, gradients = measure(picture(side, STILL), picture(side, MOVED), grid, case)
     middle = (side - 1) / 2
     x, y = np.meshgrid(grid.x - middle, grid.y - middle)
     length = np.stack([
@@ -97,7 +111,26 @@ def errors_of(measure: Measure, case: SelfTestCase) -> Errors:
     ])  # fmt: skip
     slope = [getattr(field, name) - getattr(MOVED, name) for name in KnownMotion._fields[2:]]
     refused = int(np.count_nonzero(field.status != Status.OK))
-    return Errors(float(np.abs(length).max()), float(np.abs(slope).max()), refused)
+    off = [abs(_share(gradients[k], known) - 1) for k, known in enumerate(_gradients(side % 2))]
+    return Errors(
+        float(np.abs(length).max()), float(np.abs(slope).max()), refused, max(off), float(field.noise)
+    )
+
+
+@lru_cache(maxsize=2)
+def _gradients(odd: int) -> tuple[Floats, Floats]:
+    """The gradients of the pattern in the middle along x and y, (16, 16) or where ``odd`` (17, 17), GL/px."""
+    side, h = 16 + odd, 0.03
+    moved = [(STILL._replace(u=-h), STILL._replace(u=h)), (STILL._replace(v=-h), STILL._replace(v=h))]
+    x, y = ((picture(side, a).astype(float) - picture(side, b)) / (2 * h) for a, b in moved)
+    return np.asarray(x, np.float64), np.asarray(y, np.float64)
+
+
+def _share(found: Pixels, known: Floats) -> float:
+    """The middle of ``found`` over what is known of it."""
+    low = [(n - len(known)) // 2 for n in found.shape]
+    part = found[low[0] : low[0] + len(known), low[1] : low[1] + len(known)]
+    return float((part * known).sum() / (known * known).sum())
 
 
 def picture(side: int, motion: KnownMotion) -> NDArray[np.float32]:
@@ -121,7 +154,6 @@ def picture(side: int, motion: KnownMotion) -> NDArray[np.float32]:
     return np.asarray(LEVEL_GL + CONTRAST_GL * math.sqrt(2 / WAVES) * waves, np.float32)
 
 
-Floats = NDArray[np.float64]
 TOLERANCE = 1e-6
 """Of results of the size of 1 to 10; a library that works is right to 1e-12."""
 SIDE = 48
@@ -247,6 +279,11 @@ def measuring_fault(measure: Measure, case: SelfTestCase) -> str:
     allowed = limits(case)
     if found.refused:
         return f"{found.refused} of 4 ZOIs have no value"
+    if not (found.gradient <= allowed.gradient and found.noise <= allowed.noise):
+        return (
+            f"what sigma is made of: gradients {found.gradient:.1%} off, limit {allowed.gradient:.1%}, "
+            f"noise {found.noise:.2g} GL, limit {allowed.noise:.2g}"
+        )
     if found.length <= allowed.length and found.slope <= allowed.slope:
         return ""
     return (

@@ -253,12 +253,12 @@ def check_machine(settings: KernelSettings, size: int) -> None:
 
 def _measure_known(
     reference: NDArray[np.float32], deformed: NDArray[np.float32], grid: ZoiGrid, case: SelfTestCase
-) -> StrainField:
-    """As a new kernel measures its first picture."""
+) -> tuple[StrainField, NDArray[np.float32]]:
+    """As a new kernel measures its first picture; and the gradients of the reference, (2, H, W)."""
     estimator: Estimator = "phase" if case.estimator == "phase" else "spectral"
     settings = KernelSettings(case.window, estimator, case.order, case.interpolant)
     made = ReferencePicture.first(as_image(reference, "the pattern"), grid, settings, None, None)
     moved = as_recorded(deformed, "the moved pattern")
     solution = Solution(made, moved, None, made.searched(moved))
     retry_lost(solution, None)
-    return field_of(solution)
+    return field_of(solution), made.prepared.images[:2, : reference.shape[0], : reference.shape[1]]

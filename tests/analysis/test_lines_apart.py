@@ -13,18 +13,32 @@ from analysis.kernel.lines import APART, _profile, apart
 SIZE, ROWS = 32, 200
 
 
-def profile(v: Any, stretch: float = 0.0) -> np.ndarray:
-    """What is taken off each row of 200, of ZOIs every 16 px with bands of amplitude 3 that moved by ``v`` px."""
+def profile(v: Any, stretch: float = 0.0, axis: int = 0, across: float = 0.0) -> np.ndarray:
+    """What is taken off each line of 200, of ZOIs every 16 px with bands of amplitude 3 that moved by ``v`` px.
+
+    ``axis`` 0: rows, and v is the displacement along y; 1: columns, along x. ``across`` is the other displacement.
+    """
     starts = np.arange(0, ROWS - 2 * SIZE, 16)
     n = len(starts)
     p = np.zeros((n, 6))
-    p[:, 3], p[:, 5] = v, stretch
+    own, other = (3, 0) if axis == 0 else (0, 3)
+    p[:, own], p[:, own + 2 - axis], p[:, other], p[:, other + 1 + axis] = v, stretch, across, across / 50
     moved = starts[:, None] + np.arange(SIZE) + np.broadcast_to(v, n)[:, None]
     left = 3.0 * np.sin(2 * np.pi * moved / 12)
-    ready = SimpleNamespace(origins=np.stack([starts, np.zeros(n, int)], 1), shape=(ROWS, 64))
+    origins = np.zeros((n, 2), int)
+    origins[:, axis] = starts
+    ready = SimpleNamespace(origins=origins, shape=(ROWS, 64) if axis == 0 else (64, ROWS))
     reference = SimpleNamespace(prepared=ready, grid=SimpleNamespace(size=SIZE), affine=slice(None))
     solution: Any = SimpleNamespace(reference=reference, found=SimpleNamespace(p=p))
-    return _profile(solution, np.arange(n), left, 0)
+    return _profile(solution, np.arange(n), left, axis)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_bands_move_with_the_displacement_across_them_alone(axis: int) -> None:
+    """Of rows with v and dv_dy, of columns with u and du_dx."""
+    found, lines = profile(5.3, axis=axis, across=-9.0), np.arange(ROWS)
+    inside = (lines > 8) & (lines < 130)
+    np.testing.assert_allclose(found[inside], 3 * np.sin(2 * np.pi * lines[inside] / 12), atol=0.05)
 
 
 def test_bands_of_a_whole_field_are_found() -> None:

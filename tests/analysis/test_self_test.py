@@ -6,16 +6,19 @@ import itertools
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
+import scipy.fft
 
 from analysis import KernelSettings, MachineError, PhaseKernel, Roi, ZoiGrid, self_test, warm_up
 from analysis.field import WINDOWS
 from analysis.kernel import solve
 from analysis.kernel.phase_kernel import _measure_known as measure_known
 from analysis.kernel.phase_kernel import check_machine
+from analysis.picture import splines
 from analysis.self_test import SelfTestCase, errors_of, limits, measuring_fault, picture
 
 GRID = ZoiGrid.cover(Roi(8, 8, 80, 80), size=32, step=16)
@@ -55,6 +58,7 @@ def test_a_healthy_machine_passes(estimator: Any, order: int, size: int) -> None
         found, allowed = errors_of(measure_known, case), limits(case)
         margin = 10 if degree == 5 else 1.5
         assert found.length < allowed.length / margin and found.slope < allowed.slope / margin, (case, found)
+        assert found.gradient < allowed.gradient / 10 and found.noise < allowed.noise / 1.5, (case, found)
 
 
 def test_the_pattern_has_its_motion() -> None:
@@ -83,6 +87,39 @@ def test_wrong_taps_are_found(
     monkeypatch.setattr(solve, "tap_table", spoilt(solve.tap_table, factor))
     with pytest.raises(MachineError, match=rf"ZOIs of {size} px: "):
         check_machine(KernelSettings(estimator=estimator, order=order), size)
+
+
+def scaled(function: Callable[..., Any], factor: float) -> Callable[..., Any]:
+    return lambda *arguments, **named: function(*arguments, **named) * np.float32(factor)
+
+
+def one_tap_off(degree: int, *, which: int) -> Any:
+    taps = splines.prefilter_taps(degree).copy()
+    taps[which] *= 1.02
+    return taps
+
+
+@pytest.mark.parametrize("size", [16, 32, 64])
+@pytest.mark.parametrize(("estimator", "order"), WAYS)
+def test_what_makes_sigma_wrong_is_found(
+    untested: None, monkeypatch: pytest.MonkeyPatch, estimator: Any, order: int, size: int
+) -> None:
+    """A gradient that is 10 % too large makes sigma 9 % too small, and moves no displacement."""
+    settings = KernelSettings(estimator=estimator, order=order)
+    faults: list[tuple[Any, str, Any]] = [
+        (splines, "gradient_filter", scaled(splines.gradient_filter, 1.1)),
+        (splines, "gradient_filter", scaled(splines.gradient_filter, 0.99)),
+        *((solve, "prefilter_taps", partial(one_tap_off, which=k)) for k in (0, 1, 2)),
+        *((scipy.fft, name, scaled(getattr(scipy.fft, name), 1.02)) for name in ("rfft", "irfft")),
+    ]
+    for module, name, wrong in faults:
+        with monkeypatch.context() as patched:
+            patched.setattr(module, name, wrong)
+            self_test._check_measuring.cache_clear()
+            with pytest.raises(MachineError, match="what sigma is made of"):
+                check_machine(settings, size)
+    self_test._check_measuring.cache_clear()
+    check_machine(settings, size)
 
 
 def test_a_kernel_is_refused_with_the_names_of_the_libraries(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,6 +27,7 @@ from live.replay.batch.scheduler import (
     sweep_chunks,
 )
 from live.replay.batch.task import FIELDS_FILE, Task, TaskProgress
+from live.replay.batch.workdir import _host, staging_dir
 
 
 def edges(times: Any, seconds: float) -> list[int]:
@@ -202,3 +204,18 @@ def test_chunks_are_removed_with_their_test_or_where_settings_are_others(tmp_pat
         folder.mkdir()
     sweep_chunks(tmp_path, {"a.b"}, {"long": task})
     assert sorted(path for path in tmp_path.iterdir()) == sorted([mine, other])
+
+
+def test_chunks_that_another_process_works_on_are_left(tmp_path: Path) -> None:
+    task = dataclasses.replace(TASK, out=str(tmp_path))
+    outdated, finished = tmp_path / f".long.{'o' * 12}.chunks", tmp_path / f".a.b.{'k' * 12}.chunks"
+    working = staging_dir(outdated / "0001").with_name(f".0001.{_host()}.{os.getppid()}.part")
+    elsewhere = finished / ".0001.another-host.1.part"
+    ended = staging_dir(outdated / "0002").with_name(f".0002.{_host()}.{2**22 + 1}.part")
+    for folder in (working, elsewhere, ended):
+        folder.mkdir(parents=True)
+    sweep_chunks(tmp_path, {"a.b"}, {"long": task})
+    assert working.is_dir() and elsewhere.is_dir(), "of a process of this machine, and of another machine"
+    working.rmdir()
+    sweep_chunks(tmp_path, {"a.b"}, {"long": task})
+    assert not outdated.exists() and elsewhere.is_dir()
