@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from live.ui.terminal.screen import print_line
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """``phasedic devices`` has no arguments."""
+    """Arguments of ``phasedic devices``."""
+    words = "watch each device and write what it does, to be sent: no pictures, no names (default FILE: %(const)s)"
+    parser.add_argument("--report", nargs="?", const="phasedic-devices.txt", metavar="FILE", help=words)
+    words = "with --report: only this camera; may be repeated"
+    parser.add_argument("--camera", action="append", default=[], metavar="ADDRESS", help=words)
+    words = "with --report: only this load cell; may be repeated"
+    parser.add_argument("--load", action="append", default=[], metavar="ADDRESS", help=words)
+    words = "with --report: how long each is watched (default 5)"
+    parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help=words)
 
 
 def command(arguments: argparse.Namespace) -> int:
-    """``phasedic devices``."""
+    """``phasedic devices [--report [FILE]]``."""
+    if arguments.report is not None:
+        return _report(arguments)
     from acquire.camera import list_cameras
     from acquire.serial_line.ports import list_serial_ports
     from acquire.text.printable import printable
@@ -31,4 +42,20 @@ def command(arguments: argparse.Namespace) -> int:
     for port in ports:
         print_line(port.text())
     print_line(f"threads that measure: {threads()}")
+    return 0
+
+
+def _report(arguments: argparse.Namespace) -> int:
+    """Show the lines as they come, and keep them in a new file."""
+    from live.commands.device_report import report_lines, without_names
+    from live.commands.options import require_new
+
+    path = Path(arguments.report)
+    require_new(path)
+    kept = []
+    for line in report_lines(arguments.camera, arguments.load, arguments.seconds):
+        kept.append(without_names(line))
+        print_line(kept[-1])
+    path.write_text("\n".join(kept) + "\n", encoding="utf-8")
+    print_line(f"written: {path}; read it, then send it with what you saw")
     return 0
