@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from acquire.hdf5 import open_datasets, stored_rows
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.session import layout
-from acquire.session.stored import Oddities, Rows, read_column, same_length, usable
+from acquire.session.oddities import Oddities
+from acquire.session.stored import Rows, read_column, same_length, usable
 
 PIECE = 1 << 16
 """Samples that are read at once."""

@@ -25,9 +25,9 @@ from acquire.errors import PhasedicError
 from acquire.events import Event
 from acquire.frame import CameraInfo, Frame
 from acquire.load_cell import check
-from acquire.printable import brief, printable
 from acquire.serial_line import identify
 from acquire.serial_line.ports import list_serial_ports
+from acquire.text.printable import brief, printable
 from live import VERSION
 from live.setup.devices import open_load, open_rig
 
