@@ -91,6 +91,8 @@ class Burst:
     motion_px : float, px
         Largest motion of any part of the picture during the burst, estimated; NaN when unknown.
         Above 0.05 px the mean is smeared.
+    alike : bool
+        Whether no picture has less than half the contrast of another: a blank one among them falsifies the mean.
     """
 
     mean: NDArray[Any]
@@ -105,6 +107,7 @@ class Burst:
     lost: int
     clock: Clock
     motion_px: float = math.nan
+    alike: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -193,6 +193,7 @@ class Accumulator(ABC, Generic[Made]):
             "lost": self._lost,
             "clock": last.clock,
             "motion_px": math.nan if sums is None else sums.motion(last, n, noise),
+            "alike": sums is None or 2 * min(sums.contrasts) >= max(sums.contrasts),
         }
 
 
@@ -228,6 +229,11 @@ class FrameSums:
     memory : PictureMemory
     kind : uint16 or uint32, optional
         Of the sum, which is all that is made then; by default the mean is made.
+
+    Attributes
+    ----------
+    contrasts : list of float, GL
+        Standard deviation over some thousand pixels of each frame.
     """
 
     def __init__(self, like: Frame, memory: PictureMemory, kind: DTypeLike | None = None) -> None:
@@ -242,6 +248,7 @@ class FrameSums:
         self._waiting: list[NDArray[Any]] = []
         self._previous: NDArray[Any] | None = None
         self._squares = 0
+        self.contrasts: list[float] = []
 
     @property
     def total(self) -> NDArray[Any]:
@@ -257,6 +264,8 @@ class FrameSums:
                 f"frame {frame.index} is {_words(frame)}, but the burst began with {_words(self._like)}; "
                 "one burst needs frames of one kind"
             )
+        step = max(1, math.isqrt(frame.image.size // TILE_PIXELS))
+        self.contrasts.append(float(frame.image[::step, ::step].std()))
         self._waiting.append(np.ascontiguousarray(frame.image).reshape(-1))
         if n > 0 or len(self._waiting) == GROUP:
             self._fold(0 if self._summed else n)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from acquire.errors import DataError
 from acquire.events import Event, EventKind, EventSink, Level, ignore_event
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
@@ -279,6 +280,10 @@ def measure(
     for item in bursts:
         number += isinstance(item, Burst)
         try:
+            if not (item if isinstance(item, Burst) else item.burst).alike:
+                raise DataError(
+                    "a picture of it is blank, or has half the contrast of another; look at light and cable"
+                )
             if isinstance(item, NewReference):
                 tracker.renew_on_demand(corrections.sensor(item.burst))
                 continue

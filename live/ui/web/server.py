@@ -308,9 +308,8 @@ class _Handler(BaseHTTPRequestHandler):
         guard = self.server.page.guard
         if not guard.is_token(token):
             raise HttpError(403, "a wrong token; open the address that phasedic has printed")
-        self._send(
-            Response(b'<meta http-equiv="refresh" content="0; url=/">', _TYPES["html"]), cookie=guard.cookie
-        )
+        forward = b'<link rel="icon" href="data:,"><meta http-equiv="refresh" content="0; url=/">'
+        self._send(Response(forward, _TYPES["html"]), cookie=guard.cookie)
 
     def _post(self) -> None:
         page = self.server.page
