@@ -27,7 +27,8 @@ def main(folder: str) -> int:
     with open_run(folder) as run:
         # The curve: one number a measurement.
         strain, force = run.strain.values[run.axial], run.force
-        print(f"{run.title}: {run.strain.n} measurements, force up to {np.nanmax(force):.0f} N")
+        most = f"force up to {np.nanmax(force):.0f} N" if np.isfinite(force).any() else "no force"
+        print(f"{run.title}: {run.strain.n} measurements, {most}")
 
         # Maps: (T, R, C), NaN where a ZOI has no value; each with its standard uncertainty.
         last, sigma = run.strain.maps(run.axial, -1), run.strain.maps(f"sigma_{run.axial}", -1)

@@ -58,8 +58,9 @@ def report_lines(cameras: Sequence[str], loads: Sequence[str], seconds: float) -
         yield from _guarded(f"port {port}", _port_lines(port, seconds))
     for address in loads:
         yield from _guarded(f"load cell {address}", _load_lines(address, seconds))
-    if everything and not (listed or ports):
-        yield "no camera and no serial port was found; give --camera ADDRESS or --load ADDRESS"
+    for what, found, option in ("camera", listed, "--camera"), ("serial port", ports, "--load"):
+        if everything and not found:
+            yield f"no {what} was found; {option} ADDRESS gives one"
 
 
 def without_names(line: str) -> str:
@@ -126,7 +127,9 @@ def _measured(info: CameraInfo, frames: Sequence[Frame], arrivals: np.ndarray) -
 
 def _port_lines(device: str, seconds: float) -> Iterator[str]:
     for baud, received, finding in identify.listen(device):
-        yield f"{baud} baud: {len(received)} bytes, {received[-80:]!r}"
+        yield (
+            f"{baud} baud: {len(received)} bytes, {received[-80:]!r}" if received else f"{baud} baud: silence"
+        )
         if finding is not None:
             yield f"understood as {finding.address}; {finding.remark}"
             yield from _load_lines(with_setting(finding.address, "gain", 1.0), seconds)

@@ -73,7 +73,11 @@ def test_a_port_is_heard_and_understood(port: str, monkeypatch: pytest.MonkeyPat
 def test_without_devices_it_says_what_to_give(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(device_report, "list_cameras", list)
     monkeypatch.setattr(device_report, "list_serial_ports", list)
-    assert list(report_lines([], [], 1.0))[-1].endswith("give --camera ADDRESS or --load ADDRESS")
+    said = list(report_lines([], [], 1.0))
+    assert said[-2:] == [
+        "no camera was found; --camera ADDRESS gives one",
+        "no serial port was found; --load ADDRESS gives one",
+    ]
 
 
 def test_names_and_serial_numbers_are_taken_out() -> None:
