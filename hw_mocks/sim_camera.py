@@ -177,7 +177,7 @@ class SimCamera(Closing):
         }
         return CameraInfo(
             address=address,
-            name=f"simulated camera, {specimen.kind} specimen",
+            name=Message("simulated camera, {specimen} specimen", specimen.kind),
             width=specimen.width,
             height=specimen.height,
             bits=sensor.bits,

@@ -194,7 +194,7 @@ class LiveCamera(CameraBase):
         if picture.image is None:
             self._counter.leave_out(picture.number)  # and count it as lost with the next one
             if count := self._lost.due(picture.t):
-                why = f" ({picture.trouble})" if picture.trouble else ""
+                why = Message(" ({trouble})", picture.trouble) if picture.trouble else ""
                 self._report(
                     Message(
                         "{count} frame(s) came without a whole picture{why} and are counted as lost",

@@ -41,6 +41,7 @@ from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, to_gray
 from acquire.opencv.image_metadata import read_stamps, taken_times
 from acquire.text import Message
+from acquire.text.printable import counted
 
 MAX_REPORTED = 20  # pictures that are left out, one by one
 _SAMPLE = 3  # pictures whose format is compared
@@ -151,7 +152,7 @@ class ImageFiles(CameraBase):
         self._shape, self._dtype = first.shape, first.dtype
         self.info = CameraInfo(
             address=address,
-            name=f"{len(paths)} image file{'s' * (len(paths) > 1)}, {paths[0].name} ...",
+            name=Message("{counted}, {first} ...", counted(len(paths), "image file"), paths[0].name),
             width=first.shape[1],
             height=first.shape[0],
             bits=self._bits,

@@ -229,7 +229,7 @@ class OpenCVDriver:
             )
         return CameraInfo(
             address=self.name,
-            name=f"OpenCV camera {self.name}",
+            name=Message("OpenCV camera {name}", self.name),
             width=width,
             height=height,
             bits=8,

@@ -252,7 +252,7 @@ def _without_line(loading: Loading, options: TensileOptions, why: str) -> Tensil
     zero = 0.0 if options.zero != "preload" else float(loading.strain[0])
     how = Message("as measured") if options.zero != "preload" else Message("the first value")
     return replace(
-        _nothing(f"no elastic line: {why}", options),
+        _nothing(Message("no elastic line: {why}", why), options),
         Agt=_from_zero(strain_at_top(loading), zero),
         At=_from_zero(strain_at_break(loading), zero),
         seconds=seconds_of(loading, options.standard),

@@ -36,7 +36,7 @@ function shown(value, format) {
 // A number in a format of Python: sign, width, digits, and one of f, g, e, d, x, %.
 export function number(value, format) {
   const [, sign, zero, width, digits, kind] = /^(\+?)(0?)(\d*)(?:\.(\d+))?([fgedx%]?)$/.exec(format) ?? [];
-  let text = String(value);
+  let text = exponent(String(value));
   if (kind === "f") text = value.toFixed(digits ?? 6);
   else if (kind === "%") text = `${(100 * value).toFixed(digits ?? 6)}%`;
   else if (kind === "e") text = exponent(value.toExponential(digits ?? 6));
