@@ -21,7 +21,7 @@ PIECE = 1 << 16
 """Samples that are read at once."""
 _STABLE = {code: word for word, code in layout.STABLE.items()}
 _SAMPLE = ("monotonic_s", "force", "unit", "stable", "flags", "device_ms")
-_CURVE = ("monotonic_s", "force")
+_TIME = "monotonic_s"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,54 +56,50 @@ class LoadTable:
         DataError, or what ``stored.DAMAGE`` names
             They cannot be read.
         """
-        held, n = self._opened()
-        for first in range(0, n, PIECE):
-            last = min(first + PIECE, n)
-            times = self._read(held["monotonic_s"], "monotonic_s", first, last)
-            wanted = (times >= low) & (times <= high)
-            if not wanted.any():
-                continue
-            table = {"monotonic_s": times}
-            table |= {
-                name: self._read(held[name], name, first, last) for name in held if name != "monotonic_s"
-            }
-            good = usable(self._group, table, layout.LOAD_COLUMNS, first, whole=self._whole) & wanted
+        for table, good, first in self._tables(sorted(layout.LOAD_COLUMNS, key=_TIME.__ne__), low, high):
             places = np.flatnonzero(good)
             rows = Rows({name: column[places] for name, column in table.items()}, places + first)
-            yield LoadPiece(rows, self._raw_lines(rows, held["line_end"]))
+            yield LoadPiece(rows, self._raw_lines(rows))
 
     def curve(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
         """Times (monotonic s) and forces (N) of all samples, by the piece; raises as ``pieces``."""
-        held, n = self._opened()
-        for first in range(0, n, PIECE):
-            table = {name: self._read(held[name], name, first, min(first + PIECE, n)) for name in _CURVE}
-            good = usable(self._group, table, layout.LOAD_COLUMNS, first, whole=self._whole)
-            yield table["monotonic_s"][good], table["force"][good]
+        for table, good, _ in self._tables([_TIME, "force"]):
+            yield table[_TIME][good], table["force"][good]
 
     def troubles(self) -> tuple[str, ...]:
         """What is left out or odd, for a person; of a whole file by the times alone. Raises as ``pieces``."""
-        (held, n), odd = self._opened(), Oddities("load", closed=self._closed)
-        names = ("monotonic_s",) if self._whole else tuple(held)
-        for first in range(0, n, PIECE):
-            table = {name: self._read(held[name], name, first, min(first + PIECE, n)) for name in names}
-            good = usable(self._group, table, layout.LOAD_COLUMNS, first, whole=self._whole)
-            odd.add(good, table["monotonic_s"][good])
+        odd = Oddities("load", closed=self._closed)
+        for table, good, _ in self._tables([_TIME] if self._whole else list(layout.LOAD_COLUMNS)):
+            odd.add(good, table[_TIME][good])
         return odd.words()
 
-    def _opened(self) -> tuple[dict[str, h5py.Dataset], int]:
+    def _tables(
+        self, names: Sequence[str], low: float = -math.inf, high: float = math.inf
+    ) -> Iterator[tuple[dict[str, NDArray[Any]], NDArray[np.bool_], int]]:
+        """Columns, which rows are good, and the number of the first; for ``low`` and ``high`` the time comes first."""
         held = open_datasets(self._group, {name: one.declared() for name, one in layout.LOAD_COLUMNS.items()})
-        return held, same_length(self._group, [*held.values()], whole=self._whole)
+        n = same_length(self._group, [*held.values()], whole=self._whole)
+        for first in range(0, n, PIECE):
+            table: dict[str, NDArray[Any]] = {}
+            beside = np.zeros(1, np.bool_)
+            for name in names:
+                missing, last = layout.LOAD_COLUMNS[name].missing, min(first + PIECE, n)
+                table[name] = read_column(held[name], last, missing, first=first, whole=self._whole)
+                beside = (table[_TIME] < low) | (table[_TIME] > high) if _TIME in table else beside
+                if beside.all():
+                    break
+            else:
+                good = usable(self._group, table, layout.LOAD_COLUMNS, first, whole=self._whole)
+                yield table, good & ~beside, first
 
-    def _read(self, item: h5py.Dataset, name: str, first: int, last: int) -> NDArray[Any]:
-        missing = layout.LOAD_COLUMNS[name].missing
-        return read_column(item, last, missing, first=first, whole=self._whole)
-
-    def _raw_lines(self, rows: Rows, line_end: h5py.Dataset) -> list[bytes | None]:
+    def _raw_lines(self, rows: Rows) -> list[bytes | None]:
         """The line of each sample; None where it is not in the file yet."""
         if not len(rows):
             return []
         first, last = int(rows.places[0]), int(rows.places[-1]) + 1
-        before = read_column(line_end, last, first=max(first - 1, 0), whole=self._whole).astype(np.int64)
+        before = read_column(
+            self._group["line_end"], last, first=max(first - 1, 0), whole=self._whole
+        ).astype(np.int64)
         every = before if first else np.concatenate([[0], before])
         starts, ends = every[rows.places - first], every[rows.places - first + 1]
         there = stored_rows(self._lines)

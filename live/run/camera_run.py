@@ -83,7 +83,7 @@ class CameraRun(Subscriber):
     ) -> None:
         self.name, self._prepared, self._run_state = name, prepared, run_state
         self.folder = prepared.folder
-        self._held = os.open(self.folder, os.O_RDONLY) if os.name == "posix" else -1
+        self._held = os.open(self.folder, os.O_RDONLY) if os.name == "posix" and self.folder.is_dir() else -1
         self._screen, self._stop, self._stream = screen, stop, stream
         self._recording: PreTriggerBuffer | None = None
         self._has_recorded = self._hinted = False

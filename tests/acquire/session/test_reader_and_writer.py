@@ -94,7 +94,7 @@ def test_of_other_times_no_load_sample_is_read(path: Path, monkeypatch: pytest.M
     with Session.open(path) as back:
         monkeypatch.setattr(loads, "PIECE", 10)
         monkeypatch.setattr(loads, "read_column", noted)
-        monkeypatch.setattr(loads.LoadTable, "_raw_lines", lambda self, rows, ends: [b""] * len(rows))
+        monkeypatch.setattr(loads.LoadTable, "_raw_lines", lambda self, rows: [b""] * len(rows))
         assert len(list(back.each_load_sample(high=sample(3).t))) == 4
     assert {count for name, count in read if name == "force"} == {10}
     assert sum(count for name, count in read if name == "force") == 10

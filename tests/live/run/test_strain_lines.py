@@ -225,6 +225,7 @@ def test_a_heartbeat_repeats_the_last_measurement_with_its_age(monkeypatch: pyte
     test.until(START + 5.0)
     assert test.sent[-1][1]["axial"] is None and test.sent[-1][1]["frame"] is None
     assert test.sent[-1][1]["state"] == "old" and test.sent[-1][1]["age_s"] > 2
+    test.out.end()
 
 
 def test_a_line_comes_at_least_every_half_second(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -234,6 +235,7 @@ def test_a_line_comes_at_least_every_half_second(monkeypatch: pytest.MonkeyPatch
         test.until(START + 0.4 + 0.7 * k)
     times = [at for at, _ in test.sent]
     assert max(later - earlier for earlier, later in pairwise(times)) <= 0.5
+    test.out.end()
 
 
 @pytest.mark.parametrize(
