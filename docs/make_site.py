@@ -15,6 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PAGES = ROOT / "build" / "pages"
 REFERENCE = {
+    "Tests and replays from a program": "live.commands.from_python",
     "Kernel, grid and field": "analysis",
     "Gauges and figures of a test": "analysis.evaluate",
     "Results": "live.results",
@@ -47,7 +48,7 @@ def lay_out() -> None:
 def reference() -> str:
     """The page that mkdocstrings fills from the docstrings."""
     parts = [f"## {words}\n\n::: {module}\n" for words, module in REFERENCE.items()]
-    head = "# Reference\n\nFrom the docstrings. These names are public; the rest may change without notice.\n"
+    head = "# Reference\n\nFrom the docstrings. Public is what `from phasedic import ...` has; the rest may change.\n"
     return "\n".join([head, *parts])
 
 
