@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 from analysis.compiled.loops import helper, parallel
 from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
 from analysis.fit.kernel_args import BLURS, NUISANCES, NormalArgs, ReferenceImages, WindowRows
-from analysis.fit.shapes import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, cross_moments, product_moments
+from analysis.fit.moments import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, product_moments
+from analysis.fit.shapes import cross_moments
 
-CHUNK = 32
-"""ZOIs that a thread takes at a time."""
+CHUNK, RUN = 32, 8
+"""ZOIs that a thread takes at a time; those among them whose columns are summed once, at most."""
 RIDGE, BLUR_RIDGE = 1e-7, 1e-3
 """Added to the unit diagonal of the scaled normal matrix; in a pattern of one frequency blur and gain are alike."""
 
@@ -177,21 +178,32 @@ def _prepare_some(
     order = 1 if half == 3 else 2
     affine = np.array([0, 1, 2, half, half + 1, half + 2])
     down, end, o = np.uintp(images.pitch), np.uintp(3 * images.samples), np.uintp(0)
-    one = np.ones(rows.powers.shape[1], np.float32)
-    columns = np.empty((PRODUCT_ROWS + SQUARE_ROWS, rows.powers.shape[1]), np.float32)
+    wide = RUN * rows.powers.shape[1]
+    one = np.ones(wide, np.float32)
+    columns = np.empty((PRODUCT_ROWS + SQUARE_ROWS, wide), np.float32)
     normal = np.empty((count, count))
     middle = np.empty((count, count))
     inv = np.empty((count, count))
     low = np.empty((count, count))
-    of_w = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
-    of_q = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
+    all_w = np.zeros((RUN, N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
+    all_q, by_level = np.zeros_like(all_w), np.zeros_like(all_w)
     energy = out.energy
+    begin = end_of_run = first
     for z in range(first, min(first + CHUNK, len(origins))):
-        at = np.uintp(origins[z, 0] * images.pitch + origins[z, 1])
-        product_moments(
-            images.plain, images.plain, one, o, o, one, np.uintp(images.samples), at, down, size,
-            rows.powers, rows.squares, order, columns, of_w, of_q,
-        )  # fmt: skip
+        if z == end_of_run:
+            begin, end_of_run = z, _end_of_run(origins, z, min(first + CHUNK, len(origins)), size)
+            at = np.uintp(origins[z, 0] * images.pitch + origins[z, 1])
+            places = (origins[z:end_of_run, 1] - origins[z, 1]).astype(np.uintp)
+            product_moments(
+                images.plain, images.plain, one, o, o, one, np.uintp(images.samples), at, down, size, places,
+                rows.powers, rows.squares, order, columns, all_w, all_q,
+            )  # fmt: skip
+            if images.by_level.size:  # of both the latter alone is read, and kept
+                product_moments(
+                    images.by_level, images.plain, images.by_level, end + at, down, one, np.uintp(images.samples),
+                    at, down, size, places, rows.powers, rows.squares, order, columns, by_level, by_level,
+                )  # fmt: skip
+        of_w, of_q = all_w[z - begin], all_q[z - begin]
         _assemble(of_w, table, normal)
         total = of_w[6, 0, 0]
         energy[z, 0] = of_w[0, 0, 0] / total
@@ -212,12 +224,19 @@ def _prepare_some(
         out.freedom[z] = total - _taken(inv, middle, out.taken[z])
         out.blur[z] = _of_sum(inv, middle, count - 3, count - 2)
         if images.by_level.size:
-            product_moments(
-                images.by_level, images.plain, images.by_level, end + at, down, one, np.uintp(images.samples),
-                at, down, size, rows.powers, rows.squares, order, columns, of_w, of_q,
-            )  # fmt: skip
-            _assemble(of_q, table, middle)
+            _assemble(by_level[z - begin], table, middle)
             _sandwich(inv, middle, affine, units, out.covariance_level[z])
+
+
+@helper
+def _end_of_run(origins: Any, z: int, end: int, size: int) -> int:
+    """The first ZOI behind ``z`` that does not begin in its row, close behind the one before."""
+    n = z + 1
+    while n < min(end, z + RUN) and origins[n, 0] == origins[z, 0]:
+        if not 0 <= origins[n, 1] - origins[n - 1, 1] <= size:
+            break
+        n += 1
+    return n
 
 
 @helper
