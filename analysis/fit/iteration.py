@@ -315,7 +315,7 @@ def _know_nothing(out: Any, i: int) -> None:
         out.nuisance[i, k] = np.nan
 
 
-@helper
+@inlined
 def take(
     fit: Any, stop: Any, out: Any, i: int, z: int, q: Any, step: Any, whole: Any, bent_by: Any, known: Any, solved: Any
 ) -> None:  # fmt: skip
@@ -333,19 +333,20 @@ def take(
     out.bending[i] = bent(bent_by, fit.cross, z, whole, gain, fit.squares, known, solved, i, out.cubic)
     longest = 0.0
     for k in range(modes):
-        longest = max(longest, abs(step[k]) / gain)
-    if not longest < 1e3:
+        longest = max(longest, abs(step[k]))
+    longest /= gain
+    if longest < 1e3:
+        brake = min(1.0, MAX_STEP / longest) if longest > 0 else 1.0
+        for k in range(modes):
+            step[k] *= fit.units[k] * (brake / gain)
+        compose(q, fit.order, step)
+        out.iterations[i] += 1
+        if brake == 1.0 and _converged(
+            step, modes // 2, fit.size / 6.0, stop.length[z], stop.slope[z], stop.trust[z]
+        ):
+            out.state[i] = CONVERGED
+    else:
         out.state[i] = DIVERGED
-        return
-    brake = min(1.0, MAX_STEP / longest) if longest > 0 else 1.0
-    for k in range(modes):
-        step[k] *= fit.units[k] / gain * brake
-    compose(q, fit.order, step)
-    out.iterations[i] += 1
-    if brake == 1.0 and _converged(
-        step, modes // 2, fit.size / 6.0, stop.length[z], stop.slope[z], stop.trust[z]
-    ):
-        out.state[i] = CONVERGED
 
 
 @helper

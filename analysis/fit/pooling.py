@@ -123,7 +123,8 @@ def _common(out: Floats, known: ReferenceArgs, every: int, given: bool) -> Poole
     scatter = MAD * float(np.median(np.abs(ratio / of_each - 1)))
     lowest = _lowest(ratio[groups], spread[groups])
     as_stated = (lowest < AS_STATED) | (np.median(lowest) < AS_STATED)
-    forgiven = _at(known.signal, middle, np.where(as_stated, np.minimum(usual, 1.0), usual))
+    common = np.where(as_stated, np.minimum(usual, 1.0), usual)
+    forgiven = trend if np.array_equal(common, usual) else _at(known.signal, middle, common)
     colour = _shrunk(medians(shares / of_each), number)
     return PooledError(trend, forgiven, float(np.median(trend)), scatter, colour, bent, False)
 

@@ -7,12 +7,12 @@ down the columns of those that begin in the same row. What is left to each is it
 A ZOI takes the affine part of the motion around its centre for its own start. What the motion has beyond that, rho of
 seven shapes a component, the difference of the images lacks: to first order gain J_s rho, so that the moments are those
 of an affine start less gain C rho, C = J' w J_s (``shapes.cross_moments``). The gain follows from its own row of the
-fit: with m the moments and h that row of H^-1, 1 + gain's step = (1 + h m) / (1 + h C rho).
+fit: with m the moments and h that row of H^-1 it is (1 + h m) / (1 + h C rho).
 
 A ZOI whose step ends its iteration is done; the others, those of tiles that a common motion does not fit, and those
 that stand alone, go on by ``iteration.track``. So a ZOI's last digits depend on which others are measured with it: by
-0.003 of its sigma (rms), 0.05 at most. Neither the number of threads nor their timing changes a bit, since one thread
-does a tile.
+0.003 to 0.01 of its sigma (rms), 0.05 at most. Neither the number of threads nor their timing changes a bit, since one
+thread does a tile.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from analysis.compiled.loops import helper, parallel
+from analysis.compiled.loops import helper, inlined, parallel
 from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
 from analysis.compiled.vectors import LANES
 from analysis.fit.iteration import GAIN_RANGE, fetch_all, is_short, moments_of, solve, take
-from analysis.fit.kernel_args import DIVERGED, FitArgs, OutArgs, PictureArgs, StopArgs
+from analysis.fit.kernel_args import DIVERGED, IMAGES, FitArgs, OutArgs, PictureArgs, StopArgs
 from analysis.fit.moments import (
     CHANNELS,
     DEGREES,
@@ -36,7 +36,7 @@ from analysis.fit.moments import (
     weighted_rows,
 )
 from analysis.fit.shapes import N_HELD
-from analysis.fit.tiles import LOST, TERMS, Tiles, departure, fit_motion, within_zoi
+from analysis.fit.tiles import LOST, TERMS, Tiles, departures, fit_motion, within_zoi
 from analysis.picture.smooth import new_pieces, stays, warp_smooth
 from analysis.picture.splines import PAD
 
@@ -93,7 +93,8 @@ def _some_tiles(
         box, unit = _laid(fit, members[:n], at[:n])
         if _shares(picture, fit, stop, out, members[:n], at[:n], joined[:n], box, unit, normal, t):
             stride = picture.width + 2 * PAD
-            warp_smooth(picture.c, stride, t, unit, box, pieces, ramp, table, g, line)
+            also = fit.images, fit.samples, fit.pitch, IMAGES
+            warp_smooth(picture.c, stride, t, unit, box, pieces, ramp, table, g, line, also)
             _steps(fit, stop, out, members[:n], at[:n], joined[:n], box, unit, t, g, line, columns)
         tile = next_piece(counters, share, count)
 
@@ -124,33 +125,31 @@ def _shares(
     lever, pixels = fit.size / 6.0, box[2] * box[3]
     joined[:] = True
     enough = max(MIN_JOINED * len(members), pixels / (MIN_SAVED * fit.size**2))
-    count, worst = len(members), np.inf
+    count, worst, away = len(members), np.inf, np.empty((len(members), 2))
     for _ in range(ROUNDS):
         if worst <= LOST or count < enough:
             break
         count = fit_motion(out.p, members, at, joined, lever, unit, normal, t)
-        worst = _leave_out(out.p, members, at, lever, unit, t, joined)
+        departures(out.p, members, at, t, lever, unit, away)
+        worst = _leave_out(away[:, 0], joined)
     if worst > LOST or count < enough:
         return False
     done = 0
     for k in range(len(members)):
         if joined[k]:
-            i, z = members[k]
-            place, turn = departure(out.p, i, t, at[k, 0], at[k, 1], lever, unit)
-            done += is_short(max(place, turn), lever, stop.length[z], stop.slope[z], stop.trust[z])
+            z = members[k, 1]
+            done += is_short(max(away[k, 0], away[k, 1]), lever, stop.length[z], stop.slope[z], stop.trust[z])
     return done >= MIN_DONE * count and stays(picture, t, unit, box)
 
 
 @helper
-def _leave_out(p: Any, members: Any, at: Any, lever: Any, unit: Any, t: Any, joined: Any) -> Any:
+def _leave_out(away: Any, joined: Any) -> Any:
     """The largest departure of those that have joined, px; ``joined`` is anew those that depart little beside it."""
-    away = np.empty(len(members))
     worst = 0.0
-    for k in range(len(members)):
-        away[k], _ = departure(p, members[k, 0], t, at[k, 0], at[k, 1], lever, unit)
+    for k in range(len(away)):
         if joined[k] and not away[k] <= worst:
             worst = away[k]
-    for k in range(len(members)):
+    for k in range(len(away)):
         joined[k] = away[k] <= max(LOST, worst / 2)
     return worst
 
@@ -204,7 +203,7 @@ def _steps(
         k = end
 
 
-@helper
+@inlined
 def _affine(fit: Any, z: int, whole: Any, known: Any, lacking: Any, solved: Any, step: Any) -> Any:
     """The fit ``step`` (P,) from an affine start, of ``whole`` (P,) to a difference that lacks ``known`` (14,) shapes.
 

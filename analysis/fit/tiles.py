@@ -53,7 +53,7 @@ class Tiles(NamedTuple):
         count = np.maximum(1, np.rint(span / (spacing * np.array([rows, NODES[1]]))).astype(np.int64))
         down, along = (from_corner * count // span).T
         tile = down * count[1] + along
-        order = np.lexsort((origins[:, 1], origins[:, 0], tile)).astype(np.int64)
+        order = np.argsort((tile * span[0] + from_corner[:, 0]) * span[1] + from_corner[:, 1], kind="stable")
         ends = np.flatnonzero(np.diff(tile[order], prepend=-1, append=-1)).astype(np.int64)
         high, wide = np.minimum(-(-span // count), span) + size
         return cls(order, ends, int(np.diff(ends).max(initial=0)), int(high), int(wide))
@@ -126,14 +126,16 @@ def _solve_both(normal: Any, t: Any) -> None:
 
 
 @helper
-def departure(p: Any, i: int, t: Any, x: Any, y: Any, lever: Any, unit: Any) -> Any:
-    """How far ZOI ``i`` of ``p`` is from the motion: u or v, px, and the gradients over the ``lever``."""
-    place = turn = 0.0
-    for c in range(2):
-        along, down = slopes(t, c, x, y)
-        place = max(place, abs(p[i, 3 * c] - moved(t, c, x, y)))
-        turn = max(turn, abs(p[i, 3 * c + 1] - along / unit), abs(p[i, 3 * c + 2] - down / unit))
-    return place, turn * lever
+def departures(p: Any, members: Any, at: Any, t: Any, lever: Any, unit: Any, out: Any) -> None:
+    """How far ZOIs are from the motion, (n, 2), px: u or v, and the gradients over the ``lever``."""
+    e = 1 / unit
+    for k in range(len(members)):
+        i, place, turn = members[k, 0], 0.0, 0.0
+        for c in range(2):
+            along, down = slopes(t, c, at[k, 0], at[k, 1])
+            place = max(place, abs(p[i, 3 * c] - moved(t, c, at[k, 0], at[k, 1])))
+            turn = max(turn, abs(p[i, 3 * c + 1] - along * e), abs(p[i, 3 * c + 2] - down * e))
+        out[k, 0], out[k, 1] = place, turn * lever
 
 
 @helper

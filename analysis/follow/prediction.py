@@ -26,7 +26,7 @@ BETA_MOVED = 0.4
 """The part that enters the motion where news are more than noise; the position is then the measured one."""
 NEWS = 4.0
 """Standard deviations of a frame's noise up to which news are taken for noise."""
-LEAP = 25.0
+LEAP = 100.0
 """The same from which on the motion is the last difference alone: of a leap of 40 px and back, 0.4 would be left in it,
 and then 0.6 of what was left the frame before, so that for a dozen frames every ZOI took two iterations in place of
 one."""

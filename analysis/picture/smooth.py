@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from analysis.compiled.loops import helper, inlined
-from analysis.compiled.vectors import LANES, load, spread, store
+from analysis.compiled.vectors import LANES, fetch_later, fetch_soon, load, spread, store
 from analysis.picture.cutting import inside
 from analysis.picture.splines import PAD
 from analysis.picture.warp import pixels
 
 ROWS = 8
-"""Rows that are cut before they are warped."""
+"""Rows that are cut before they are warped; meanwhile the next ones are prefetched."""
 BORDER = 8
 """Steps along a side of a tile at which it is looked whether it has left the image."""
 
@@ -114,19 +114,37 @@ def new_pieces(width: int) -> Any:
     return np.empty((ROWS * width, 2), np.int64), np.empty((ROWS * width, 8), np.float32)
 
 
+@inlined
+def _fetch(c: Any, stride: int, t: Any, box: Any, row: int, also: Any) -> None:
+    """Prefetch a row of other images, and of the deformed one what is warped ``ROWS`` later.
+
+    Rows lie further apart than the processor prefetches by itself.
+    """
+    top, left, _, width = box
+    images, samples, pitch, count = also
+    moved_to = (top + row + ROWS + PAD + np.intp(t[1, 0])) * stride + left + PAD + np.intp(t[0, 0])
+    here = (top + row) * pitch + left
+    for x in range(0, width, LANES):
+        fetch_soon(c, np.uintp(moved_to + x))
+        for k in range(count):
+            fetch_later(images, np.uintp(here + x + k * samples))
+
+
 @helper
 def warp_smooth(
-    c: Any, stride: int, t: Any, unit: Any, box: Any, pieces: Any, ramp: Any, table: Any, out: Any, line: int
-) -> None:
+    c: Any, stride: int, t: Any, unit: Any, box: Any, pieces: Any, ramp: Any, table: Any, out: Any, line: int, also: Any
+) -> None:  # fmt: skip
     """The deformed image over a tile, its rows ``line`` apart in ``out``, flat float32.
 
     Written in whole vectors, of which each may begin at any pixel: what is written too much is overwritten or not read.
+    ``also`` are images that are read next: flat float32, samples of each, pitch, and how many.
     """
     where, how = pieces
     r = load(ramp, np.uintp(0))
     for first in range(0, box[2], ROWS):
         n = np.intp(0)  # a literal 0 would have numba compile the loops twice
         for row in range(first, min(first + ROWS, box[2])):
+            _fetch(c, stride, t, box, row, also)
             n = _cut(t, unit, box, row, row * line, stride, n, where, how)
         for piece in range(n):
             tau_x, tau_y = _cubic(how, piece, 0, r), _cubic(how, piece, 4, r)
