@@ -38,6 +38,10 @@ class ConfigError(PhasedicError):
     exit_code = 2
 
 
+class TooLittleMemory(ConfigError):
+    """What is to be measured needs more memory than there is."""
+
+
 class DeviceError(PhasedicError):
     """A camera or load cell that cannot be opened, or is gone for good."""
 

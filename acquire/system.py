@@ -276,6 +276,15 @@ def memory_MiB() -> float:
         return _memory_by_psutil()
 
 
+def available_MiB() -> float:
+    """Memory that this system can still give to a process; NaN where it is not known."""
+    try:
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        return next(int(line.split()[1]) / 2**10 for line in lines if line.startswith("MemAvailable:"))
+    except (OSError, ValueError, IndexError, StopIteration):
+        return float("nan")
+
+
 def _page_bytes() -> int:
     if sys.platform == "win32":
         return 4096  # never asked: it has no /proc

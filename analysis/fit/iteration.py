@@ -1,7 +1,7 @@
 """The iteration: warp, take moments of the difference, solve, compose, until the step is small.
 
-One compiled loop over ZOIs; each is done by one thread from start to end, so its numbers depend
-neither on the number of threads nor on the other ZOIs.
+One compiled loop over ZOIs; each is done by one thread, so its numbers depend neither on the number of threads nor,
+from the same start, on the other ZOIs. The first step of many is made for a tile of them at once (``shared``).
 
 A step of d px leaves about d (0.003 + 1.15 sigma_u + 0.03 d): the iteration stops by this measured law. A fixed share
 (0.12) in its place needed two iterations where one was enough. The law holds for affine ZOIs with a uniform or
@@ -29,17 +29,15 @@ from analysis.fit.kernel_args import (
     PictureArgs,
     StopArgs,
 )
-from analysis.fit.shapes import (
+from analysis.fit.moments import (
     CHANNELS,
     DEGREES,
     DIFFERENCE_ROWS,
-    N_SHAPES,
     add_difference_columns,
-    bent,
     difference_moments,
-    shares,
     weighted_rows,
 )
+from analysis.fit.shapes import N_HELD, bent, shares
 from analysis.picture.cutting import ROWS, displacement, inside, new_plan, plan_rows
 from analysis.picture.splines import PAD
 from analysis.picture.warp import warp_cut_rows, warp_rows
@@ -126,8 +124,7 @@ def _moments(
     """
     plan, ramp, g, columns, sums = buffers
     starts, taus, where, how = plan
-    size, order, rows, mix = fit.size, fit.order, fit.rows, fit.mix
-    half = 3 if order == 1 else 6
+    size, order, rows = fit.size, fit.order, fit.rows
     stride = picture.width + 2 * PAD
     line = rows.shape[1]
     reach = (size - 1) / 2
@@ -152,10 +149,18 @@ def _moments(
             )  # fmt: skip
         at = np.uintp((top + y) * fit.pitch + first)
         add_difference_columns(
-            fit.images, np.uintp(fit.samples), at, np.uintp(fit.pitch), g, np.uintp(line), y, count,
-            rows, columns,
+            fit.images, np.uintp(fit.samples), at, np.uintp(fit.pitch), g, np.uintp(0), np.uintp(line), line, y,
+            count, rows, columns,
         )  # fmt: skip
-    energy = difference_moments(columns, rows, line, sums)
+    return moments_of(fit, columns, np.uintp(0), sums, m, bent_by)
+
+
+@inlined
+def moments_of(fit: Any, columns: Any, place: Any, sums: Any, m: Any, bent_by: Any) -> Any:
+    """J' w d (P,) of a ZOI that begins at column ``place`` of column sums, and the sums with the shapes; d' w d."""
+    mix, order = fit.mix, fit.order
+    half = 3 if order == 1 else 6
+    energy = difference_moments(columns, place, fit.rows, fit.rows.shape[1], sums)
     x, xx = mix[1, 1], mix[2, 2]
     for k in range(4, CHANNELS):
         m[2 * half + 2 + k] = sums[k, 0, 0]
@@ -172,7 +177,7 @@ def _moments(
 
 
 @inlined
-def _solve(fit: Any, z: int, m: Any, step: Any, energy: Any, solved: Any) -> Any:
+def solve(fit: Any, z: int, m: Any, step: Any, energy: Any, solved: Any) -> Any:
     """Parameters of one linear fit, of ZOI ``z``, and the weighted sum of squares it leaves.
 
     What noise adds is taken off as far as there is noise: a picture that is its own reference has none.
@@ -190,13 +195,12 @@ def _solve(fit: Any, z: int, m: Any, step: Any, energy: Any, solved: Any) -> Any
 
 
 @inlined
-def _fetch(picture: Any, fit: Any, z: int, q: Any) -> None:
+def _fetch(picture: Any, fit: Any, origin: Any, q: Any) -> None:
     """Prefetch what a ZOI to come needs of the images and its neighbours do not: its last rows and columns.
 
     Rows lie further apart than the processor prefetches by itself. ``q`` is about where the ZOI has moved.
     """
     size = fit.size
-    origin = fit.origins[min(z + AHEAD, len(fit.origins) - 1)]
     fresh = min(fit.spacing, size)
     down, right = int(q[len(q) // 2]) + PAD + BEYOND, int(q[0]) + PAD + BEYOND
     for x in range(size - fresh + LANES - 1, size + LANES - 1, LANES):
@@ -220,7 +224,7 @@ def _fetch_rows(picture: Any, fit: Any, next_one: Any, y: int, count: int) -> No
 
 
 @inlined
-def _fetch_all(array: Any, z: int) -> None:
+def fetch_all(array: Any, z: int) -> None:
     """Prefetch what an array (A, m, n) holds of ZOI ``z``."""
     each = array.shape[1] * array.shape[2]
     for n in range(0, each, LANES):
@@ -228,40 +232,42 @@ def _fetch_all(array: Any, z: int) -> None:
 
 
 @parallel
-def track(picture: PictureArgs, table: Any, fit: FitArgs, stop: StopArgs, out: OutArgs) -> None:
-    """Measure all ZOIs from the start values in ``out.p`` and write what is found to ``out``.
+def track(picture: PictureArgs, table: Any, fit: FitArgs, stop: StopArgs, out: OutArgs, todo: Any) -> None:
+    """Measure ZOIs from the values in ``out.p`` and write what is found to ``out``.
 
     ``table`` (18,) has the weights of the taps (``splines.tap_table``). It is no part of the picture, since
-    read from a tuple it lets the compiler sum in another order, and the last digit of float32 changes.
+    read from a tuple it lets the compiler sum in another order, and the last digit of float32 changes. ``todo`` (K,)
+    are the places in ``out``; those whose iterations have begun go on.
     """
     counters, calling = np.zeros(SHARES, np.int64), caller()
     for share in prange(SHARES):
         keep_apart(calling)
-        _track_share(picture, table, fit, stop, out, counters, share)
+        _track_share(picture, table, fit, stop, out, todo, counters, share)
 
 
 @helper
-def _track_share(picture: Any, table: Any, fit: Any, stop: Any, out: Any, counters: Any, share: int) -> None:
+def _track_share(
+    picture: Any, table: Any, fit: Any, stop: Any, out: Any, todo: Any, counters: Any, share: int
+) -> None:
     """The pieces of all ZOIs that one thread takes."""
-    at_once = min(CHUNK, 1 + len(fit.origins) // SHARES)  # of some lost ones each may take as long as a frame
-    pieces = (len(fit.origins) + at_once - 1) // at_once
+    at_once = min(CHUNK, 1 + len(todo) // SHARES)  # of some lost ones each may take as long as a frame
+    pieces = (len(todo) + at_once - 1) // at_once
     piece = next_piece(counters, share, pieces)
     while piece >= 0:
         start = piece * at_once
-        _track_some(picture, table, fit, stop, out, start, min(start + at_once, len(fit.origins)))
+        _track_some(picture, table, fit, stop, out, todo, start, min(start + at_once, len(todo)))
         piece = next_piece(counters, share, pieces)
 
 
 @helper
-def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: int, end: int) -> None:
+def _track_some(
+    picture: Any, table: Any, fit: Any, stop: Any, out: Any, todo: Any, start: int, end: int
+) -> None:
     """``track`` for some ZOIs; a function of its own, since numba takes long over the body of a parallel loop."""
-    p, left, bending, cubic, nuisance = out.p, out.left, out.bending, out.cubic, out.nuisance
-    state, iterations = out.state, out.iterations
+    p, state, iterations = out.p, out.state, out.iterations
     count = fit.inverse.shape[1]
-    modes = p.shape[1]
-    half = modes // 2
+    half = p.shape[1] // 2
     reach = (fit.size - 1) / 2
-    lever = fit.size / 6.0
     line = fit.rows.shape[1]
     g = np.zeros(ROWS * line + LANES, np.float32)
     ramp = np.arange(line).astype(np.float32)
@@ -272,45 +278,75 @@ def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: 
     m = np.empty(count)
     step = np.empty(count)
     solved = np.empty(count + LANES, np.float32)
-    bent_by = np.empty(2 * N_SHAPES)
-    for z in range(start, end):
+    bent_by, known = np.empty(2 * N_HELD), np.zeros(2 * N_HELD, np.float32)
+    for k in range(start, end):
+        i = todo[k]
+        z = fit.which[i]
         top, first = fit.origins[z]
-        q = p[z]
-        _fetch(picture, fit, z, q)
-        _fetch_all(fit.inverse, z + 2)
-        _fetch_all(fit.cross, z + 2)
-        state[z], iterations[z] = RUNNING, 0
-        left[z] = bending[z] = cubic[z, 0] = cubic[z, 1] = nuisance[z, 0] = nuisance[z, 1] = np.nan
-        nuisance[z, 2] = np.nan
-        for iteration in range(stop.max_iterations):
+        q = p[i]
+        _fetch(picture, fit, fit.origins[fit.which[todo[min(k + AHEAD, len(todo) - 1)]]], q)
+        after = fit.which[todo[min(k + 2, len(todo) - 1)]]
+        fetch_all(fit.inverse, after)
+        fetch_all(fit.cross, after)
+        coming = fit.origins[fit.which[todo[min(k + 1, end - 1)]]]
+        begun = np.intp(iterations[i])
+        state[i] = RUNNING
+        if begun == 0:
+            _know_nothing(out, i)
+        for iteration in range(begun, stop.max_iterations):
             if not _within(picture, q, fit.order, first + reach, top + reach, reach):
-                state[z] = LEFT_IMAGE
+                state[i] = LEFT_IMAGE
                 break
-            coming = fit.origins[min(z + 1, end - 1)]
             motion = int(q[half]) + PAD + BEYOND, int(q[0]) + PAD + BEYOND
-            next_one = (coming[0] if iteration == 0 else -1, coming[1], *motion)
+            next_one = (coming[0] if iteration == begun else -1, coming[1], *motion)
             energy = _moments(picture, table, fit, top, first, q, buffers, next_one, m, bent_by)
-            left[z] = _solve(fit, z, m, step, energy, solved)
-            gain: Any = 1 + step[modes]
-            nuisance[z, 0] = gain
-            nuisance[z, 1] = step[modes + 3]
-            nuisance[z, 2] = (step[modes + 6] + step[modes + 7]) / gain
-            gain = min(max(gain, GAIN_RANGE[0]), GAIN_RANGE[1])
-            bending[z] = bent(bent_by, fit.cross, z, step, gain, fit.squares, solved, cubic)
-            longest = 0.0
-            for i in range(modes):
-                longest = max(longest, abs(step[i]) / gain)
-            if not longest < 1e3:
-                state[z] = DIVERGED
+            out.left[i] = solve(fit, z, m, step, energy, solved)
+            take(fit, stop, out, i, z, q, step, step, bent_by, known, solved)
+            if state[i] != RUNNING:
                 break
-            brake = min(1.0, MAX_STEP / longest) if longest > 0 else 1.0
-            for i in range(modes):
-                step[i] *= fit.units[i] / gain * brake
-            compose(q, fit.order, step)
-            iterations[z] = iteration + 1
-            if brake == 1.0 and _converged(step, half, lever, stop.length[z], stop.slope[z], stop.trust[z]):
-                state[z] = CONVERGED
-                break
+
+
+@helper
+def _know_nothing(out: Any, i: int) -> None:
+    out.left[i] = out.bending[i] = np.nan
+    for k in range(2):
+        out.cubic[i, k] = np.nan
+    for k in range(3):
+        out.nuisance[i, k] = np.nan
+
+
+@inlined
+def take(
+    fit: Any, stop: Any, out: Any, i: int, z: int, q: Any, step: Any, whole: Any, bent_by: Any, known: Any, solved: Any
+) -> None:  # fmt: skip
+    """Move ``q`` (modes,) of ZOI ``z`` by one linear fit, ``step`` (P,); what it shows is written to ``out`` at ``i``.
+
+    ``whole`` (P,) is the fit to all of the difference, of which ``bent_by`` (14,) are the sums with the shapes and
+    ``known`` (14,), px, is what the warp had of them; ``solved`` is for use.
+    """
+    modes = len(q)
+    gain: Any = 1 + step[modes]
+    out.nuisance[i, 0] = gain
+    out.nuisance[i, 1] = step[modes + 3]
+    out.nuisance[i, 2] = (step[modes + 6] + step[modes + 7]) / gain
+    gain = min(max(gain, GAIN_RANGE[0]), GAIN_RANGE[1])
+    out.bending[i] = bent(bent_by, fit.cross, z, whole, gain, fit.squares, known, solved, i, out.cubic)
+    longest = 0.0
+    for k in range(modes):
+        longest = max(longest, abs(step[k]))
+    longest /= gain
+    if longest < 1e3:
+        brake = min(1.0, MAX_STEP / longest) if longest > 0 else 1.0
+        for k in range(modes):
+            step[k] *= fit.units[k] * (brake / gain)
+        compose(q, fit.order, step)
+        out.iterations[i] += 1
+        if brake == 1.0 and _converged(
+            step, modes // 2, fit.size / 6.0, stop.length[z], stop.slope[z], stop.trust[z]
+        ):
+            out.state[i] = CONVERGED
+    else:
+        out.state[i] = DIVERGED
 
 
 @helper
@@ -318,9 +354,14 @@ def _converged(step: Any, half: int, lever: Any, length_left: Any, slope_left: A
     """Whether the error that this step has left is below the tolerances of u, v and the gradients."""
     move = max(abs(step[0]), abs(step[half]))
     turn = 0.0
-    for i in range(1, 3):
-        turn = max(turn, abs(step[i]), abs(step[half + i]))
-    length = max(move, turn * lever)
+    for k in range(1, 3):
+        turn = max(turn, abs(step[k]), abs(step[half + k]))
+    return is_short(max(move, turn * lever), lever, length_left, slope_left, trust)
+
+
+@helper
+def is_short(length: Any, lever: Any, length_left: Any, slope_left: Any, trust: Any) -> Any:
+    """Whether a step of ``length`` px leaves less than the tolerances."""
     left = length * (LEFT_BY_MISFIT + LEFT_BY_NOISE * trust + LEFT_BY_LENGTH * length)
     return left <= length_left and left <= slope_left * lever
 

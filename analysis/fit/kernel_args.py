@@ -65,6 +65,8 @@ class FitArgs(NamedTuple):
     ----------
     images : flat float32, ``samples`` of each, ``pitch`` a row
         See ``PreparedReference.images``.
+    which : (B,) int64
+        The ZOIs that are measured; all else is of all A. ``OutArgs`` are of the B.
     origins : (A, 2) int64
         First row and column of each ZOI.
     size : int, px
@@ -74,7 +76,7 @@ class FitArgs(NamedTuple):
     rows : (4, whole(size)) float32
         Window times P0 .. P3, zero beyond ``size``; ``mix`` (4, 4) has the polynomials (``shapes``).
     inverse : (A + 1, P, P) float32
-    cross : (A + 1, P, 10) float32
+    cross : (A + 1, P, 14) float32
     squares : (A, 2) float64
         Sums of w f_x^2 and w f_y^2.
     units, bias : (modes,) float64 and (A, P) float32
@@ -86,6 +88,7 @@ class FitArgs(NamedTuple):
     images: NDArray[np.float32]
     samples: int
     pitch: int
+    which: NDArray[np.int64]
     origins: NDArray[np.int64]
     size: int
     spacing: int
@@ -159,7 +162,7 @@ class OutArgs(NamedTuple):
         count = len(guess)
         return cls(
             guess.copy(), np.empty(count), np.empty(count), np.empty((count, 2)), np.empty((count, 3)),
-            np.empty(count, np.uint8), np.empty(count, np.uint8),
+            np.full(count, RUNNING, np.uint8), np.zeros(count, np.uint8),
         )  # fmt: skip
 
     @classmethod
@@ -168,7 +171,6 @@ class OutArgs(NamedTuple):
         empty = cls.starting(np.full((count, modes), np.nan))
         for array in (empty.left, empty.bending, empty.cubic, empty.nuisance):
             array[:] = np.nan
-        empty.state[:] = empty.iterations[:] = 0
         return empty
 
     def put(self, places: NDArray[np.intp], other: OutArgs) -> None:
@@ -335,7 +337,7 @@ class NormalArgs(NamedTuple):
     ----------
     inverse : (A + 1, P, P) float32
         Zero where there is no pattern.
-    cross : (A + 1, P, 10) float32
+    cross : (A + 1, P, 14) float32
         Of the shapes that the fit cannot follow with the columns of J (``shapes.cross_moments``). Both
         have a ZOI more than there is, of zeros, since loops read whole vectors.
     covariance, covariance_level : (A, 21) float32

@@ -40,8 +40,9 @@ SHOWN = 8
 BENT, SOME_BENT = 4.0, 0.1
 """What a fit leaves of a displacement that bends, over the median of noise, that one ZOI in a hundred exceeds by
 chance; share of the ZOIs that bend from which on those that do not are pooled alone, ..."""
-STRAIGHT_COLOUR = 1.3
-"""... as long as they are one in ``LOWEST`` and show no more colour than this: coloured errors bend all."""
+STRAIGHT_COLOUR = 1.15, 1.5
+"""... as long as they are one in ``LOWEST`` and show no more colour than the first: coloured errors bend all. Towards
+the second, more and more all of them count; a step would judge pictures near it now twice as mildly, now not."""
 WHITE_BENT = 0.83
 """Median of what white noise bends, over its mean (simulated: 0.80 to 0.85)."""
 SAME = 1e-3
@@ -78,9 +79,31 @@ def pooled(
     if count < MIN_POOLED:
         return None
     out = out[:, :count]
-    straight = _straight(out, known.white)
-    if straight is not None:
-        out, count = out[:, straight], np.count_nonzero(straight)
+    straight, part = _straight(out, known.white)
+    of_all = None if part == 1 else _common(out, known, every, given)
+    if part == 0:
+        return of_all
+    of_straight = _common(out[:, straight], known, every, given)
+    if of_straight is None:
+        return None
+    return _between(of_all, of_straight, part)._replace(apart=True)
+
+
+def _between(a: PooledError | None, b: PooledError, part: float) -> PooledError:
+    """The common error between two, by ``part`` that of the second; all of it where the first is None."""
+    if a is None:
+        return b
+    ratio, forgiven, usual, colour, bent = (
+        np.exp((1 - part) * np.log(getattr(a, name)) + part * np.log(getattr(b, name)))
+        for name in ("ratio", "forgiven", "usual", "colour", "bent")
+    )
+    scatter = (1 - part) * a.scatter + part * b.scatter
+    return PooledError(ratio, forgiven, float(usual), scatter, colour, float(bent), b.apart)
+
+
+def _common(out: Floats, known: ReferenceArgs, every: int, given: bool) -> PooledError | None:
+    """The common error of the ZOIs shown, (SHOWN, N), one in ``every``; None where the picture is its own reference."""
+    count = out.shape[1]
     contrast, ratio, spread, bare, *cubic, _, bends = out[:, np.argsort(out[0], kind="stable")]
     if np.count_nonzero(bare < SAME) > count / 2:
         return None
@@ -94,15 +117,16 @@ def pooled(
         stated = PooledError.none(len(known.signal))._replace(
             forgiven=np.minimum(_at(known.signal, middle, usual), 1)
         )
-        stated = stated._replace(bent=bent, apart=straight is not None)
+        stated = stated._replace(bent=bent)
         return stated if np.abs(np.log(colour)).max() < np.log(COLOURED) else stated._replace(colour=colour)
     trend, of_each = _at(known.signal, middle, usual), _at(contrast, middle, usual)
     scatter = MAD * float(np.median(np.abs(ratio / of_each - 1)))
     lowest = _lowest(ratio[groups], spread[groups])
     as_stated = (lowest < AS_STATED) | (np.median(lowest) < AS_STATED)
-    forgiven = _at(known.signal, middle, np.where(as_stated, np.minimum(usual, 1.0), usual))
+    common = np.where(as_stated, np.minimum(usual, 1.0), usual)
+    forgiven = trend if np.array_equal(common, usual) else _at(known.signal, middle, common)
     colour = _shrunk(medians(shares / of_each), number)
-    return PooledError(trend, forgiven, float(np.median(trend)), scatter, colour, bent, straight is not None)
+    return PooledError(trend, forgiven, float(np.median(trend)), scatter, colour, bent, False)
 
 
 @helper
@@ -149,14 +173,18 @@ def explained(
     return count if count >= MIN_MATCHED * tried else 0
 
 
-def _straight(out: Floats, white: Floats) -> NDArray[np.bool_] | None:
-    """Which of the ZOIs shown, (SHOWN, N), do not bend; None where few bend, most do, or all by a coloured error."""
+def _straight(out: Floats, white: Floats) -> tuple[NDArray[np.bool_], float]:
+    """Which of the ZOIs shown, (SHOWN, N), do not bend; how far they count alone, 0 to 1.
+
+    0 where few bend, most do, or all by a coloured error.
+    """
     straight = np.asarray(out[6] < BENT * white.sum())
     count = np.count_nonzero(straight)
     if not max(MIN_POOLED, len(straight) / LOWEST) <= count < (1 - SOME_BENT) * len(straight):
-        return None
-    shares = np.median(out[4:6, straight] / out[1, straight], axis=1) / white
-    return straight if shares.max() < STRAIGHT_COLOUR else None
+        return straight, 0.0
+    shares = medians(out[4:6, straight] / out[1, straight]) / white
+    low, high = np.log(STRAIGHT_COLOUR)
+    return straight, float(np.clip((high - np.log(max(shares.max(), 1e-6))) / (high - low), 0, 1))
 
 
 def _at(contrast: Floats, middle: Floats, values: Floats) -> Floats:

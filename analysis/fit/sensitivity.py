@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 from analysis.compiled.loops import helper, parallel
 from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
 from analysis.fit.kernel_args import BLURS, NUISANCES, NormalArgs, ReferenceImages, WindowRows
-from analysis.fit.shapes import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, cross_moments, product_moments
+from analysis.fit.moments import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, product_moments
+from analysis.fit.shapes import cross_moments
 
-CHUNK = 32
-"""ZOIs that a thread takes at a time."""
+CHUNK, RUN = 32, 8
+"""ZOIs that a thread takes at a time; those among them whose columns are summed once, at most."""
 RIDGE, BLUR_RIDGE = 1e-7, 1e-3
 """Added to the unit diagonal of the scaled normal matrix; in a pattern of one frequency blur and gain are alike."""
 
@@ -52,18 +53,33 @@ def square_rows(line: NDArray[np.float64], length: int) -> NDArray[np.float32]:
 
 
 @helper
-def _assemble(moments: Any, table: Any, out: Any) -> None:
+def _moments_of(table: Any) -> Any:
+    """Where the products of the columns of J are among the moments of a ZOI, (P, P), flat."""
+    out = np.empty((len(table), len(table)), np.intp)
     for i in range(len(table)):
         for j in range(len(table)):
-            product = PRODUCT[table[i, 0], table[j, 0]]
-            out[i, j] = moments[product, table[i, 2] + table[j, 2], table[i, 1] + table[j, 1]]
+            at = PRODUCT[table[i, 0], table[j, 0]] * PRODUCT_ROWS + table[i, 2] + table[j, 2]
+            out[i, j] = at * PRODUCT_ROWS + table[i, 1] + table[j, 1]
+    return out
 
 
 @helper
-def _invert(matrix: Any, low: Any, inverse: Any) -> bool:
-    """Inverse of a symmetric positive matrix by Cholesky after scaling to a unit diagonal, ridged; blur stands last."""
+def _assemble(moments: Any, places: Any, out: Any) -> None:
+    flat = moments.reshape(moments.size)
+    for i in range(len(places)):
+        for j in range(i + 1):
+            out[i, j] = flat[places[i, j]]
+            out[j, i] = out[i, j]
+
+
+@helper
+def _invert(matrix: Any, low: Any, back: Any, inverse: Any) -> bool:
+    """Inverse of a symmetric positive matrix by Cholesky after scaling to a unit diagonal, ridged; blur stands last.
+
+    ``low`` and ``back``, (P, P) each, are for use: the triangle, and the columns of its inverse as rows.
+    """
     n = len(matrix)
-    scale = np.empty(n)
+    scale, over = np.empty(n), np.empty(n)
     for i in range(n):
         if not matrix[i, i] > 0:
             return False
@@ -78,22 +94,21 @@ def _invert(matrix: Any, low: Any, inverse: Any) -> bool:
             if i == j:
                 if not total > 0:
                     return False
-                low[i, i] = math.sqrt(total)
+                over[i] = 1 / math.sqrt(total)
             else:
-                low[i, j] = total / low[j, j]
-    back = np.zeros((n, n))  # inverse of the triangle
+                low[i, j] = total * over[j]
     for j in range(n):
-        back[j, j] = 1 / low[j, j]
+        back[j, j] = over[j]
         for i in range(j + 1, n):
             total = 0.0
             for k in range(j, i):
-                total -= low[i, k] * back[k, j]
-            back[i, j] = total / low[i, i]
+                total -= low[i, k] * back[j, k]
+            back[j, i] = total * over[i]
     for i in range(n):
         for j in range(i + 1):
             total = 0.0
             for k in range(i, n):
-                total += back[k, i] * back[k, j]
+                total += back[i, k] * back[j, k]
             inverse[i, j] = total * scale[i] * scale[j]
             inverse[j, i] = inverse[i, j]
     return True
@@ -108,7 +123,7 @@ def _sandwich(inverse: Any, middle: Any, affine: Any, units: Any, out: Any) -> N
         for j in range(n):
             total = 0.0
             for k in range(n):
-                total += inverse[affine[a], k] * middle[k, j]
+                total += inverse[affine[a], k] * middle[j, k]
             part[a, j] = total
     pair = 0
     for a in range(6):
@@ -177,28 +192,40 @@ def _prepare_some(
     order = 1 if half == 3 else 2
     affine = np.array([0, 1, 2, half, half + 1, half + 2])
     down, end, o = np.uintp(images.pitch), np.uintp(3 * images.samples), np.uintp(0)
-    one = np.ones(rows.powers.shape[1], np.float32)
-    columns = np.empty((PRODUCT_ROWS + SQUARE_ROWS, rows.powers.shape[1]), np.float32)
+    wide = RUN * rows.powers.shape[1]
+    one = np.ones(wide, np.float32)
+    columns = np.empty((PRODUCT_ROWS + SQUARE_ROWS, wide), np.float32)
     normal = np.empty((count, count))
     middle = np.empty((count, count))
     inv = np.empty((count, count))
-    low = np.empty((count, count))
-    of_w = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
-    of_q = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
+    low, back = np.empty((count, count)), np.empty((count, count))
+    pairs = _moments_of(table)
+    all_w = np.zeros((RUN, N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
+    all_q, by_level = np.zeros_like(all_w), np.zeros_like(all_w)
     energy = out.energy
+    begin = end_of_run = first
     for z in range(first, min(first + CHUNK, len(origins))):
-        at = np.uintp(origins[z, 0] * images.pitch + origins[z, 1])
-        product_moments(
-            images.plain, images.plain, one, o, o, one, np.uintp(images.samples), at, down, size,
-            rows.powers, rows.squares, order, columns, of_w, of_q,
-        )  # fmt: skip
-        _assemble(of_w, table, normal)
+        if z == end_of_run:
+            begin, end_of_run = z, _end_of_run(origins, z, min(first + CHUNK, len(origins)), size)
+            at = np.uintp(origins[z, 0] * images.pitch + origins[z, 1])
+            places = (origins[z:end_of_run, 1] - origins[z, 1]).astype(np.uintp)
+            product_moments(
+                images.plain, images.plain, one, o, o, one, np.uintp(images.samples), at, down, size, places,
+                rows.powers, rows.squares, order, columns, all_w, all_q,
+            )  # fmt: skip
+            if images.by_level.size:  # of both the latter alone is read, and kept
+                product_moments(
+                    images.by_level, images.plain, images.by_level, end + at, down, one, np.uintp(images.samples),
+                    at, down, size, places, rows.powers, rows.squares, order, columns, by_level, by_level,
+                )  # fmt: skip
+        of_w, of_q = all_w[z - begin], all_q[z - begin]
+        _assemble(of_w, pairs, normal)
         total = of_w[6, 0, 0]
         energy[z, 0] = of_w[0, 0, 0] / total
         energy[z, 1] = of_w[2, 0, 0] / total
         energy[z, 3] = of_w[9, 0, 0] / total
         energy[z, 2] = of_w[5, 0, 0] / total - (of_w[9, 0, 0] / total) ** 2
-        if not _invert(normal, low, inv):
+        if not _invert(normal, low, back, inv):
             out.inverse[z].fill(0)
             out.cross[z].fill(0)
             out.covariance[z].fill(0)
@@ -207,17 +234,24 @@ def _prepare_some(
             continue
         _copy(inv, out.inverse[z])
         cross_moments(of_w, table, rows.mix, out.cross[z])
-        _assemble(of_q, table, middle)
+        _assemble(of_q, pairs, middle)
         _sandwich(inv, middle, affine, units, out.covariance[z])
         out.freedom[z] = total - _taken(inv, middle, out.taken[z])
         out.blur[z] = _of_sum(inv, middle, count - 3, count - 2)
         if images.by_level.size:
-            product_moments(
-                images.by_level, images.plain, images.by_level, end + at, down, one, np.uintp(images.samples),
-                at, down, size, rows.powers, rows.squares, order, columns, of_w, of_q,
-            )  # fmt: skip
-            _assemble(of_q, table, middle)
+            _assemble(by_level[z - begin], pairs, middle)
             _sandwich(inv, middle, affine, units, out.covariance_level[z])
+
+
+@helper
+def _end_of_run(origins: Any, z: int, end: int, size: int) -> int:
+    """The first ZOI behind ``z`` that does not begin in its row, close behind the one before."""
+    n = z + 1
+    while n < min(end, z + RUN) and origins[n, 0] == origins[z, 0]:
+        if not 0 <= origins[n, 1] - origins[n - 1, 1] <= size:
+            break
+        n += 1
+    return n
 
 
 @helper

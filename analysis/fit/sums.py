@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper
 from analysis.field import Window, ZoiGrid, combination, profile, variance_of_sum
+from analysis.fit.moments import CHANNELS
 from analysis.fit.sensitivity import columns, parameter_scale
-from analysis.fit.shapes import CHANNELS
 
 Floats = NDArray[np.float64]
 Item = TypeVar("Item")

@@ -136,20 +136,19 @@ def side_peaks(
 def _far_peaks(image: Image, region: Roi, reach: int) -> list[tuple[int, int]]:
     """Displacements beyond ``reach`` px at which a region looks like the picture, the nearest first."""
     from scipy.fft import irfft2, rfft2
-    from scipy.ndimage import maximum_filter
 
     times = 1
     while image.size > FAR_PIXELS * times**2:
         times *= 2
     height, width = (n // times for n in image.shape)
     small = image[: height * times, : width * times].reshape(height, times, width, times).mean(axis=(1, 3))
-    small = _without_slow(small, SLOWEST_PX / times)
+    small, spectrum = _without_slow(small, SLOWEST_PX / times)
     top, left = region.y // times, region.x // times
     rows, columns = max(region.height // times, 1), max(region.width // times, 1)
     part = np.zeros_like(small)
     part[top : top + rows, left : left + columns] = small[top : top + rows, left : left + columns]
-    found = irfft2(rfft2(small) * np.conj(rfft2(part)), small.shape) / max(float(np.vdot(part, part)), 1e-12)
-    y, x = np.nonzero((found > FAR_PEAK * MIN_OVERLAP) & (found >= maximum_filter(found, 5, mode="wrap")))
+    found = irfft2(spectrum * np.conj(rfft2(part)), small.shape) / max(float(np.vdot(part, part)), 1e-12)
+    y, x = _tops(found, FAR_PEAK * MIN_OVERLAP)
     scores: dict[tuple[int, int], float] = {}
     for down in (y, y - height):
         for across in (x, x - width):
@@ -165,13 +164,26 @@ def _far_peaks(image: Image, region: Roi, reach: int) -> list[tuple[int, int]]:
     return sorted(best, key=lambda p: math.hypot(*p))
 
 
-def _without_slow(image: Image, slowest: float) -> Image:
-    """A picture less all waves longer than ``slowest`` px."""
+def _tops(image: Image, least: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pixels above ``least`` that are the largest within 2 px, where the picture goes on at the opposite edge."""
+    y, x = np.nonzero(image > least)  # hardly any, as a rule
+    height, width = image.shape
+    for down in range(-2, 3):
+        for across in range(-2, 3):
+            beside = image[(y + down) % height, (x + across) % width]
+            top = image[y, x] >= beside
+            y, x = y[top], x[top]
+    return y, x
+
+
+def _without_slow(image: Image, slowest: float) -> tuple[Image, NDArray[np.complex64]]:
+    """A picture less all waves longer than ``slowest`` px, and its spectrum."""
     from scipy.fft import fftfreq, irfft2, rfft2, rfftfreq
 
     height, width = image.shape
     fast = np.hypot(fftfreq(height)[:, None], rfftfreq(width)[None]) * slowest > 1
-    return np.asarray(irfft2(rfft2(image) * fast, image.shape), np.float32)
+    spectrum = rfft2(image) * fast
+    return np.asarray(irfft2(spectrum, image.shape), np.float32), spectrum
 
 
 def _shared(moved: NDArray[np.intp], first: int, length: int, whole: int) -> Floats:

@@ -114,7 +114,7 @@ class Blocks:
 
     def plane_at(self, y: NDArray[np.floating], x: NDArray[np.floating]) -> NDArray[np.float64]:
         """The plane of the nearest block, moved to each point, (points, 6)."""
-        r, c = (np.abs(np.subtract.outer(at, own)).argmin(axis=1) for at, own in ((y, self.y), (x, self.x)))
+        r, c = _nearest(self.y, y), _nearest(self.x, x)
         blocks, own = np.unique(r * len(self.x) + c, return_inverse=True)
         plane = self.planes(*np.divmod(blocks, len(self.x)))[own]
         dy, dx = y - self.y[r], x - self.x[c]
@@ -138,6 +138,11 @@ def _planes(
 def _neighbours(centres: NDArray[np.floating], at: NDArray[np.floating]) -> tuple[NDArray[np.intp], ...]:
     right = np.searchsorted(centres, at)
     return np.clip(right - 1, 0, len(centres) - 1), np.clip(right, 0, len(centres) - 1)
+
+
+def _nearest(centres: NDArray[np.floating], at: NDArray[np.floating]) -> NDArray[np.intp]:
+    left, right = _neighbours(centres, at)
+    return np.where(at - centres[left] <= centres[right] - at, left, right)
 
 
 def find_blocks(reference: Image, deformed: Image, roi: Roi) -> Blocks:

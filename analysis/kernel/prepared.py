@@ -62,7 +62,7 @@ class PreparedReference:
     origins : (A, 2) int64
         First row and column of each ZOI.
     inverse : (A + 1, P, P) float32
-    cross : (A + 1, P, 10) float32
+    cross : (A + 1, P, 14) float32
         Of the shapes that the fit cannot follow with the columns of J (``shapes.cross_moments``). Both
         have a ZOI more than there is, of zeros, since loops read whole vectors.
     shapes : Shapes
@@ -189,7 +189,7 @@ def _fits(
     """
     from analysis.compiled.vectors import whole
     from analysis.fit.sensitivity import columns, parameter_scale, prepare, square_rows
-    from analysis.fit.shapes import N_SHAPES, shapes_of
+    from analysis.fit.shapes import N_HELD, shapes_of
 
     size = len(line)
     table, units = columns(order), parameter_scale(order, size)
@@ -197,7 +197,7 @@ def _fits(
     affine = units[[0, 1, 2, half, half + 1, half + 2]]
     shapes = shapes_of(line, whole(size))
     window = WindowRows(shapes.powers, square_rows(line, whole(size)), shapes.mix)
-    out = NormalArgs.empty(len(origins), len(table), 2 * N_SHAPES, level_from is not None)
+    out = NormalArgs.empty(len(origins), len(table), 2 * N_HELD, level_from is not None)
     for which in _near_each_other(origins, size):
         tops = origins[which, 0]
         first = int(tops.min())

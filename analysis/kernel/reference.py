@@ -25,6 +25,7 @@ from analysis.picture.splines import Box
 
 if TYPE_CHECKING:
     from analysis.fit.sums import MeanNoise
+    from analysis.fit.tiles import Tiles
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -64,6 +65,8 @@ class ReferencePicture:
         Of a renewed reference on the first.
     spacing : int, px
         Between ZOIs that follow each other in a row.
+    tiles : Tiles
+        Which ZOIs share a warp.
     sharpness : float
         Independent pixels a ZOI would have without a window, over the sum of its weights squared.
     unit_covariance : (21, R, C) float32
@@ -98,6 +101,7 @@ class ReferencePicture:
     sensors: Sensors | None
     placement: Placement | None
     spacing: int
+    tiles: Tiles
     sharpness: float
     unit_covariance: NDArray[np.float32]
     unit_sigma: Floats
@@ -272,6 +276,8 @@ def _laid_out(
     placement: Placement | None = None,
 ) -> ReferencePicture:
     """What every frame needs of a prepared picture, once."""
+    from analysis.fit.tiles import Tiles
+
     line = profile(settings.window, grid.size)
     sensors = None
     if settings.estimator == "phase":
@@ -279,6 +285,7 @@ def _laid_out(
         prepared = replace(prepared, covariance=sensors.covariance)
     sharpness = float((line.sum() / (line @ line)) ** 2)
     index = np.flatnonzero(grid.active)
+    spacing = _spacing(prepared.origins, grid.step)
     lengths, slopes = (np.sqrt(np.maximum(prepared.covariance[:, k].astype(np.float64), 0)) for k in _AFFINE)
     unit_covariance = np.ascontiguousarray(_spread(prepared.covariance, index, grid.shape, 0))
     share_variance = 1 / np.maximum(prepared.weight * sharpness * prepared.energy, 1e-12)
@@ -292,7 +299,8 @@ def _laid_out(
         prepared=prepared,
         sensors=sensors,
         placement=placement,
-        spacing=_spacing(prepared.origins, grid.step),
+        spacing=spacing,
+        tiles=Tiles.of(prepared.origins, grid.size, spacing),
         sharpness=sharpness,
         unit_covariance=unit_covariance,
         unit_sigma=np.stack([lengths.min(1), slopes.min(1), lengths.max(1)]),

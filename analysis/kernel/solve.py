@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from analysis.field import Status, profile
 from analysis.fit.kernel_args import (
+    CONVERGED,
     LEFT_IMAGE,
     FitArgs,
     OutArgs,
@@ -187,24 +188,27 @@ class Solution:
 
     def _iterated(self, which: Places, guess: Floats, max_iterations: int | None = None) -> OutArgs:
         from analysis.fit.iteration import track
+        from analysis.fit.shared import share_warps
 
-        out, stop = OutArgs.starting(guess), self.tolerance.at(which)
+        out, stop, fit = OutArgs.starting(guess), self.tolerance, self._fit(which)
         if max_iterations is not None:
             stop = stop.after(max_iterations)
-        track(self.picture, self.table, self._fit(which), stop, out)
+        elif fit.order == 1 and 2 * len(guess) > len(self.guess):
+            share_warps(self.picture, self.table, fit, stop, out, self.reference.tiles)
+        todo = np.flatnonzero(out.state != CONVERGED)
+        if len(todo):
+            track(self.picture, self.table, fit, stop, out, todo)
         return out
 
     def _fit(self, which: Places) -> FitArgs:
         from analysis.fit.sensitivity import parameter_scale
 
         ready, grid, order = self.reference.prepared, self.reference.grid, self.reference.settings.order
-        padded = which if isinstance(which, slice) else np.append(which, -1)
         return FitArgs(
-            ready.images.ravel(), ready.images[0].size, ready.images.shape[2],
-            ready.origins[which], grid.size, self.reference.spacing, order, ready.shapes.rows, ready.shapes.mix,
-            ready.inverse[padded], ready.cross[padded],
-            ready.weight * ready.energy[which], parameter_scale(order, grid.size), ready.bias[which],
-            self._noise[which], self._noise_left[which],
+            ready.images.ravel(), ready.images[0].size, ready.images.shape[2], np.arange(len(self.guess))[which],
+            ready.origins, grid.size, self.reference.spacing, order, ready.shapes.rows, ready.shapes.mix,
+            ready.inverse, ready.cross, ready.weight * ready.energy, parameter_scale(order, grid.size), ready.bias,
+            self._noise, self._noise_left,
         )  # fmt: skip
 
     def _by_phases(self, sensors: Sensors, which: Places, guess: Floats) -> OutArgs:

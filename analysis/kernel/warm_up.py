@@ -44,12 +44,12 @@ def not_compiled(kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) ->
 
 
 def _loops(phase: bool) -> list[Any]:
-    from analysis.fit import assembly, iteration, pooling, sensitivity, sums, verdict
+    from analysis.fit import assembly, iteration, pooling, sensitivity, shared, sums, verdict
     from analysis.follow import block_match, coherence, hill_climb, prediction
 
     loops = [
-        sensitivity.prepare, iteration.track, block_match.match, hill_climb.climb, prediction.advance, verdict.judge,
-        coherence.stand_out, coherence.label,
+        sensitivity.prepare, iteration.track, shared.share_warps, block_match.match, hill_climb.climb,
+        prediction.advance, verdict.judge, coherence.stand_out, coherence.label,
         assembly.expect, assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.medians,
         assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
     ]  # fmt: skip
@@ -149,21 +149,24 @@ def _iteration() -> None:
     """The iteration alone: called for no ZOI at all, it is compiled all the same."""
     from analysis.fit.iteration import track
     from analysis.fit.kernel_args import FitArgs, OutArgs, StopArgs
+    from analysis.fit.shared import share_warps
+    from analysis.fit.tiles import Tiles
 
     none, no_images = np.empty(0), np.empty((0, 6, 6), np.float32)
-    no_bias = np.empty((0, 6), np.float32)
+    no_bias, no_origins, no_zois = (
+        np.empty((0, 6), np.float32),
+        np.empty((0, 2), np.int64),
+        np.empty(0, np.int64),
+    )
     fit = FitArgs(
-        np.empty(0, np.float32), 0, 0, np.empty((0, 2), np.int64), 32, 16, 1,
+        np.empty(0, np.float32), 0, 0, no_zois, no_origins, 32, 16, 1,
         np.empty((4, 32), np.float32), np.empty((4, 4)), no_images, no_images, np.empty((0, 2)), np.empty(6),
         no_bias, none, none,
     )  # fmt: skip
-    track(
-        _no_picture(),
-        np.empty(18, np.float32),
-        fit,
-        StopArgs(none, none, none, 12),
-        OutArgs.starting(np.empty((0, 6))),
-    )
+    picture, table, stop = _no_picture(), np.empty(18, np.float32), StopArgs(none, none, none, 12)
+    out = OutArgs.starting(np.empty((0, 6)))
+    share_warps(picture, table, fit, stop, out, Tiles.of(no_origins, 32, 16))
+    track(picture, table, fit, stop, out, no_zois)
 
 
 def _no_picture() -> PictureArgs:

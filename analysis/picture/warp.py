@@ -5,10 +5,9 @@ every pixel, a vector of pixels at a time (``cutting`` has where a row is cut fo
 of the rate at which the processor issues multiply-adds.
 
 Tried and rejected: two rows at a time with shared loads (too few registers), six sums of taps side by side, ZOIs in the
-order of tiles (all within 3 %); a warp of the whole frame shared by overlapping ZOIs (a result would depend on the
-motion of neighbours). Estimated and not built: columns, then rows, with 0.7 of the arithmetic but a skew error with
-rotation (3e-4 px and 35 um/m at 1 degree); polynomials of the tap weights along a row; cutting
-the corners of the window.
+order of tiles (all within 3 %). Overlapping ZOIs share a warp in ``smooth``. Estimated and not built: columns, then
+rows, with 0.7 of the arithmetic but a skew error with rotation (3e-4 px and 35 um/m at 1 degree); polynomials of the
+tap weights along a row; cutting the corners of the window.
 """
 
 from __future__ import annotations
@@ -73,7 +72,7 @@ def _six_rows(row: Any, stride: Any, a: Any, b: Any) -> Any:
 
 
 @inlined
-def _pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: Any) -> Any:
+def pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: Any) -> Any:
     """A vector of pixels; ``first`` is the flat index of the first of the 36 taps of its first pixel."""
     value, _ = _six_rows(address(c, first), stride, _weights(tau_x, t), _weights(tau_y, t))
     return value
@@ -125,7 +124,7 @@ def _warp_pieces(c: Any, stride: Any, n: int, where: Any, how: Any, ramp: Any, t
         for done in range(0, where[piece, 2], LANES):
             k = np.uintp(done)
             r = load(ramp, k)
-            store(out, at + k, _pixels(c, stride, first + k, x0 + r * x1, y0 + r * y1, t))
+            store(out, at + k, pixels(c, stride, first + k, x0 + r * x1, y0 + r * y1, t))
 
 
 @helper
@@ -160,7 +159,7 @@ def _warp_bent_pieces(
             r = load(ramp, k)
             tau_x = spread(how[piece, 0]) + r * (spread(how[piece, 1]) + r * spread(x2))
             tau_y = spread(how[piece, 2]) + r * (spread(how[piece, 3]) + r * spread(y2))
-            store(out, at + k, _pixels(c, stride, first + k, tau_x, tau_y, t))
+            store(out, at + k, pixels(c, stride, first + k, tau_x, tau_y, t))
 
 
 @inlined
@@ -180,7 +179,7 @@ def warp_rows(
         for n in range(0, size, LANES):
             k = np.uintp(n)
             r = load(ramp, k)
-            store(out, at + k, _pixels(c, stride, start + k, x0 + r * sx, y0 + r * sy, t))
+            store(out, at + k, pixels(c, stride, start + k, x0 + r * sx, y0 + r * sy, t))
         at += line
 
 

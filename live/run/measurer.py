@@ -9,7 +9,7 @@ import threading
 import time
 
 from acquire.burst import LIMIT_PX
-from acquire.errors import PhasedicError
+from acquire.errors import PhasedicError, TooLittleMemory
 from acquire.events import Event, EventKind, EventSink, Level
 from acquire.frame import Burst
 from acquire.system import lower_priority
@@ -248,6 +248,11 @@ class Measurer:
                 self._incoming.skip_rest()
             else:
                 self._measure(ready)
+        except TooLittleMemory as error:
+            self.failure = 1
+            text = Message("nothing is measured, recording goes on: {error}", error)
+            self._run_state.event_log.emit(EventKind.MEASUREMENT, "measurement", text, "error")
+            self._incoming.skip_rest()
         except PhasedicError as error:
             self._refused = error
             self._stop.request(Message("the start failed"))

@@ -22,8 +22,7 @@ from analysis.compiled.loops import helper, stamp
 from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
 from analysis.compiled.vectors import LANES, load, spread, store, total, whole
 from analysis.field.grid import profile
-from analysis.fit.sensitivity import square_rows
-from analysis.fit.shapes import (
+from analysis.fit.moments import (
     CHANNELS,
     DEGREES,
     DEGREES_OF,
@@ -35,8 +34,9 @@ from analysis.fit.shapes import (
     add_difference_columns,
     difference_moments,
     product_moments,
-    shapes_of,
 )
+from analysis.fit.sensitivity import square_rows
+from analysis.fit.shapes import shapes_of
 from analysis.kernel.images import with_second_differences
 
 PARTS = 64
@@ -207,10 +207,10 @@ def of_the_difference(images, samples, at, pitch, g, line, size, rows, columns, 
     for first in range(0, size, 16):
         count = min(16, size - first)
         add_difference_columns(
-            images, samples, at + np.uintp(first) * pitch, pitch, g[first * line :], np.uintp(line), first,
-            count, rows, columns,
+            images, samples, at + np.uintp(first) * pitch, pitch, g, np.uintp(first * line), np.uintp(line),
+            line, first, count, rows, columns,
         )  # fmt: skip
-    return difference_moments(columns, rows, line, out)
+    return difference_moments(columns, np.uintp(0), rows, line, out)
 
 
 def test_operations_on_vectors() -> None:
@@ -262,24 +262,28 @@ def test_moments_of_products(order: int) -> None:
     top, left, line = 11, 3, whole(size)
     window = profile("gaussian", size)
     powers, squares = shapes_of(window, line).powers, square_rows(window, line)
-    of_w, of_q = np.zeros((2, N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
-    one = np.ones(line, np.float32)
-    columns = np.zeros((PRODUCT_ROWS + SQUARE_ROWS, line), np.float32)
+    places = np.array([0, 7, 26], np.uintp)
+    of_w, of_q = np.zeros((2, len(places), N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
+    one = np.ones(3 * line, np.float32)
+    columns = np.zeros((PRODUCT_ROWS + SQUARE_ROWS, 3 * line), np.float32)
     product_moments(
-        images.ravel(), images.ravel(), one, 0, 0, one, HEIGHT * PITCH, top * PITCH + left, PITCH, size,
+        images.ravel(), images.ravel(), one, 0, 0, one, HEIGHT * PITCH, top * PITCH + left, PITCH, size, places,
         powers, squares, order, columns, of_w, of_q,
     )  # fmt: skip
-    parts = images[:, top : top + size, left : left + size].astype(float)
-    parts[3] = 1
     w, q = powers[:, :size].astype(float), squares[:, :size].astype(float)
-    for a in range(CHANNELS):
-        for b in range(a, CHANNELS):
-            product = parts[a] * parts[b]
-            for found, rows, most in ((of_w, w, 3 + order), (of_q, q, 2 * order)):
-                expected = rows @ product @ rows.T
-                for y in range(most + 1):
-                    for x in range(most + 1 - y):
-                        assert found[PRODUCT[a, b], y, x] == pytest.approx(expected[y, x], abs=1e-3)
+    degrees = order, order, 1, 1, 0, 0, 0
+    for z, place in enumerate(places.astype(int)):
+        parts = images[:, top : top + size, left + place : left + place + size].astype(float)
+        parts[3] = 1
+        for a in range(CHANNELS):
+            for b in range(a, CHANNELS):
+                product = parts[a] * parts[b]
+                with_shapes = degrees[b] + (3 if a < 2 else degrees[a])
+                for found, rows, most in ((of_w, w, with_shapes), (of_q, q, degrees[a] + degrees[b])):
+                    expected = rows @ product @ rows.T
+                    for y in range(most + 1):
+                        for x in range(most + 1 - y):
+                            assert found[z, PRODUCT[a, b], y, x] == pytest.approx(expected[y, x], abs=1e-3)
 
 
 def test_a_measurement_compiles_nothing_that_was_not_compiled_ahead() -> None:

@@ -13,6 +13,7 @@ from analysis.kernel.reference import ReferencePicture
 from tests.analysis.speckle import SHAPE, picture
 
 GRID = ZoiGrid.cover(Roi(8, 8, 224, 184), size=32, step=16)
+GRID_8 = ZoiGrid.cover(Roi(2, 2, 236, 196), size=32, step=8)
 FIELDS = ("u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy", "sigma_u", "sigma_exx", "residual")
 
 
@@ -100,11 +101,9 @@ def test_imposed_motion_is_found_from_scratch(motion: dict, order: int) -> None:
     assert np.isnan(field.u[~ok]).all() and (field.status[~ok] == Status.OUTSIDE).all()
 
 
-def test_values_do_not_depend_on_threads_or_other_zois() -> None:
+def test_values_do_not_depend_on_threads() -> None:
     reference, deformed = picture(0.01, 1), picture(0.01, 2, u=0.3, du_dx=0.002)
-    few = GRID.subset(every=3)
     whole = PhaseKernel(reference, GRID, noise=41.0).measure(deformed, noise=41.0)
-    part = PhaseKernel(reference, few, noise=41.0).measure(deformed, noise=41.0)
     threads = numba.get_num_threads()
     numba.set_num_threads(1)
     try:
@@ -113,7 +112,26 @@ def test_values_do_not_depend_on_threads_or_other_zois() -> None:
         numba.set_num_threads(threads)
     for name in FIELDS:
         assert np.array_equal(getattr(whole, name), getattr(alone, name), equal_nan=True)
-        assert np.array_equal(getattr(whole, name)[few.active], getattr(part, name)[few.active])
+
+
+@pytest.mark.parametrize(
+    "part", [GRID_8.subset(every=3), GRID_8.subset(active=np.indices(GRID_8.shape)[1] > 12)]
+)
+def test_values_depend_on_other_zois_by_a_twentieth_of_their_sigma(part: ZoiGrid) -> None:
+    """ZOIs of a tile share a motion; from a search each has its own."""
+    pictures = [picture(0.01, k, u=0.3 + 0.03 * k, du_dx=0.002 + 2e-4 * k) for k in range(4)]
+    fields: list[list[StrainField]] = []
+    for grid in (GRID_8, part):
+        kernel = PhaseKernel(pictures[0], grid, noise=41.0)
+        fields.append([kernel.measure(pictures[1], noise=41.0)])
+        for image in pictures[2:]:
+            fields[-1].append(kernel.measure(image, start=fields[-1][-1], noise=41.0))
+    for whole, few in zip(*fields, strict=True):
+        off = np.stack(
+            [((getattr(few, n) - getattr(whole, n)) / whole.sigma(n))[part.active] for n in FIELDS[:6]]
+        )
+        assert np.max(np.abs(off)) < 0.05 and np.sqrt(np.mean(off**2)) < 0.02
+    assert np.array_equal(fields[0][0].u[part.active], fields[1][0].u[part.active])
 
 
 def test_a_start_gives_the_same_values_as_a_search() -> None:

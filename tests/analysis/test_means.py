@@ -10,7 +10,7 @@ import pytest
 from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
 from analysis.field import Window
 from analysis.field.uncertainty import variance_of_sum
-from analysis.fit.shapes import CHANNELS
+from analysis.fit.moments import CHANNELS
 from analysis.fit.sums import MONOMIALS, scatter, sum_of_squares
 from analysis.kernel.images import continue_rim, padded, with_second_differences
 from tests.analysis.speckle import picture

@@ -203,6 +203,25 @@ def test_noise_of_a_stretched_picture_is_a_mean_over_more_pixels(
     assert np.sqrt(np.mean(np.concatenate(off) ** 2)) == pytest.approx(1, abs=0.06)
 
 
+def test_what_those_that_do_not_bend_decide_has_no_step() -> None:
+    """They decide alone where they are white, and less and less the more colour they show."""
+    rng, count = np.random.default_rng(3), 600
+    straight = np.arange(count) % 3 == 0
+    left = np.where(straight, 2.0, 8.0) * rng.uniform(0.95, 1.05, count)
+    found, known = zois(count, left, np.full(count, 900.0))
+    forgiven, apart = [], []
+    for colour in np.linspace(1.0, 1.7, 141):
+        found.cubic[:] = colour * 1e-4 * known.white * left[:, None]
+        found.bending[:] = 1e-4 * left * np.where(straight, 1.0, 1e4)
+        common = pooled(found, left, np.ones(count), known, np.arange(count), given=False)
+        assert common is not None
+        forgiven.append(float(np.median(common.forgiven)))
+        apart.append(common.apart)
+    assert forgiven[0] == pytest.approx(2.0, rel=0.02) and forgiven[-1] == pytest.approx(8.0, rel=0.05)
+    assert np.abs(np.diff(np.log(forgiven))).max() < 0.06
+    assert apart[0] and not apart[-1]
+
+
 def test_given_noise_stands_where_what_is_left_agrees_and_few_zois_decide_nothing() -> None:
     signal = np.full(200, 900.0)
     found, known = zois(200, np.full(200, 0.9), signal)

@@ -94,6 +94,22 @@ def test_news_beyond_four_sigmas_are_motion(mode: int, unit: float) -> None:
     assert predicted(3, 0.041 * unit, mode)[0] == pytest.approx(1 + 0.4 * 0.041 * unit)
 
 
+@pytest.mark.parametrize("age", [1, 3, 9])
+def test_after_a_leap_the_motion_is_the_last_difference(age: int) -> None:
+    """Of a picture far away and back nothing is left after two frames: it was no motion that goes on."""
+    assert predicted(age, 40.0)[:2] == pytest.approx((41.0, 41.0))
+    assert predicted(9, 1.01)[0] == pytest.approx(2.01)
+    assert predicted(9, 0.99)[0] == pytest.approx(1 + 0.4 * 0.99)
+    motion, guess = Motion.none(np.arange(1), 6), np.zeros((1, 6))
+    for frame in range(12):
+        values = np.zeros((1, 6))
+        values[0, 0] = 40.0 if frame == 5 else 0.05 * frame
+        motion = motion_after(motion, values, guess, np.full(1, 0.01), 5.0)
+        guess = values + motion.ahead
+        if frame in (8, 9, 10):
+            assert guess[0, 0] == pytest.approx(0.05 * (frame + 1), abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("step", "length"),
     [((0.02, 0, 0, 0.01, 0, 0), 0.02), ((0, 0, 0, -0.03, 0, 0), 0.03), ((0, 0.002, 0, 0, 0, -0.004), 0.02)],

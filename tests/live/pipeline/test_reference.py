@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquire.errors import TooLittleMemory
 from acquire.events import Event, EventKind
-from analysis import Roi, Status, StrainField, ZoiGrid
+from analysis import KernelSettings, Roi, Status, StrainField, ZoiGrid
+from live.pipeline import reference
 from live.pipeline.measure import Tracker, _share
-from live.pipeline.reference import ReferenceMotion, averaged, motion_between, repetition_text
+from live.pipeline.reference import ReferenceMotion, averaged, motion_between, prepare, repetition_text
 from tests.live.made_up import START, make_field, make_grid, make_measurement
 
 GRID = ZoiGrid.cover(Roi(0, 0, 176, 32), 32, 16)  # ten side by side
@@ -76,6 +78,22 @@ def test_a_reference_is_pulled_beyond_five_sigma_and_twenty_micrometres_a_metre(
 ) -> None:
     assert ReferenceMotion(0.01, strain, sigma).pulled is pulled
     assert not ReferenceMotion(0.01).pulled
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_too_little_memory_is_one_sentence_with_the_way_out(
+    known: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before anything is taken where it is known what there is, else when the system refuses."""
+
+    def refused(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(reference, "available_MiB", lambda: 0.01 if known else math.nan)
+    monkeypatch.setattr("analysis.PhaseKernel", refused)
+    words = r"ZOIs in a picture .* take about \d+ MiB.*: take a larger step or a smaller roi"
+    with pytest.raises(TooLittleMemory, match=words):
+        prepare(make_measurement(0).burst, make_grid(), KernelSettings(), 1.0)
 
 
 def test_the_noise_of_a_mean_has_at_least_that_of_the_rounding() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from acquire.errors import DataError
+from acquire.errors import DataError, TooLittleMemory
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from live.pipeline import latency
@@ -313,6 +313,16 @@ def test_a_defect_ends_the_measurement_alone(monkeypatch: pytest.MonkeyPatch) ->
     assert (bench.thread.failure, bench.skipped) == (1, 1)
     (event,) = bench.state.event_log.events("error")
     assert event.text.startswith("measuring has stopped by a defect, recording goes on: ZeroDivisionError(")
+
+
+def test_without_the_memory_to_measure_recording_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused() -> None:
+        raise TooLittleMemory("they take too much")
+
+    bench = MeasureSetup(monkeypatch, refused)
+    assert (bench.thread.failure, bench.skipped, bench.stop.reason) == (1, 1, "")
+    (event,) = bench.state.event_log.events("error")
+    assert event.text == "nothing is measured, recording goes on: they take too much"
 
 
 def test_without_a_reference_the_rest_is_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
