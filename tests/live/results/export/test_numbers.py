@@ -8,6 +8,7 @@ import json
 import math
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 from xml.etree import ElementTree
 
 import cv2
@@ -15,11 +16,10 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from acquire.load_sample import LoadSample
 from live.cli import main
 from live.results.export.tables import load_table
 from live.results.quantities import Display
-from live.results.run_folder import open_run
+from live.results.run_folder import RunFolder, open_run
 from tests.live.made_run import THICKNESS_MM, WIDTH_MM
 from tests.live.results.export import vti
 
@@ -226,8 +226,14 @@ def test_xarray(run_dir: Path) -> None:
 
 
 def test_a_table_of_loads_counts_from_the_start_of_the_test() -> None:
-    run, file = SimpleNamespace(start_monotonic=100.0), io.StringIO()
-    load_table(run, [LoadSample(100.5, 12.5), LoadSample(101.25, math.nan)], file)  # type: ignore[arg-type]
+    recorded: Any = SimpleNamespace(
+        session=SimpleNamespace(load_curve=lambda: (np.array([100.5, 101.25]), np.array([12.5, math.nan]))),
+        _recorded=lambda read, none: read(),
+        start_monotonic=100.0,
+    )
+    run: Any = SimpleNamespace(load_curve=RunFolder.load_curve.func(recorded))
+    file = io.StringIO()
+    load_table(run, file)
     heads, *rows = csv.reader(io.StringIO(file.getvalue()))
     assert heads == ["time_s", "force_N"]
     (half, known), (later, unknown) = ([float(cell) for cell in row] for row in rows)
