@@ -115,7 +115,7 @@ def decode(source: Source, page: int = 0) -> Decoded:
         try:
             picture = _decode(cv2, source, page)
         except cv2.error as error:
-            reports.append(error.text)
+            reports.append(str(error))
     damage = next((line for line in reports if _DAMAGE.search(line)), "")
     return Decoded(picture, _BEFORE.sub("", damage).strip()[:200])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from numbers import Number
 
 from acquire.text.message import Message
 
@@ -27,7 +28,9 @@ def _changed(text: object, change: Callable[[str], str]) -> str:
     text = getattr(text, "text", text) if isinstance(text, Exception) else text
     if not isinstance(text, Message):
         return change(str(text))
-    values = {key: _changed(one, change) if isinstance(one, str) else one for key, one in text.values.items()}
+    values = {
+        key: _changed(one, change) if not isinstance(one, Number) else one for key, one in text.values.items()
+    }
     return Message(text.template, **values)
 
 

@@ -190,9 +190,9 @@ def test_what_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None
     monkeypatch.setattr(run, "VIEWER_OPENS_S", 0.0)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.delenv("DISPLAY", raising=False)
-    assert run._open_viewer(9881).startswith("no: no window") and not (tmp_path / "opened").exists()
+    assert run._open_viewer(9881).line.startswith("no: no window") and not (tmp_path / "opened").exists()
     monkeypatch.setenv("DISPLAY", ":7")
-    assert run._open_viewer(9881) == "ok"
+    assert run._open_viewer(9881).line == "ok"
     until(lambda: (tmp_path / "opened").exists() and (tmp_path / "opened").read_text())
     assert (tmp_path / "opened").read_text().startswith("--connect rerun+http://127.0.0.1:9881/proxy ")
 
@@ -205,7 +205,7 @@ def test_a_viewer_without_its_libraries_names_their_packages(
     monkeypatch.setattr(viewer, "viewer_binary", lambda: program)
     monkeypatch.setattr(run, "VIEWER_OPENS_S", 60.0)
     monkeypatch.setenv("DISPLAY", ":7")
-    answer = run._open_viewer(9881)
+    answer = run._open_viewer(9881).line
     assert answer == (
         "no: the viewer did not open (winit: Failed to load one of xlib's shared libraries); "
         f"on a Debian without desktop it needs: {viewer.VIEWER_PACKAGES}"

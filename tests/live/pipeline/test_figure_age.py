@@ -13,6 +13,7 @@ import pytest
 
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadFlag, LoadSample
+from acquire.text.message import from_json
 from live.config.loading import load_config
 from live.config.sections import AlarmConfig, SpecimenConfig
 from live.pipeline.channel_values import ChannelValues
@@ -70,7 +71,7 @@ def page_of(state: RunState, *, paused: bool = False) -> dict[str, Any]:
         paused=paused, recording=True, live=True, folder=Path("run"), run_state=state
     )
     page.attach(running)
-    found: dict[str, Any] = plain(page.state())
+    found: dict[str, Any] = json.loads(json.dumps(plain(page.state())), object_hook=from_json)
     return found
 
 
