@@ -111,7 +111,7 @@ def _parse(text: str, allowed: Mapping[str, float], where: str) -> Fault:
     time, star, amount = rest.partition("*")
     if name not in allowed:
         raise ConfigError(
-            "{where}: unknown fault {name}; known: {join}", where, repr(name), ", ".join(allowed)
+            "{where}: unknown fault {name}; known: {listed}", where, repr(name), ", ".join(allowed)
         )
     try:
         fault = Fault(name, float(time), float(amount) if star else allowed[name])

@@ -257,7 +257,7 @@ def _kind(address: Address) -> Kind:
         if kind == wanted:
             return kind
     raise ConfigError(
-        "{text}: there is no simulated specimen {wanted}; known: {join}",
+        "{text}: there is no simulated specimen {wanted}; known: {listed}",
         address.text,
         repr(wanted),
         ", ".join(KINDS),

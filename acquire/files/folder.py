@@ -27,7 +27,7 @@ def listed(target: str) -> list[Path]:
         there = found = [item for item in map(Path, names) if not item.is_dir() and _is_seen(item)]
     for item in found or there:
         if what := FOREIGN.get(item.suffix.lower()):
-            raise DataError("{item}: {what}", item, what)
+            raise DataError("{value}: {what}", item, what)
     if found:
         return found
     if not path.is_dir():
@@ -41,7 +41,7 @@ def listed(target: str) -> list[Path]:
         else Message("it is empty")
     )
     raise DataError(
-        "{path}: no picture in this folder ({only}); wanted: {join}", path, only, ", ".join(SUFFIXES)
+        "{path}: no picture in this folder ({only}); wanted: {listed}", path, only, ", ".join(SUFFIXES)
     )
 
 

@@ -81,7 +81,7 @@ def name_of(library: Aravis, target: str, where: str) -> str:
     here = "; ".join(Message("genicam:{id}  {one}", one.id, one) for one in cameras) or "none"
     if found:
         raise ConfigError(
-            "{where}: {len} cameras are meant; give one of them. Cameras here: {here}",
+            "{where}: {count} cameras are meant; give one of them. Cameras here: {here}",
             where,
             len(found),
             here,

@@ -209,7 +209,9 @@ def load_aravis() -> Aravis:
         return Aravis()
     except (OSError, AttributeError) as error:
         others = [name for name in OTHER_VERSIONS if ctypes.util.find_library(name)]
-        there = Message("; {join} is here, which it does not work with", ", ".join(others)) if others else ""
+        there = (
+            Message("; {listed} is here, which it does not work with", ", ".join(others)) if others else ""
+        )
         raise DeviceError(
             "genicam: cameras need the library Aravis 0.8, which is not there ({error}){there}: {HOW_TO_INSTALL}",
             error,

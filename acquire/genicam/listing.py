@@ -46,4 +46,4 @@ def _details(device: GenicamDevice) -> Iterator[str]:
                 "{key}={ask:g} ({low:g}..{high:g})", key, device.ask(f"arv_camera_get_{what}"), low, high
             )
     if device.has("TriggerSource"):
-        yield Message("trigger=no, {join}", ", ".join(device.choices("TriggerSource")))
+        yield Message("trigger=no, {listed}", ", ".join(device.choices("TriggerSource")))

@@ -132,7 +132,7 @@ def _put_on_manual(device: GenicamDevice) -> None:
 def _set_feature(device: GenicamDevice, feature: str, value: str, where: str) -> None:
     if not device.has(feature):
         raise ConfigError(
-            "{where}: this camera has no feature {feature}; known settings: {join}",
+            "{where}: this camera has no feature {feature}; known settings: {listed}",
             where,
             repr(feature),
             ", ".join(KEYS),
@@ -160,14 +160,14 @@ def _choose_format(device: GenicamDevice, asked: str | None, where: str) -> Mono
     usable = readable(offered)
     if not usable:
         raise DeviceError(
-            "{where}: offers {join}, none of them grey levels we can read",
+            "{where}: offers {listed}, none of them grey levels we can read",
             where,
             ", ".join(offered) or "nothing",
         )
     name = preferred(offered) if asked is None else asked
     if name not in usable:
         raise ConfigError(
-            "{where}: format={asked} is not possible; the camera offers {join}",
+            "{where}: format={asked} is not possible; the camera offers {listed}",
             where,
             asked,
             ", ".join(usable),
@@ -225,7 +225,7 @@ def _set_trigger(device: GenicamDevice, settings: GenicamSettings, where: str) -
     offered = device.choices("TriggerSource") if device.has("TriggerSource") else []
     if settings.trigger not in offered:
         raise ConfigError(
-            "{where}: trigger={trigger} is not possible; allowed: {join}",
+            "{where}: trigger={trigger} is not possible; allowed: {listed}",
             where,
             settings.trigger,
             ", ".join([NO_TRIGGER, *offered]),
@@ -365,7 +365,7 @@ def _warnings(device: GenicamDevice, settings: GenicamSettings, fps: float | Non
     automatic = [name for name in AUTOMATIC if device.has(name) and device.text(name) != "Off"]
     if automatic:
         yield Message(
-            "the camera goes on changing by itself: {join}; grey levels may drift", ", ".join(automatic)
+            "the camera goes on changing by itself: {listed}; grey levels may drift", ", ".join(automatic)
         )
     if device.has("Gamma") and not same_value(device.text("Gamma"), "1"):
         yield Message(

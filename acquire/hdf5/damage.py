@@ -220,7 +220,7 @@ def read_superblock(path: Path) -> Superblock:
     if not begin.startswith(SIGNATURE):
         raise DataError("{path} is not an HDF5 file, so not a session; give a session.h5", path)
     if len(begin) < 48:
-        raise DataError("{path} is truncated to {len} bytes; nothing in it can be read", path, len(begin))
+        raise DataError("{path} is truncated to {count} bytes; nothing in it can be read", path, len(begin))
     if begin[8] not in (2, 3) or begin[9] != 8:
         return Superblock(False, 0)
     return Superblock(begin[11] != 0, int.from_bytes(begin[28:36], "little"))

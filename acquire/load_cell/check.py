@@ -367,6 +367,6 @@ def report_lines(found: LoadReport) -> list[str]:
         ]
     lines += [Message("flag     {name}: {count}", name, count) for name, count in found.flags]
     lines += [
-        Message("line     {decode}", repr(line.decode("ascii", "backslashreplace"))) for line in found.lines
+        Message("line     {line}", repr(line.decode("ascii", "backslashreplace"))) for line in found.lines
     ]
     return lines + [Message("look     {remark}", remark) for remark in found.remarks]

@@ -38,7 +38,7 @@ def read_stamps(path: Path, images: Sequence[Path]) -> list[float]:
     for number, row in enumerate(rows):
         if math.isnan(_number(row[-1])) or len(row) > 2:
             raise DataError(
-                "{path}: row {number} of the times is {join}; wanted: [file name,] s",
+                "{path}: row {number} of the times is {listed}; wanted: [file name,] s",
                 path,
                 number + 1,
                 repr(",".join(row)),
@@ -74,7 +74,7 @@ def _by_name(path: Path, rows: list[list[str]], images: Sequence[Path]) -> list[
     missing = [image.name for image in images if image.name not in by_name]
     if missing:
         raise DataError(
-            "{path}: no time for {missing} ({len} of {len2} images lack one)",
+            "{path}: no time for {missing} ({count} of {len2} images lack one)",
             path,
             missing[0],
             len(missing),
@@ -86,7 +86,7 @@ def _by_name(path: Path, rows: list[list[str]], images: Sequence[Path]) -> list[
 def _check(path: Path, times: list[float], images: Sequence[Path]) -> None:
     if len(times) < len(images):
         raise DataError(
-            "{path}: {len} times for {len2} images; one each is needed", path, len(times), len(images)
+            "{path}: {count} times for {len2} images; one each is needed", path, len(times), len(images)
         )
     for earlier, later in itertools.pairwise(times):
         if later < earlier:

@@ -210,7 +210,9 @@ class ImageFiles(CameraBase):
             return index / self._settings.fps
         if index >= len(self._stamps):
             raise DataError(
-                "{stamps}: {len} times, but there are more pictures", self._settings.stamps, len(self._stamps)
+                "{stamps}: {count} times, but there are more pictures",
+                self._settings.stamps,
+                len(self._stamps),
             )
         return self._stamps[index]
 
@@ -236,7 +238,7 @@ class ImageFiles(CameraBase):
             )
         if self._bits < 8 * image.itemsize and image.max() >= 2**self._bits:
             raise DataError(
-                "{path}: a value of {max} does not fit into bits={bits}; give the camera's bits",
+                "{path}: a value of {most} does not fit into bits={bits}; give the camera's bits",
                 path,
                 image.max(),
                 self._bits,
@@ -253,7 +255,7 @@ class ImageFiles(CameraBase):
         if len(taken) < len(pages):
             yield (
                 Message(
-                    "{name}: {len} of {len2} pages are taken, the others are smaller (thumbnails)",
+                    "{name}: {count} of {len2} pages are taken, the others are smaller (thumbnails)",
                     self._usual.name,
                     len(taken),
                     len(pages),
@@ -267,7 +269,7 @@ class ImageFiles(CameraBase):
             if self._settings.bits is None and first.itemsize == 2 and 2**8 <= first.max() < 2**bits:
                 yield (
                     Message(
-                        "16-bit files whose largest value is {max}: if the camera has {bits} bits say bits={bits}, so "
+                        "16-bit files whose largest value is {most}: if the camera has {bits} bits say bits={bits}, so "
                         "that clipped pixels are seen",
                         first.max(),
                         bits,
@@ -365,7 +367,7 @@ def _settings(address: Address) -> FileSettings:
     gray = options.text("gray")
     if gray is not None and gray not in GRAYS:
         raise ConfigError(
-            "{text}: gray={gray} is not possible; allowed: {join}", address.text, gray, ", ".join(GRAYS)
+            "{text}: gray={gray} is not possible; allowed: {listed}", address.text, gray, ", ".join(GRAYS)
         )
     settings = FileSettings(
         fps=options.number("fps", 1.0, minimum=1e-6, maximum=1e6),

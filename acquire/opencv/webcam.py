@@ -218,7 +218,7 @@ class OpenCVDriver:
         if self._automatic:
             warnings.append(
                 Message(
-                    "OpenCV does not switch off, or does not tell: automatic {join}; grey levels and sharpness may "
+                    "OpenCV does not switch off, or does not tell: automatic {listed}; grey levels and sharpness may "
                     "drift: set them by hand in the camera's own program",
                     ", ".join(self._automatic),
                 )

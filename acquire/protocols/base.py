@@ -146,6 +146,8 @@ def find_protocol(name: str) -> Protocol:
         It is unknown; lists those there are.
     """
     if name not in PROTOCOLS:
-        raise ConfigError("no protocol is called {name}; there are: {join}", repr(name), ", ".join(PROTOCOLS))
+        raise ConfigError(
+            "no protocol is called {name}; there are: {listed}", repr(name), ", ".join(PROTOCOLS)
+        )
     protocol: Protocol = importlib.import_module(PROTOCOLS[name]).PROTOCOL
     return protocol

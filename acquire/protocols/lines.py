@@ -133,7 +133,7 @@ def load_preset(name: str) -> dict[str, Any]:
         return dict(known[name])
     if not name.endswith(".toml"):
         raise ConfigError(
-            "no preset is called {name}; there are: {join}, or give a .toml file",
+            "no preset is called {name}; there are: {listed}, or give a .toml file",
             repr(name),
             ", ".join(known),
         )
@@ -144,7 +144,7 @@ def load_preset(name: str) -> dict[str, Any]:
     unknown = set(rules) - set(KEYS)
     if unknown:
         raise ConfigError(
-            "preset {name}: unknown key {min}; known: {join}", name, repr(min(unknown)), ", ".join(KEYS)
+            "preset {name}: unknown key {least}; known: {listed}", name, repr(min(unknown)), ", ".join(KEYS)
         )
     return rules
 
@@ -161,7 +161,7 @@ def parser_from(preset: Mapping[str, Any]) -> RuledParser:
         raise ConfigError("protocol=lines needs pattern= or preset=")
     ends = ENDS.get(str(preset.get("ends", "line")))
     if ends is None:
-        raise ConfigError("ends={preset} is not possible; allowed: {join}", preset["ends"], ", ".join(ENDS))
+        raise ConfigError("ends={preset} is not possible; allowed: {listed}", preset["ends"], ", ".join(ENDS))
     rules = LineRules(
         pattern=_pattern(str(preset["pattern"])),
         states=tuple((word, flag) for key, flag in STATES.items() for word in _words(preset, key)),

@@ -89,7 +89,7 @@ def load_profile(name: str) -> Profile:
         return profile_from(known[name], name)
     if not name.endswith(".toml"):
         raise ConfigError(
-            "no profile is called {name}; there are: {join}, or give a .toml file",
+            "no profile is called {name}; there are: {listed}, or give a .toml file",
             repr(name),
             ", ".join(known),
         )
@@ -165,7 +165,9 @@ def _command(table: Mapping[str, Any], name: str) -> tuple[int, int]:
 def _known_keys(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
     unknown = set(table.keys()) - set(known)
     if unknown:
-        raise ConfigError("unknown key {where}{min}; known: {join}", where, min(unknown), ", ".join(known))
+        raise ConfigError(
+            "unknown key {where}{least}; known: {listed}", where, min(unknown), ", ".join(known)
+        )
 
 
 def _whole(value: Any, low: int, high: int, where: str) -> int:
@@ -180,6 +182,6 @@ def _whole(value: Any, low: int, high: int, where: str) -> int:
 def _one_of(value: Any, allowed: tuple[str, ...], where: str) -> str:
     if value not in allowed:
         raise ConfigError(
-            "{where} = {value} is not possible; allowed: {join}", where, repr(value), ", ".join(allowed)
+            "{where} = {value} is not possible; allowed: {listed}", where, repr(value), ", ".join(allowed)
         )
     return str(value)

@@ -71,7 +71,7 @@ def newtons_per(unit: str, mass_reads_force: bool = False) -> float:
     if name in FORCES:
         return FORCES[name]
     if name not in MASSES:
-        raise ConfigError("unit {unit} is not known; known: {join}", repr(unit), ", ".join(UNITS))
+        raise ConfigError("unit {unit} is not known; known: {listed}", repr(unit), ", ".join(UNITS))
     if not mass_reads_force:
         raise ConfigError(
             "{unit} is a unit of mass; say mass_reads_force=yes if the display shows the force as a mass (1 "

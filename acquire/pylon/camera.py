@@ -127,7 +127,7 @@ class PylonDriver:
         node = self._node(*FEATURES.get(key, (key,)))
         if node is None:
             raise ConfigError(
-                "{address}: this camera has no {key}; known settings: {join}",
+                "{address}: this camera has no {key}; known settings: {listed}",
                 self._address,
                 key,
                 ", ".join(FEATURES),
@@ -235,7 +235,7 @@ def _only(address: Address) -> str:
         listed = "; ".join(f"{one.address}  {one.name}" for one in here) or "none"
         raise (ConfigError if found else DeviceError)(
             Message(
-                "{text}: {len} cameras are meant; give a serial number. Cameras here: {listed}",
+                "{text}: {count} cameras are meant; give a serial number. Cameras here: {listed}",
                 address.text,
                 len(found),
                 listed,
@@ -246,7 +246,7 @@ def _only(address: Address) -> str:
 
 def _allowed(node: Any) -> str:
     if hasattr(node, "Symbolics"):
-        return Message("allowed: {join}", ", ".join(node.Symbolics))
+        return Message("allowed: {listed}", ", ".join(node.Symbolics))
     return (
         Message("allowed: {Min:g} to {Max:g}", node.Min, node.Max)
         if hasattr(node, "Min")

@@ -51,7 +51,7 @@ class TareZero:
         unfit = [why for _, gross, why in recent if why and (math.isnan(gross) or why == recent[-1][2])]
         if unfit:
             return Message(
-                "{len} of the {len2} samples of the last {window:.1f} s are {unfit}",
+                "{count} of the {len2} samples of the last {window:.1f} s are {unfit}",
                 len(unfit),
                 len(recent),
                 window,

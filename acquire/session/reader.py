@@ -313,7 +313,7 @@ def _whole_set(opened: SessionPart) -> tuple[list[SessionPart], str | None]:
             missing.append(path.name)
     if not missing:
         return parts, None
-    return parts, Message("files of this session are missing or unreadable: {join}", ", ".join(missing))
+    return parts, Message("files of this session are missing or unreadable: {listed}", ", ".join(missing))
 
 
 def _last_part(first: Path) -> int:

@@ -203,7 +203,7 @@ def same_length(group: h5py.Group, items: Sequence[h5py.Dataset], *, whole: bool
     n, extents = min(lengths), {len(item) for item in items}
     if whole and {*lengths, *extents} != {n}:
         raise DataError(
-            "{filename}: {name} has {n} to {max} rows, not one number of them in all its columns; the file is "
+            "{filename}: {name} has {n} to {most} rows, not one number of them in all its columns; the file is "
             "damaged: 'phasedic recover' saves the rows that are whole",
             group.file.filename,
             group.name,

@@ -243,7 +243,7 @@ def _need(controls: Mapping[int, Control], number: int, what: str, where: str) -
 
 def _known(controls: Mapping[int, Control]) -> str:
     names = ", ".join(sorted(control.name for control in controls.values())) or "none"
-    return Message("known: {join}; controls of this camera: {names}", ", ".join(SETTINGS), names)
+    return Message("known: {listed}; controls of this camera: {names}", ", ".join(SETTINGS), names)
 
 
 def _set(device: V4L2Device, control: Control, value: int, unit: str, where: str) -> None:

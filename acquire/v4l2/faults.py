@@ -102,7 +102,7 @@ def _holders(path: str) -> str:
         with contextlib.suppress(OSError):
             if any(os.path.realpath(fd) == real for fd in (process / "fd").iterdir()):
                 found.append(
-                    Message("{strip}, PID {name}", (process / "comm").read_text().strip(), process.name)
+                    Message("{program}, PID {name}", (process / "comm").read_text().strip(), process.name)
                 )
     others = [words for words in found if not words.endswith(f" {os.getpid()}")]
     return f" ({'; '.join(others)})" if others else ""

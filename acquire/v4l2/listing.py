@@ -77,7 +77,7 @@ def _details(device: V4L2Device) -> Iterator[str]:
         yield "controls: " + ", ".join(_control_words(control) for control in controls)
     automatic = still_automatic({control.id: control for control in controls})
     if automatic:
-        yield Message("automatic now, put on manual when opened: {join}", ", ".join(automatic))
+        yield Message("automatic now, put on manual when opened: {listed}", ", ".join(automatic))
 
 
 def _modes(device: V4L2Device, fourcc: str) -> tuple[str, ...]:
@@ -85,7 +85,8 @@ def _modes(device: V4L2Device, fourcc: str) -> tuple[str, ...]:
     for size in device.sizes(fourcc):
         rates = device.rates(fourcc, size.width[1], size.height[1])
         modes.append(
-            f"{size}" + (Message(" at {join} 1/s", ", ".join(f"{rate:g}" for rate in rates)) if rates else "")
+            f"{size}"
+            + (Message(" at {listed} 1/s", ", ".join(f"{rate:g}" for rate in rates)) if rates else "")
         )
     return tuple(modes)
 

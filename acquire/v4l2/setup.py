@@ -206,7 +206,7 @@ def _in_force(device: V4L2Device, settings: V4L2Settings, controls: dict[int, Co
     if automatic:
         warnings.append(
             Message(
-                "the camera goes on changing by itself: {join}; grey levels may drift", ", ".join(automatic)
+                "the camera goes on changing by itself: {listed}; grey levels may drift", ", ".join(automatic)
             )
         )
     if mode.field in api.FIELDS_WOVEN:

@@ -222,7 +222,7 @@ def poisson_between(loading: Loading, low: float, high: float) -> Figure:
         return Figure.none(Message("the strain does not rise above its noise there"))
     slope = float(x @ y) / sxx
     rest = y - slope * x
-    words = Message("strains {low:g} to {min:.3g} %", 100 * low, 100 * min(high, reached))
+    words = Message("strains {low:g} to {least:.3g} %", 100 * low, 100 * min(high, reached))
     return Figure.about(-slope, math.sqrt(float(rest @ rest) / (n - 2) / sxx), n - 2, words)
 
 

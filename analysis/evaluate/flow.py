@@ -187,7 +187,7 @@ def _over(low: float, high: float) -> str:
 
 def _short(reached: float, needed: float) -> str:
     return Message(
-        "the plastic strain reaches {max:.2g} %, {needed:g} % is needed",
+        "the plastic strain reaches {most:.2g} %, {needed:g} % is needed",
         100 * max(reached, 0.0),
         100 * needed,
     )

@@ -113,9 +113,9 @@ class _Fit:
 
 def _too_little(strain: Track, force: Track, max_lag: float) -> str:
     if len(strain.t) < MIN_FRAMES:
-        return Message("{len} frames have a strain, {MIN_FRAMES} are needed", len(strain.t), MIN_FRAMES)
+        return Message("{count} frames have a strain, {MIN_FRAMES} are needed", len(strain.t), MIN_FRAMES)
     if len(force.t) < MIN_FRAMES:
-        return Message("{len} load samples, {MIN_FRAMES} are needed", len(force.t), MIN_FRAMES)
+        return Message("{count} load samples, {MIN_FRAMES} are needed", len(force.t), MIN_FRAMES)
     if strain.t[-1] - strain.t[0] < 2 * max_lag or force.t[-1] - force.t[0] < 2 * max_lag:
         return Message("the test is shorter than twice the largest lag looked for, {max_lag:g} s", max_lag)
     if np.ptp(force.values) <= 10 * noise(force.values):

@@ -106,7 +106,7 @@ def _found(curve: Curve) -> tuple[Kind, str, int | None]:
     turns = reversals(stress, max(_REVERSAL * float(np.ptp(stress)), _SURE * sigma))
     peaks = [k for k in turns if stress[k] > 0 and stress[k] >= stress[turns].mean()]
     if peaks and _is_cyclic(strain, stress, turns, peaks[0]):
-        return "cyclic", Message(", whose stress turns round {len} times", len(turns)), int(known[peaks[0]])
+        return "cyclic", Message(", whose stress turns round {count} times", len(turns)), int(known[peaks[0]])
     held = _hold(t, strain, stress)
     if held is None:
         return "tensile", "", None

@@ -20,7 +20,7 @@ def strain_rate(loading: Loading, first: int, last: int, bands: tuple[Band, ...]
     """The slope of strain over time, held against the bands of a standard."""
     t, strain = (loading.t - loading.idle)[first:last], loading.strain[first:last]
     if len(t) < 3 or np.ptp(t) == 0:
-        return Figure.none(Message("{len} points of that part are known", len(t)))
+        return Figure.none(Message("{count} points of that part are known", len(t)))
     dt, de = t - t.mean(), strain - strain.mean()
     stt = float(dt @ dt)
     slope = float(dt @ de) / stt
@@ -56,7 +56,7 @@ def _against(rate: float, parts: list[float], bands: tuple[Band, ...]) -> str:
         tenths = (
             ""
             if kept
-            else Message(" on average, its tenths at {min:.2g} to {max:.2g} 1/s", min(parts), max(parts))
+            else Message(" on average, its tenths at {least:.2g} to {most:.2g} 1/s", min(parts), max(parts))
         )
         return Message("within {name}{tenths}", inside[0].name, tenths)
     allowed = ", ".join(

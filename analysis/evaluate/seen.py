@@ -36,7 +36,7 @@ def confirmed(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
     rows = known[alone]
     highest = int(rows[np.argmax(curve.stress[rows])])
     words = Message(
-        "forces left out because no neighbour confirms them: {len}, the highest, at {t:.4g} s, {stress:.3g} "
+        "forces left out because no neighbour confirms them: {count}, the highest, at {t:.4g} s, {stress:.3g} "
         "times the highest of the others",
         len(rows),
         curve.t[highest] - curve.t[0],

@@ -29,7 +29,7 @@ class Blur(NamedTuple):
         if not math.isfinite(self.px):
             return ""
         return Message(
-            "{value} by {abs:.2f} ± {sigma:.2f} px",
+            "{value} by {size:.2f} ± {sigma:.2f} px",
             "less sharp" if self.px >= 0 else "sharper",
             abs(self.px),
             self.sigma,

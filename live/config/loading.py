@@ -351,4 +351,4 @@ def _short_repr(value: Any) -> str:
 def _suggestion(word: str, known: list[str]) -> str:
     near = difflib.get_close_matches(word, known, 1)
     meant = Message(" (did you mean {near}?)", near[0]) if near else ""
-    return Message("{meant}; known: {join}", meant, ", ".join(known))
+    return Message("{meant}; known: {listed}", meant, ", ".join(known))

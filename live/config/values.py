@@ -190,7 +190,7 @@ def _region(value: Any) -> tuple[int, int, int, int] | str:
     try:
         return _box(value)
     except NotAllowed as allowed:
-        raise NotAllowed("{allowed}; or {join}", allowed, " or ".join(map(repr, REGIONS))) from None
+        raise NotAllowed("{allowed}; or {listed}", allowed, " or ".join(map(repr, REGIONS))) from None
 
 
 def _read_region(word: str) -> list[int] | str:

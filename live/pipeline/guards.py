@@ -150,9 +150,11 @@ class DilatationGuard:
             self._on_event(Event(step.t, EventKind.MEASUREMENT, "strain", text, "warning", data))
 
     def _text(self, false: float, nu: float) -> str:
-        way = "towards" if false > 0 else Message("away from")
+        way = "towards" if false > 0 else "away from"
         far = (
-            "" if self._stand_off_mm is None else Message(" by {abs:.2f} mm", abs(false) * self._stand_off_mm)
+            ""
+            if self._stand_off_mm is None
+            else Message(" by {size:.2f} mm", abs(false) * self._stand_off_mm)
         )
         return Message(
             "the strains along and across do not fit nu = {nu:g}: {false:+.0f} µm/m in both is as from "
@@ -193,7 +195,7 @@ class TiltGuard:
             if false:
                 self._seeks_dilatation = False
                 text = Message(
-                    "exx and eyy are alike, {false:+.0f} µm/m: as from motion by {abs:.1e} of the stand-off or from "
+                    "exx and eyy are alike, {false:+.0f} µm/m: as from motion by {size:.1e} of the stand-off or from "
                     "temperature, not from a load along one axis (docs/optics.md)",
                     false * 1e6,
                     abs(false),
@@ -213,7 +215,7 @@ class TiltGuard:
             self._seeks_tilt = False
             angle = ""
             if self._focal_px is not None:
-                angle = Message(" by {abs:.2g} degrees", abs(math.degrees(found.tilt(self._focal_px))))
+                angle = Message(" by {size:.2g} degrees", abs(math.degrees(found.tilt(self._focal_px))))
             text = Message(
                 "strain rises by {rise:+.0f} µm/m {way}, in x and y alike: as from a tilt{angle}, or from a shift "
                 "behind a lens that is not corrected (docs/optics.md)",

@@ -166,7 +166,7 @@ class PlateCorrection:
     def _choose(self, whole: StrainField, burst: Burst) -> Model:
         chosen = choose_model(self._fit, whole, self._focal_px)
         text = Message(
-            "plates {join}: {model} is corrected; in the mean strain that leaves {noise:.1f} µm/m by noise of "
+            "plates {listed}: {model} is corrected; in the mean strain that leaves {noise:.1f} µm/m by noise of "
             "one burst and {unseen:.1f} µm/m by a tilt of {degrees:.1g} degrees",
             ", ".join(self._fit.layout.plates),
             chosen.model,

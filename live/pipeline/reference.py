@@ -200,7 +200,7 @@ def repetition_text(period: NDArray[np.float64]) -> str:
         return ""
     known = period[repeats]
     return Message(
-        "the pattern repeats every {median:.1f} px in {size} of {able} ZOIs; it may move by "
+        "the pattern repeats every {typical:.1f} px in {size} of {able} ZOIs; it may move by "
         "{ALLOWED_PERIODS:.1f} px between two pictures, and to the first one",
         np.median(known),
         known.size,

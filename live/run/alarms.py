@@ -154,7 +154,7 @@ def in_words(channel: str, value: float, limit: float) -> str:
         plain = plain.removeprefix(prefix)
     if plain in _STRAINS or plain.startswith("gauge_"):
         return Message(
-            "{replace} {value:.0f} µm/m, limit {limit:.0f}",
+            "{channel} {value:.0f} µm/m, limit {limit:.0f}",
             channel.replace("_", " "),
             value * 1e6,
             limit * 1e6,
@@ -322,7 +322,7 @@ class AlarmWatch(Consumer):
         for alarm in self._alarms:
             channel = alarm.config.channel
             if why and is_joint(channel) and alarm.lose():
-                words = Message("{replace} is not known, {why}", channel.replace("_", " "), why)
+                words = Message("{channel} is not known, {why}", channel.replace("_", " "), why)
                 self._changed(alarm, None, math.nan, alarm.message(math.nan, words))
 
     def _changed(self, alarm: Alarm, value: float | None, stamp: float, text: str) -> None:

@@ -214,7 +214,7 @@ class CameraRun(Subscriber):
         names = self._run_state.alarms.silence() + self._run_state.faults.silence()
         if not names:
             raise ControlRefused("no alarm is on")
-        self.emit(EventKind.ALARM, Message("silenced: {join}", ", ".join(names)))
+        self.emit(EventKind.ALARM, Message("silenced: {listed}", ", ".join(names)))
 
     def emit(self, kind: EventKind, text: str) -> None:
         """An event of the operator."""

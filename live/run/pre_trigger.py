@@ -194,9 +194,9 @@ class PreTriggerBuffer(Subscriber):
             for _, _, item in kept:
                 self._pass(item)
         kind = "bursts" if self._settings.bursts else "frames"
-        text = Message("recording begins ({why}), with {len} {kind} before", why, len(pictures), kind)
+        text = Message("recording begins ({why}), with {count} {kind} before", why, len(pictures), kind)
         self._event_log.emit(EventKind.RECORD, "operator", text, data={"on": True, "before": len(pictures)})
-        return Message("with {len} before", len(pictures))
+        return Message("with {count} before", len(pictures))
 
     def _switch_off(self) -> str:
         with self._lock:

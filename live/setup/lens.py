@@ -45,7 +45,7 @@ def lens_for(config: Config, width: int, height: int, grid: ZoiGrid) -> LensMode
     if given.box is not None and not _inside(given.box, x, y):
         left, top, across, down = given.box
         raise ConfigError(
-            "lens: ZOIs from {min:.0f},{min2:.0f} to {max:.0f},{max2:.0f} px leave the part that was calibrated, "
+            "lens: ZOIs from {least:.0f},{least2:.0f} to {most:.0f},{most2:.0f} px leave the part that was calibrated, "
             "{left:.0f},{top:.0f} to {left2:.0f},{top2:.0f}; calibrate over the whole region, take a smaller "
             "--roi, or measure with --no-lens",
             x.min(),

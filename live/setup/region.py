@@ -116,7 +116,7 @@ def _found(config: Config, picture: NDArray[Any], noise: float | None) -> Region
     box = _within(specimen.box.x, specimen.box.y, specimen.box.width, specimen.box.height, config, picture)
     share = Message("{share:.0%} of the picture", specimen.share)
     words = Message(
-        "the specimen was found: {share}, within x,y,width,height = {join}", share, ",".join(map(str, box))
+        "the specimen was found: {share}, within x,y,width,height = {listed}", share, ",".join(map(str, box))
     )
     region = Region(box, specimen.mask, words, found=True)
     try:

@@ -330,7 +330,7 @@ def from_board(
     relative = math.sqrt(fit**2 + (sigma_mm / extent) ** 2 + uneven**2 / 12)
     kind = Message("ChArUco board") if board.marker_mm else "checkerboard"
     scale = float(math.sqrt(1 / (larger * smaller)))
-    method = Message("{kind} of {len} corners, {rms:.2f} px rms", kind, len(corners.mm), rms)
+    method = Message("{kind} of {count} corners, {rms:.2f} px rms", kind, len(corners.mm), rms)
     change = float(np.hypot(*gradient)) * extent
     return Scale(scale, scale * relative, method, tuple(_tilt(change, float(uneven), extent, stand_off_mm)))
 

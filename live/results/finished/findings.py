@@ -129,7 +129,7 @@ def _coverage(test: FinishedTest) -> str | None:
         return None
     limit = max(_UNCOVERED_S, _UNCOVERED * float(np.median(np.diff(t))))
     known = Message(
-        "{count_nonzero} of {len} bursts have a force",
+        "{count_nonzero} of {count} bursts have a force",
         np.count_nonzero(np.isfinite(test.curve.stress)),
         len(t),
     )
@@ -200,7 +200,7 @@ def _alignment(test: FinishedTest) -> str | None:
     if abs(off) <= _OFF_AXIS + _SIGMAS * _sigma(angle):
         return ""
     return Message(
-        "{what} is {abs:.0f} degrees off the largest strain, and so are E and nu: {mend}",
+        "{what} is {size:.0f} degrees off the largest strain, and so are E and nu: {mend}",
         what,
         abs(math.degrees(off)),
         mend,

@@ -45,7 +45,7 @@ def motion_lines(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
         yield CheckLine(
             "distance",
             Message(
-                "exx and eyy drift alike, {dilatation:+.0f} µm/m: it changes by {abs:.1e} of the stand-off",
+                "exx and eyy drift alike, {dilatation:+.0f} µm/m: it changes by {size:.1e} of the stand-off",
                 s.dilatation * 1e6,
                 abs(s.dilatation),
             ),

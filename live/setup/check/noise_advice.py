@@ -61,7 +61,7 @@ def _longer(floor: ZoiFloor, burst: int, noise: float, target: float) -> Iterato
     one = noise**2 / (1 / floor.reference + 1 / burst)
     rest = target**2 / one - 1 / floor.reference
     if rest > 1 / MAX_BURST:
-        yield Message("burst {ceil} with ZOI {zoi}", math.ceil(1 / rest), floor.zoi)
+        yield Message("burst {number} with ZOI {zoi}", math.ceil(1 / rest), floor.zoi)
     elif 2 * one / target**2 < MAX_BURST:
         both = math.ceil(2 * one / target**2)
         yield Message("burst {both} and a reference of {both} with ZOI {zoi}", both, floor.zoi)

@@ -54,7 +54,7 @@ def check_lines(
 def _few(f: CheckFigures) -> Iterator[CheckLine]:
     if f.stack.few:
         value = Message(
-            "{len}, too few for what changes in time; the pattern is that of the first", len(f.stack)
+            "{count}, too few for what changes in time; the pattern is that of the first", len(f.stack)
         )
         yield CheckLine("pictures", value)
 
@@ -62,8 +62,12 @@ def _few(f: CheckFigures) -> Iterator[CheckLine]:
 def _camera(f: CheckFigures) -> Iterator[CheckLine]:
     yield from (CheckLine("camera", warning, measured=False) for warning in f.stack.camera.warnings)
     if f.stack.lost:
-        yield CheckLine("frames lost", Message("{lost} between the {len} looked at", f.stack.lost, len(f.stack)), False,
-                   "a lower frame rate, a smaller picture (--crop), another port or a faster machine")  # fmt: skip
+        yield CheckLine(
+            "frames lost",
+            Message("{lost} between the {count} looked at", f.stack.lost, len(f.stack)),
+            False,
+            "a lower frame rate, a smaller picture (--crop), another port or a faster machine",
+        )
     automatic = ", ".join(f.automatic)
     yield CheckLine(
         "automatic controls",
@@ -250,7 +254,7 @@ def _sssig(f: CheckFigures) -> CheckLine:
     weak = float(np.percentile(known, 5))
     px = math.sqrt(2) * f.noise / math.sqrt(max(weak, 1e-9))
     value = Message(
-        "median {median:.3g}, weakest 5 % {weak:.3g} GL^2/px^2 ({px:.4f} px in one frame)",
+        "median {typical:.3g}, weakest 5 % {weak:.3g} GL^2/px^2 ({px:.4f} px in one frame)",
         np.median(known),
         weak,
         px,

@@ -68,10 +68,10 @@ class MapView:
         """Show another map, or another range; the reason of a refusal, or empty."""
         if name not in FIELD_MAPS:
             return Message(
-                "there is no map {str}; there are {join}", repr(str(name)[:40]), ", ".join(FIELD_MAPS)
+                "there is no map {given}; there are {listed}", repr(str(name)[:40]), ", ".join(FIELD_MAPS)
             )
         if span not in RANGES:
-            return Message("the ranges of a map are {join}", ", ".join(RANGES))
+            return Message("the ranges of a map are {listed}", ", ".join(RANGES))
         given = isinstance(limit, int | float) and not isinstance(limit, bool)
         if span == "fixed" and not (given and 1e-7 <= limit <= 10):  # type: ignore[operator]
             return Message("a fixed range is a strain from 1e-7 to 10")

@@ -52,7 +52,7 @@ def whole_picture(session: SetupSession, request: Request) -> None:
 def overlay(session: SetupSession, request: Request) -> None:
     """Show or hide an overlay of the picture."""
     if request.get("name") not in OVERLAYS:
-        raise ConfigError("the overlays are {join}", ", ".join(OVERLAYS))
+        raise ConfigError("the overlays are {listed}", ", ".join(OVERLAYS))
     session.overlays[str(request["name"])] = request.get("on") is True
 
 
@@ -62,7 +62,7 @@ def camera(session: SetupSession, request: Request) -> None:
     info = session.preview.info
     keys = [] if info is None else [setting.key for setting in info.settings]
     if key not in keys:
-        raise ConfigError("a number for one of {join}", ", ".join(keys) or "the settings of an open camera")
+        raise ConfigError("a number for one of {listed}", ", ".join(keys) or "the settings of an open camera")
     number = _number(str(key), value)
     session.preview.reopen(with_setting(session.draft.config.camera.address, str(key), number))
 
@@ -153,7 +153,7 @@ def gauge(session: SetupSession, request: Request) -> None:
 def _parameters_at(kind: object, points: object) -> dict[str, Any]:
     """The parameters of a gauge of ``kind`` at the points that a page has sent."""
     if not isinstance(kind, str) or kind not in GAUGE_KINDS:
-        raise ConfigError("there is no such kind of gauge; there are {join}", ", ".join(GAUGE_KINDS))
+        raise ConfigError("there is no such kind of gauge; there are {listed}", ", ".join(GAUGE_KINDS))
     if not are_points(points, 1, MAX_GAUGE_POINTS):
         raise ConfigError("a gauge has 1 to {MAX_GAUGE_POINTS} points, x and y in px", MAX_GAUGE_POINTS)
     return GAUGE_KINDS[kind].from_handles([(float(x), float(y)) for x, y in points])

@@ -53,7 +53,7 @@ class Stroke:
         tool, points, radius = request.get("tool"), request.get("points"), request.get("radius", 8)
         min_points = {"rectangle": 2, "polygon": 3}.get(str(tool), 1)
         if tool not in TOOLS:
-            raise ConfigError("no such tool; there are {join}", ", ".join(TOOLS))
+            raise ConfigError("no such tool; there are {listed}", ", ".join(TOOLS))
         if not are_points(points, min_points, MAX_POINTS):
             raise ConfigError(
                 "a {tool} has {min_points} to {MAX_POINTS} points, each two numbers, x and y in px",
