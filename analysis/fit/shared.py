@@ -11,7 +11,7 @@ fit: with m the moments and h that row of H^-1 it is (1 + h m) / (1 + h C rho).
 
 A ZOI whose step ends its iteration is done; the others, those of tiles that a common motion does not fit, and those
 that stand alone, go on by ``iteration.track``. So a ZOI's last digits depend on which others are measured with it: by
-0.003 to 0.01 of its sigma (rms), 0.05 at most. Neither the number of threads nor their timing changes a bit, since one
+0.003 to 0.02 of its sigma (rms), 0.05 at most. Neither the number of threads nor their timing changes a bit, since one
 thread does a tile.
 """
 
