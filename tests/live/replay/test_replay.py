@@ -41,6 +41,9 @@ from live.results import Strain
 from live.setup.region import FirstLook
 from tests.live.ui.waiting import LONG_S, until
 
+LAST_DIGITS = 0.05
+"""Of a sigma: what ZOIs that share a warp may differ by from those that had one each (docs/method.md)."""
+
 
 def test_the_same_items_in_order() -> None:
     assert list(prefetch(range(100), queue_size=3)) == list(range(100))
@@ -132,11 +135,13 @@ RECORDED = Path(__file__).with_name("recorded")
 
 
 def as_recorded(folder: Path, then: Mapping[str, np.ndarray], name: str) -> None:
-    """A map is within 1 % of its uncertainty of what an earlier version wrote; uncertainties are within 1 %."""
+    """A map is within its last digits of what an earlier version wrote; uncertainties are within 1 %."""
     with h5py.File(folder / "strain.h5") as file:
         now = file["entry/strain"][name][()]
     sigma = then.get(f"sigma_{name}", np.abs(then[name]))
-    np.testing.assert_allclose((now - then[name]) / np.where(sigma > 0, sigma, 1), 0, atol=0.01, err_msg=name)
+    np.testing.assert_allclose(
+        (now - then[name]) / np.where(sigma > 0, sigma, 1), 0, atol=LAST_DIGITS, err_msg=name
+    )
 
 
 def test_an_old_session_gives_the_same_strain(tmp_path: Path) -> None:
