@@ -195,7 +195,7 @@ def describe(settings: SerialSettings, usb: str) -> LoadCellInfo:
     s, line = settings, settings.line
     return LoadCellInfo(
         address=s.address,
-        name=f"{s.protocol.name} on {line.url}",
+        name=Message("{protocol} on {port}", s.protocol.name, line.url),
         protocol=s.protocol.name,
         clock="host",
         sign=s.sign,

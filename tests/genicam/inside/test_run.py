@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -112,9 +113,12 @@ def test_pulled_for_four_seconds_in_mid_test(tmp_path: Path) -> None:
     assert counts is not None and counts["lost"] >= 40
     gap = max(frame.lost_before for frame in frames)
     later = next(k for k, frame in enumerate(frames) if frame.lost_before == gap)
-    pace = np.median(np.diff([frame.t for frame in frames[:later]]))  # a busy machine's camera keeps its own
-    assert pace == pytest.approx(0.1, rel=0.1)
-    assert gap == pytest.approx((frames[later].t - frames[later - 1].t) / pace - 1, abs=1.5)
+    away = frames[later].raw_t - frames[later - 1].raw_t
+    # At the rate that came last: on a busy machine the camera of the test is slower than it says.
+    before = frames[max(later - 21, 0) : later]
+    steps = [(b.raw_t - a.raw_t) / (b.lost_before + 1) for a, b in pairwise(before)]
+    assert gap == pytest.approx(away / np.median(steps) - 1, abs=1.01)
+    assert gap == pytest.approx(away * 10 - 1, rel=0.15)
 
 
 def test_away_until_the_end_is_counted_and_ctrl_c_ends_it_within_a_second(tmp_path: Path) -> None:

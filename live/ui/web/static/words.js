@@ -20,8 +20,8 @@ function own(text) {
   return entries[text] ?? text;
 }
 
-// Not the name of a file, a device or a setting.
-const isSentence = (text) => /[a-z]{2,}[,;]? [a-z]{2,}/i.test(text.replace(/\{.*?\}/g, "")) && !/^[\w.-]*[:/]/.test(text);
+// Not the name of a file, a device or a setting, nor a list of them.
+const isSentence = (text) => text.split(", ").some((one) => one.includes(" ")) && /[a-z]{2,}[,;]? [a-z]{2,}/i.test(text.replace(/\{.*?\}/g, "")) && !/^[\w.-]*[:/]/.test(text);
 
 function filled(template, values) {
   return template.replace(FIELD, (whole, name, format) => (name == null ? whole[0] : shown(values[name], format ?? "")));

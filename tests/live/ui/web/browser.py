@@ -113,6 +113,11 @@ class Page:
                 raise AssertionError(f"not within {TIMEOUT_S:g} s: {what}; {self.errors}")
             self.page.wait_for_timeout(100)
 
+    def goto(self, address: str) -> None:
+        """Open the page; the one that takes the token leads to it."""
+        self.page.goto(address)
+        self.page.wait_for_selector("#language")
+
     def text(self, id_: str) -> str:
         """The text of an element."""
         return str(self.page.text_content(f"#{id_}"))

@@ -54,7 +54,7 @@ def another(browser: Any, address: str, locale: str = "en-US", **wanted: Any) ->
     viewport = {"width": 1280, "height": 800}
     page = Page(browser.new_context(viewport=viewport, locale=locale, **wanted).new_page())
     page.address = address
-    page.page.goto(address)
+    page.goto(address)
     page.until(lambda: bool(page.text("region")), "the specimen is found")
     return page
 

@@ -48,7 +48,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
 def opened(browser: Any, program: Program, **wanted: Any) -> Page:
     context = browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US", **wanted)
     page = Page(context.new_page())
-    page.page.goto(program.address)
+    page.goto(program.address)
     return page
 
 
@@ -88,7 +88,7 @@ def test_a_browser_comes_to_the_page_by_the_file_that_it_is_given(
     with page_opened(cast(PageController, controller), screen):
         until(lambda: given)
         page = Page(browser.new_context().new_page())
-        page.page.goto(given[0])
+        page.goto(given[0])
         page.until(lambda: bool(page.text("region")), "the specimen is found")
     assert page.page.url == program.address.partition("?")[0]
 

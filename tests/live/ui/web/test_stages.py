@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from acquire.camera import open_camera
+from acquire.errors import PhasedicError
+from acquire.text import Message
+from acquire.text.message import about
+from acquire.v4l2.faults import why_not_open
+from live.words.language import said
+from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeKernel
 from tests.live.ui.web.browser import Page, Program
 from tests.live.ui.web.conftest import CAMERA, OPTIONS, Start, another, measuring, started
 from tests.live.ui.web.legibility import COLOURS, contrast, fits, readable
@@ -54,7 +64,7 @@ def test_a_finger_that_rests_or_bounces_does_nothing(browser: Any, start: Start)
     held(page, "q", 0.8)
     assert page.stage() == "run" and page.page.is_visible("#ask"), "held: asked, and no more"
     other = Page(browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US").new_page())
-    other.page.goto(page.address)
+    other.goto(page.address)
     other.until(lambda: other.stage() == "run", "another page")
     other.press("q")
     other.page.wait_for_timeout(900)
@@ -343,27 +353,26 @@ def test_remarks_and_words_of_a_result_fit(browser: Any, start: Start) -> None:
         assert not one.errors
 
 
-MESSAGES = {
-    "/dev/video0: another program holds the camera (cheese, PID 12); close it and try again": (
-        "/dev/video0: ein anderes Programm hält die Kamera (cheese, PID 12); es schließen und nochmals versuchen"
-    ),
-    "HD Webcam C920: no picture for 2.1 s": "HD Webcam C920: kein Bild seit 2.1 s",
-    "sim:?width=wide: width=wide is not possible; allowed: a whole number from 16 to 8192": (
-        "sim:?width=wide: width=wide ist nicht möglich; erlaubt: eine ganze Zahl von 16 bis 8192"
-    ),
-    "measurement: reference: 32 frames, noise of one 20.44 GL, motion 0.0009 px, force -0.03 N": (
-        "Messung: Referenz: 32 Bilder, Rauschen eines Bildes 20.44 GL, Bewegung 0.0009 px, Kraft -0.03 N"
-    ),
-    "a b/session.h5: no such file; give a session.h5 that a run has recorded": (
-        "a b/session.h5: keine solche Datei; eine session.h5 angeben, die ein Versuch aufgezeichnet hat"
-    ),
-}
+def messages() -> Iterator[str]:
+    """What devices and files say, as the page gets it."""
+    busy = OSError(errno.EBUSY, os.strerror(errno.EBUSY))
+    yield why_not_open("/dev/video0", busy, FakeKernel(FakeCamera()))
+    yield about("webcam", Message("the camera has stalled"))
+    for address in ("sim:?width=wide", "session:a b/session.h5", "files:/no/such/folder"):
+        with pytest.raises(PhasedicError) as refused:
+            open_camera(address)
+        yield refused.value.text
+
+
 TRANSLATED = "async texts => { const { t } = await import('/static/words.js'); return texts.map(t); }"
 
 
 def test_messages_of_devices_and_the_colours_of_gauges(start: Start) -> None:
     page = start(locale="de-DE", load="none:")
-    assert page.page.evaluate(TRANSLATED, list(MESSAGES)) == list(MESSAGES.values())
+    texts = list(messages())
+    sent = [one.to_json() if isinstance(one, Message) else one for one in texts]
+    german = [said(one, "de") for one in texts]
+    assert page.page.evaluate(TRANSLATED, sent) == german and not set(german) & set(texts)
     page.page.click("#tab-devices")
     page.page.fill("#cameraaddress", "files:/no/such/folder")
     page.page.press("#cameraaddress", "Enter")
@@ -382,7 +391,7 @@ def test_the_front_fails_and_the_back_goes_on(browser: Any, tmp_path: Path) -> N
     program = Program(tmp_path, "run", "--page", *cameras, "--load", "sim:", *OPTIONS[:-2])
     try:
         page = Page(browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US").new_page())
-        page.page.goto(program.address)
+        page.goto(program.address)
         page.until(lambda: page.page.locator("#runviews .bad").count() == 1, "the front has failed")
         page.until(lambda: page.text("axialname").endswith(", back"), "the figures of the back")
         assert page.text("word") == "measuring" and "mean" not in page.text("sides")
