@@ -13,7 +13,6 @@ import math
 from collections.abc import Callable
 from typing import ClassVar
 
-from acquire.text import Message
 from hw_mocks.indicator import NEWTONS, AsciiIndicator, Indicator, IndicatorReading, decimals
 from hw_mocks.modbus_indicator import ModbusIndicator
 
@@ -35,7 +34,7 @@ class MtSicsIndicator(Indicator):
         if shown.status != "ok":
             return {"overload": b"+", "underload": b"-", "error": b"I"}[shown.status]
         value, unit = self.displayed(shown)
-        return Message("{value} {value2:>10} {unit}", "S" if shown.stable else "D", value, unit).encode()
+        return f"{'S' if shown.stable else 'D'} {value:>10} {unit}".encode()
 
     def answer(self, command: bytes, shown: IndicatorReading) -> bytes:
         """S SI SIU SIR SIRU SR SNR T TI TAC Z ZI @ I4; anything else is a syntax error."""
@@ -147,7 +146,7 @@ class Mark10Indicator(Indicator):
         unit = self.foreign if shown.foreign_unit else self.unit
         value = -force / NEWTONS[unit] + 0.0  # no minus before zero
         text = f"{value:.{decimals(self.resolution / NEWTONS[unit])}f}"
-        return (Message("{text} {unit}", text, unit) if self._full else text).encode() + CRLF
+        return (f"{text} {unit}" if self._full else text).encode() + CRLF
 
     def answer(self, command: bytes, shown: IndicatorReading) -> bytes:
         """? ?C ?PT ?PC Z N LB KG FULL NUM AOUTn FLTCn LIST; *10 for anything else."""

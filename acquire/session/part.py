@@ -46,6 +46,7 @@ from acquire.session.bursts import burst_from
 from acquire.session.loads import LoadPiece, LoadTable
 from acquire.session.stored import DAMAGE, events_from, read_column, read_rows
 from acquire.text import Message
+from acquire.text.message import about
 
 TEXT = Declared("S")
 UNFINISHED = Message(
@@ -100,8 +101,7 @@ class SessionPart(Closing):
         texts = {name: self._text(entry, name) for name in stored.TEXTS}
         self.config = stored.config_from(texts["config"], Message("{path}: config", self.path))
         self.metadata, self.versions = (
-            read_object(texts[name], Message("{path}: {name}", self.path, name))
-            for name in ("metadata", "versions")
+            read_object(texts[name], about(self.path, name)) for name in ("metadata", "versions")
         )
         instrument = open_group(entry, "instrument")
         camera, cell = (self._text(open_group(instrument, n), "description") for n in ("camera", "load_cell"))

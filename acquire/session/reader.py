@@ -35,6 +35,7 @@ from acquire.session.layout import SessionInfo
 from acquire.session.part import SessionPart
 from acquire.session.writer import SessionWriter
 from acquire.text import Message
+from acquire.text.message import about
 
 _NUMBERED = re.compile(r"^(?P<stem>.+)\.(?P<number>\d{3,})$")
 
@@ -168,9 +169,7 @@ class Session(Closing):
         first = parts[0]
         self.path: Path = first.path
         words = [Message("{path} {recovered}", part.path, part.recovered) for part in parts if part.recovered]
-        words += [
-            Message("{path}: {trouble}", part.path, trouble) for part in parts for trouble in part.troubles
-        ]
+        words += [about(part.path, trouble) for part in parts for trouble in part.troubles]
         self.recovered: str | None = "; ".join([*words, missing] if missing else words) or None
         self.camera: CameraInfo = first.camera
         self.load_cell: LoadCellInfo | None = first.load_cell

@@ -27,6 +27,7 @@ from acquire.load_sample import LoadCellInfo
 from acquire.session import layout
 from acquire.session.oddities import Oddities
 from acquire.text import Message
+from acquire.text.message import about
 
 ROOT = {
     "format_version": Declared("int", (), 1),
@@ -234,7 +235,7 @@ def usable(
     if whole and beyond.any():
         raise DataError(
             _beyond(
-                Message("{filename}: {name}", group.file.filename, group.name),
+                about(group.file.filename, group.name),
                 table,
                 outside,
                 declared,

@@ -116,7 +116,7 @@ def joined(between: str, parts: Iterable[str]) -> Message:
     return Message(template, **dict(zip(names, kept, strict=True)))
 
 
-def about(name: object, what: str) -> Message:
+def about(name: object, what: object) -> Message:
     """What is said of a file, a device or a setting."""
     return Message("{name}: {what}", name, what)
 

@@ -15,6 +15,7 @@ from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
 from acquire.frame import frozen
 from acquire.text import Message
+from acquire.text.message import about
 
 Kind = Literal["grey", "luma", "bayer", "jpeg"]
 Plane = Literal["raw", "r", "g", "b"]
@@ -182,9 +183,9 @@ def _decode_jpeg(data: Any, width: int, height: int) -> NDArray[Any]:
 def warning_of(pixel_format: PixelFormat, *, full_range: bool = False, plane: Plane = "raw") -> str | None:
     """What a person should know before measuring with this format; None: nothing."""
     if pixel_format.kind == "luma" and not full_range:
-        return Message("{fourcc}: {LUMA_WARNING}", pixel_format.fourcc, LUMA_WARNING)
+        return about(pixel_format.fourcc, LUMA_WARNING)
     if pixel_format.kind == "bayer" and plane == "raw":
-        return Message("{fourcc}: {BAYER_WARNING}", pixel_format.fourcc, BAYER_WARNING)
+        return about(pixel_format.fourcc, BAYER_WARNING)
     if pixel_format.kind == "jpeg":
-        return Message("{fourcc}: {JPEG_WARNING}", pixel_format.fourcc, JPEG_WARNING)
+        return about(pixel_format.fourcc, JPEG_WARNING)
     return None

@@ -17,6 +17,7 @@ from acquire.errors import ConfigError, DataError, MachineUnfit, PhasedicError, 
 from acquire.frame import Burst, Frame
 from acquire.system import available_MiB
 from acquire.text import Message
+from acquire.text.message import about
 from analysis.field import Status, StrainField
 from analysis.quality.steadiness import strain_drifts
 
@@ -36,7 +37,7 @@ def numerics_error(error: ValueError, what: str) -> PhasedicError:
     from analysis import PatternError
 
     kind = DataError if isinstance(error, PatternError) else ConfigError
-    return kind(Message("{what}: {error}", what, error))
+    return kind(about(what, error))
 
 
 @contextlib.contextmanager

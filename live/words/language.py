@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ast
 import logging
-import os
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -22,12 +21,6 @@ log = logging.getLogger(__name__)
 LANGUAGES = ("de", "fr")
 """Beside English."""
 FOLDER = Path(__file__).parent
-
-
-def of_environment(environ: Mapping[str, str] = os.environ) -> str:
-    """The language that the environment asks for: "en", or one of ``LANGUAGES``."""
-    asked = next((environ[name] for name in ("LC_ALL", "LC_MESSAGES", "LANG") if environ.get(name)), "")
-    return asked[:2] if asked[:2] in LANGUAGES else "en"
 
 
 @cache

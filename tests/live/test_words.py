@@ -16,7 +16,7 @@ from acquire.text.message import about, fields
 from analysis.evaluate import GAUGE_KINDS
 from live.results.maps.field_maps import FIELD_MAPS
 from live.words import language
-from live.words.language import LANGUAGES, entries, of_environment, parsed, said
+from live.words.language import LANGUAGES, entries, parsed, said
 from tests.live.ui.web.browser import ROOT
 from tests.live.ui.web.page_texts import of_the_page
 
@@ -74,20 +74,6 @@ def test_a_broken_or_missing_file_leaves_english(german: Path, content: str | No
 def test_an_entry_with_other_fields_leaves_english(german: Path) -> None:
     german.write_text('msgid "{a} m"\nmsgstr "{b} m"\n', "utf-8")
     assert said(Message("{a} m", a=1), "de") == "1 m"
-
-
-@pytest.mark.parametrize(
-    ("environ", "name"),
-    [
-        ({"LANG": "de_DE.UTF-8"}, "de"),
-        ({"LANG": "de_DE", "LC_ALL": "fr_FR"}, "fr"),
-        ({"LC_MESSAGES": "C", "LANG": "de_DE"}, "en"),
-        ({"LANG": "pl_PL"}, "en"),
-        ({}, "en"),
-    ],
-)
-def test_the_language_is_that_of_the_environment(environ: dict[str, str], name: str) -> None:
-    assert of_environment(environ) == name
 
 
 # Calls whose texts are for people, and which of their arguments are: what ``pybabel extract -k`` takes.

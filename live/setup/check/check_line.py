@@ -25,7 +25,7 @@ class CheckLine:
     def text(self) -> str:
         """The line as printed."""
         mark = "ok  " if self.measured else "?   "
-        return Message("{mark}  {what:<22} {value}", mark if self.good else "LOOK", self.what, self.value) + (
+        return f"{mark if self.good else 'LOOK'}  {self.what:<22} {self.value}" + (
             "" if self.good or not self.advice else f"\n      -> {self.advice}"
         )
 

@@ -9,11 +9,13 @@ from acquire.text import Message
 from analysis.quality.steadiness import Steadiness, mains_of, strain_drifts
 from live.setup.check.check_line import CheckLine, not_measured
 from live.setup.check.check_list import CheckFigures
+from live.setup.check.stillness import PictureStillness
 
 MAX_DILATATION = 5e-5  # common drift of exx and eyy
 
 
 def motion_lines(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
+    """Drift and vibration, and what exx and eyy do alike; motion above ``max_px`` is bad."""
     if f.lens:
         yield CheckLine("lens", f.lens)
     s = f.still
@@ -41,32 +43,7 @@ def motion_lines(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
         s.drift_px <= max_px and not pulled,
         words,
     )
-    if s.dilatation:
-        yield CheckLine(
-            "distance",
-            Message(
-                "exx and eyy drift alike, {dilatation:+.0f} µm/m: it changes by {size:.1e} of the stand-off",
-                s.dilatation * 1e6,
-                abs(s.dilatation),
-            ),
-            abs(s.dilatation) < MAX_DILATATION,
-            "warm up the camera, clamp grips and tripod, or hang plates (docs/optics.md)",
-        )
-    across, down = s.keystone
-    if across:
-        yield CheckLine(
-            "tilt",
-            Message("strain drifts by {across:+.0f} µm/m from left to right, in x and y alike", across * 1e6),
-            abs(across) < MAX_DILATATION,
-            "clamp grips and tripod, warm up the camera, or hang plates (docs/optics.md)",
-        )
-    if down:
-        yield CheckLine(
-            "tilt",
-            Message("strain drifts by {down:+.0f} µm/m from top to bottom, in x and y alike", down * 1e6),
-            abs(down) < MAX_DILATATION,
-            "clamp grips and tripod, warm up the camera, or hang plates (docs/optics.md)",
-        )
+    yield from _common(s)
     shake = s.worse
     yield CheckLine(
         "vibration",
@@ -78,6 +55,28 @@ def motion_lines(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
         shake.vibration <= max_px,
         "a stiffer tripod, a quiet floor, no fan on the bench",
     )
+
+
+def _common(s: PictureStillness) -> Iterator[CheckLine]:
+    """What exx and eyy do alike: a change of the distance, a tilt."""
+    steady = "clamp grips and tripod, warm up the camera, or hang plates (docs/optics.md)"
+    if s.dilatation:
+        words = Message(
+            "exx and eyy drift alike, {dilatation:+.0f} µm/m: it changes by {size:.1e} of the stand-off",
+            s.dilatation * 1e6,
+            abs(s.dilatation),
+        )
+        warm = "warm up the camera, clamp grips and tripod, or hang plates (docs/optics.md)"
+        yield CheckLine("distance", words, abs(s.dilatation) < MAX_DILATATION, warm)
+    across, down = s.keystone
+    if across:
+        words = Message(
+            "strain drifts by {across:+.0f} µm/m from left to right, in x and y alike", across * 1e6
+        )
+        yield CheckLine("tilt", words, abs(across) < MAX_DILATATION, steady)
+    if down:
+        words = Message("strain drifts by {down:+.0f} µm/m from top to bottom, in x and y alike", down * 1e6)
+        yield CheckLine("tilt", words, abs(down) < MAX_DILATATION, steady)
 
 
 def _vibration(s: Steadiness, unit: float, name: str, digits: int) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from acquire.text import Message
+from acquire.text.message import about
 from analysis.evaluate import TensileFigures
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import sentence
@@ -68,9 +69,7 @@ def cameras_result(
         **next(iter(results.values())),
         "folder": str(folder),
         "figures": figures,
-        "troubles": [
-            Message("{side}: {text}", side, text) for side, one in results.items() for text in one["troubles"]
-        ],
+        "troubles": [about(side, text) for side, one in results.items() for text in one["troubles"]],
     }
 
 
