@@ -96,8 +96,11 @@ document.addEventListener("keydown", (event) => {
 
 $("note").addEventListener("submit", async (event) => {
   event.preventDefault();
-  const text = $("notetext").value.trim();
-  if (text && !(await command(`note ${text}`)).refused) { $("notetext").value = ""; $("notetext").blur(); }
+  const input = $("notetext"), text = input.value.trim();
+  input.blur(); // at once: a key that follows is a command, not a letter of the note
+  if (!text) return;
+  input.value = "";
+  if ((await command(`note ${text}`)).refused && !input.value) input.value = text;
 });
 $("notetext").addEventListener("keydown", (event) => { if (event.key === "Escape") event.target.blur(); });
 $("viewer").addEventListener("click", () => post("/viewer", {}));
