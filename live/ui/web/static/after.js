@@ -2,7 +2,7 @@
 import { $, el, fill, put } from "./base.js";
 import { finishCurve, updateCurves } from "./curves.js";
 import { drawGauges } from "./draw.js";
-import { short, strainText, strainUnit } from "./numbers.js";
+import { quantity, short, strainText, strainUnit } from "./numbers.js";
 import { t } from "./words.js";
 
 let result = null;
@@ -41,7 +41,9 @@ function row(one) {
   if (one.text == null) return el("tr", { class: "unknown" }, name, el("td", { text: t(one.why), title: t(one.why), colSpan: 2 }));
   if (one.words) return el("tr", {}, name, el("td", { class: "words", text: t(one.text), colSpan: 2 }));
   const remark = one.remark ? [el("span", { class: "words", text: ` ${t(one.remark)}` })] : [];
-  return el("tr", {}, name, el("td", { text: one.text }, ...remark), el("td", { text: one.interval }));
+  if (typeof one.text === "string") return el("tr", {}, name, el("td", { text: one.text, colSpan: 2 }, ...remark));
+  const { value, sigma, unit } = quantity(one.text), least = one.bound ? `${t("at least")} ` : "";
+  return el("tr", {}, name, el("td", { text: `${least}${value} ${unit}` }, ...remark), el("td", { text: sigma && `± ${sigma}` }));
 }
 
 const ofSide = (name, one) => (one.side ? `${name}, ${t(one.side)}` : name);

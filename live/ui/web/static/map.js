@@ -59,7 +59,7 @@ function showLegend() {
   for (const [id, now] of [["component", picture.of], ["range", choosing ? "fixed" : picture.range]]) if ($(id) !== document.activeElement) $(id).value = now;
   $("limit").hidden = $("range").value !== "fixed";
   const scaled = picture.high != null, unit = picture.strain ? strainUnit().name : (picture.unit ?? "");
-  if ($("limit") !== document.activeElement && scaled && picture.range === "fixed" && picture.strain) $("limit").value = short(picture.high * factor()).replace("−", "-");
+  if ($("limit") !== document.activeElement && scaled && picture.range === "fixed" && picture.strain) $("limit").value = String(Number((picture.high * factor()).toPrecision(4)));
   $("ramp").closest(".legend").classList.toggle("status", Boolean(picture.legend));
   fill($("statuses"), picture.legend ?? [], (one) => {
     const key = el("i", { class: "key" });
