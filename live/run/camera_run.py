@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 
 from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind
-from acquire.hdf5 import path_of
+from acquire.hdf5 import FolderWatch
 from acquire.text import Message
 from live.pipeline.consumer import Compose, RunInfo
 from live.pipeline.latency import LatencyMonitor
@@ -83,7 +82,7 @@ class CameraRun(Subscriber):
     ) -> None:
         self.name, self._prepared, self._run_state = name, prepared, run_state
         self.folder = prepared.folder
-        self._held = os.open(self.folder, os.O_RDONLY) if os.name == "posix" and self.folder.is_dir() else -1
+        self._held = FolderWatch(self.folder)
         self._screen, self._stop, self._stream = screen, stop, stream
         self._recording: PreTriggerBuffer | None = None
         self._has_recorded = self._hinted = False
@@ -305,9 +304,7 @@ class CameraRun(Subscriber):
         self._run_state.event_log.emit(EventKind.STOP, "phasedic", Message("the test ends: {reason}", reason))
         if self._recording is not None:
             self._recording.close({"stop_reason": reason})
-        self.folder = path_of(self._held, self.folder)
-        if self._held >= 0:
-            os.close(self._held)
+        self.folder = self._held.end()
 
     @property
     def exit_code(self) -> int:

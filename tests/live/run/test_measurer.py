@@ -26,6 +26,7 @@ from tests.live.made_up import START, make_measurement
 from tests.live.streaming import Noted
 
 N = 8  # frames of a reference
+BLANK = 3  # for a motion: the picture of a reference that is blank
 
 
 def as_motion(motion: float | ReferenceMotion) -> ReferenceMotion:
@@ -49,8 +50,9 @@ class References:
     def next_reference(self) -> Any:
         if self._taken == len(self._motions):
             return None
-        burst = replace(make_measurement(self._taken).burst, n=self._n)
         motion = self._motions[self._taken]
+        blank = BLANK * (motion is BLANK)
+        burst = replace(make_measurement(self._taken).burst, n=self._n, blank=blank)
         self._taken += 1
         self.state.frame_counts.add(grabbed=burst.n, reference=burst.n)
         return SimpleNamespace(burst=burst, halves=None if burst.n < 4 else motion)
@@ -72,6 +74,10 @@ class References:
 
 MOVED = "the reference moved by {:.3f} px; keep the specimen still when strains must be absolute"
 AGAIN = "the picture moved by {:.3f} px during the reference burst; taking another"
+IS_BLANK = (
+    "the reference burst cannot be measured (picture 3 of 8 is blank or has less than half the contrast of another; "
+    "look at light and cable)"
+)
 UNSEEN = "the reference burst cannot be measured (fast motion, glare, no focus?)"
 
 
@@ -90,6 +96,7 @@ UNSEEN = "the reference burst cannot be measured (fast motion, glare, no focus?)
         ((math.nan, math.nan, math.nan, math.nan, 0.01), 4,
          [("warning", f"{UNSEEN}; taking another")] * 2
          + [("error", f"{UNSEEN}; tried again until the picture is still")]),
+        ((BLANK, BLANK, 0.01), 2, [("warning", f"{IS_BLANK}; taking another")] * 2),
         ((math.nan, math.nan, math.nan, math.nan, 0.2), 4,
          [("warning", f"{UNSEEN}; taking another")] * 2
          + [("error", f"{UNSEEN}; tried again until the picture is still"), ("warning", MOVED.format(0.2))]),
@@ -109,8 +116,11 @@ def test_a_reference_that_moves_is_taken_again_twice_and_one_that_is_not_seen_un
     assert (counts.reference, counts.left_out) == (N, used * N) and counts.adds_up
 
 
-def test_a_run_that_ends_before_a_reference_can_be_measured_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = References(math.nan)
+@pytest.mark.parametrize("motion", [math.nan, BLANK])
+def test_a_run_that_ends_before_a_reference_can_be_measured_has_none(
+    monkeypatch: pytest.MonkeyPatch, motion: float
+) -> None:
+    bench = References(motion)
     assert bench.taken(monkeypatch) is None
     assert bench.told()[-1][1].startswith("no reference could be measured")
     empty = References()
