@@ -10,7 +10,7 @@ from acquire.events import Event, EventKind
 from acquire.hdf5 import FolderWatch
 from acquire.text import Message
 from live.pipeline.consumer import Compose, RunInfo
-from live.pipeline.latency import LatencyMonitor
+from live.pipeline.latency import KernelWork, LatencyMonitor
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
@@ -105,7 +105,10 @@ class CameraRun(Subscriber):
         stream.add(self, name)
         self.source = CameraSource(rig.camera, plan, run_state, stream, name)
         self._incoming = IncomingBursts(stream, run_state.frame_counts, rig.camera.info, plan, name)
-        latency = LatencyMonitor(lambda: self._recording.backlog if self._recording else 0.0)
+        latency = LatencyMonitor(
+            lambda: self._recording.backlog if self._recording else 0.0,
+            work=KernelWork(prepared.plan.grid.size, prepared.plan.grid.step, plan.burst),
+        )
         self._measurer = Measurer(prepared, run_state, self._incoming, latency, stream, stop, name)
 
     def open_recording(self) -> None:

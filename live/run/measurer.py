@@ -295,7 +295,8 @@ class Measurer:
         if math.isnan(m.time_step.latency_s):
             return
         sample = LatencySample(m.t, m.time_step.latency_s, m.time_step.measure_s)
-        warning = self._latency.check(sample, m.burst.n / max(self._run_state.health.fps, 1e-3))
+        period_s = m.burst.n / max(self._run_state.health.fps, 1e-3)
+        warning = self._latency.check(sample, period_s, newest_only=self._incoming.newest_only)
         self._run_state.health.latency_p95_s = self._latency.p95_s
         if warning:
             event = Event(m.t, EventKind.MEASUREMENT, "measurement", warning, "warning")

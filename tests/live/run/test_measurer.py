@@ -168,14 +168,16 @@ def test_each_measurement_is_counted_told_and_published(monkeypatch: pytest.Monk
     made = [make_measurement(k) for k in range(2)]
     made[1] = replace(made[1], burst=replace(made[1].burst, motion_px=0.3))
     ready: Any = SimpleNamespace(measurements=lambda *given: iter(made))
-    queue: Any = SimpleNamespace(bursts=lambda: None)
+    queue: Any = SimpleNamespace(bursts=lambda: None, newest_only=False)
     state.health.fps, stream = 80.0, Stream()
 
     def note(record: Any) -> None:
         order.append((record.body.number, round(record.body.time_step.latency_s, 6)))
 
     Noted(stream, Measurement, each=note)
-    monitor: Any = SimpleNamespace(check=lambda sample, period_s: order.append(period_s) or "", p95_s=0.2)
+    monitor: Any = SimpleNamespace(
+        check=lambda sample, period_s, newest_only: order.append(period_s) or "", p95_s=0.2
+    )
     prepared: Any = SimpleNamespace(folder=Path())
     Measurer(prepared, state, queue, monitor, stream, StopSignal())._measure(ready)
     assert order == [(0, 0.465), 0.1, (1, 0.365), 0.1]
@@ -191,11 +193,11 @@ def test_the_latency_is_judged_by_the_period_of_the_bursts(latency_s: float) -> 
     """8 frames at 20 a second."""
     asked: list[tuple[LatencySample, float]] = []
 
-    def check(sample: LatencySample, period_s: float) -> str:
+    def check(sample: LatencySample, period_s: float, *, newest_only: bool) -> str:
         asked.append((sample, period_s))
         return "results come late"
 
-    state, nothing = RunState.new(0.5), SimpleNamespace()
+    state, nothing = RunState.new(0.5), SimpleNamespace(newest_only=False)
     monitor: Any = SimpleNamespace(check=check, p95_s=0.044)
     state.health.fps = 20.0
     thread = Measurer(nothing, state, nothing, monitor, nothing, nothing)  # type: ignore[arg-type]
