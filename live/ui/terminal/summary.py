@@ -114,8 +114,8 @@ def trouble_lines(
     warnings = run_state.event_log.events("warning", "error")
     if warnings:
         last = sentence(warnings[-1], run_state.event_log.names)
-        levels = [event.level for event in warnings]
-        counts = [counted(levels.count(one), one) for one in ("warning", "error") if one in levels]
+        numbers = {level: run_state.event_log.count(level) for level in ("warning", "error")}
+        counts = [counted(n, level) for level, n in numbers.items() if n]
         yield f"{' and '.join(counts)}, the last: {last}"
 
 
