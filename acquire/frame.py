@@ -91,8 +91,9 @@ class Burst:
     motion_px : float, px
         Largest motion of any part of the picture during the burst, estimated; NaN when unknown.
         Above 0.05 px the mean is smeared.
-    alike : bool
-        Whether no picture has less than half the contrast of another: a blank one among them falsifies the mean.
+    blank : int
+        Which picture of them, from 1, has the least contrast, where that is less than half of another's: a blank one
+        falsifies the mean. 0: none.
     """
 
     mean: NDArray[Any]
@@ -107,7 +108,7 @@ class Burst:
     lost: int
     clock: Clock
     motion_px: float = math.nan
-    alike: bool = True
+    blank: int = 0
 
 
 @dataclass(frozen=True, slots=True)

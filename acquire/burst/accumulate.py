@@ -193,7 +193,7 @@ class Accumulator(ABC, Generic[Made]):
             "lost": self._lost,
             "clock": last.clock,
             "motion_px": math.nan if sums is None else sums.motion(last, n, noise),
-            "alike": sums is None or 2 * min(sums.contrasts) >= max(sums.contrasts),
+            "blank": 0 if sums is None else sums.blank,
         }
 
 
@@ -269,6 +269,12 @@ class FrameSums:
         self._waiting.append(np.ascontiguousarray(frame.image).reshape(-1))
         if n > 0 or len(self._waiting) == GROUP:
             self._fold(0 if self._summed else n)
+
+    @property
+    def blank(self) -> int:
+        """Which picture has less than half the contrast of another, from 1; 0: none."""
+        least = min(self.contrasts)
+        return self.contrasts.index(least) + 1 if 2 * least < max(self.contrasts) else 0
 
     @property
     def _kind(self) -> tuple[Any, ...]:

@@ -28,7 +28,15 @@ from acquire.hdf5.declared import (
     read_scalar,
     stored_rows,
 )
-from acquire.hdf5.disk import DiskSync, FileWatch, FlushTimer, forecast, free_bytes, network_share, path_of
+from acquire.hdf5.disk import (
+    DiskSync,
+    FileWatch,
+    FlushTimer,
+    FolderWatch,
+    forecast,
+    free_bytes,
+    network_share,
+)
 from acquire.hdf5.pictures import COMPRESSED, PictureReader, PictureStack, compile_loops
 from acquire.hdf5.tables import (
     NO_UNIT,
@@ -49,6 +57,7 @@ __all__ = [
     "DiskSync",
     "FileWatch",
     "FlushTimer",
+    "FolderWatch",
     "GrowingDataset",
     "JsonField",
     "PaddedFile",
@@ -71,7 +80,6 @@ __all__ = [
     "open_datasets",
     "open_file",
     "open_group",
-    "path_of",
     "probe",
     "read_attribute",
     "read_object",

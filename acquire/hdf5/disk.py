@@ -85,6 +85,27 @@ def path_of(descriptor: int, path: Path) -> Path:
     return path
 
 
+class FolderWatch:
+    """Holds a folder, so that it is found again where it is renamed.
+
+    Parameters
+    ----------
+    path : Path
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._held = os.open(path, os.O_RDONLY) if os.name == "posix" and path.is_dir() else -1
+
+    def end(self) -> Path:
+        """Where it is now; it is held no longer."""
+        if self._held >= 0:
+            self._path = path_of(self._held, self._path)
+            os.close(self._held)
+            self._held = -1
+        return self._path
+
+
 class FileWatch:
     """Notices that a file that is written here was removed, or cut, by somebody else.
 

@@ -73,7 +73,7 @@ class BurstTable:
 
 
 def _row(burst: Burst, start: float) -> Mapping[str, Any]:
-    names = ("n", "noise", "duration", "first_index", "last_index", "lost")
+    names = ("n", "noise", "duration", "first_index", "last_index", "lost", "blank")
     times = {"time_s": burst.t - start, "monotonic_s": burst.t, "clock": layout.CLOCKS.index(burst.clock)}
     return times | {name: getattr(burst, name) for name in names}
 
@@ -92,5 +92,6 @@ def burst_from(total: NDArray[Any], clipped: NDArray[np.uint8], row: Mapping[str
         first_index=row["first_index"],
         last_index=row["last_index"],
         lost=row["lost"],
+        blank=row["blank"],
         clock=layout.CLOCKS[row["clock"]],
     )

@@ -93,7 +93,10 @@ MAX_PIXELS = 1 << 28
 
 
 class Column(NamedTuple):
-    """A column of one value a row; ``missing`` is that of a row that is not written, the range that of others."""
+    """A column of one value a row; ``missing`` is that of a row that is not written, the range that of others.
+
+    ``later``: files of the first versions do not have it.
+    """
 
     dtype: str
     missing: Any
@@ -101,6 +104,7 @@ class Column(NamedTuple):
     meaning: str
     low: float = -math.inf
     high: float = math.inf
+    later: bool = False
 
     def declared(self) -> Declared:
         """What a reader demands of it."""
@@ -156,6 +160,15 @@ BURST_COLUMNS: Columns = {
     "first_index": _sequence("sequence number of the first frame"),
     "last_index": _sequence("sequence number of the last frame"),
     "lost": _count("frames lost or left out since the burst before"),
+    "blank": Column(
+        "u4",
+        0,
+        NO_UNIT,
+        "which of its frames, from 1, has less than half the contrast of another; 0: none",
+        0,
+        MAX_BURST_FRAMES,
+        later=True,
+    ),
     "clock": Column("u1", 0, NO_UNIT, "who stamped: 0 device, 1 host, 2 nobody (a given rate)", 0, 2),
 }
 CLOCK_COLUMNS: Columns = {

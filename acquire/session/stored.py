@@ -267,9 +267,12 @@ def read_rows(
     DataError
         Columns are missing or of another kind; where ``whole``, also of another length or out of range.
     """
-    held = open_datasets(group, {name: column.declared() for name, column in columns.items()})
+    there = {name: column for name, column in columns.items() if name in group or not column.later}
+    held = open_datasets(group, {name: column.declared() for name, column in there.items()})
     n = same_length(group, [*held.values(), *pictures], whole=whole)
     table = {name: read_column(item, n, columns[name].missing, whole=whole) for name, item in held.items()}
+    for name in columns.keys() - there.keys():
+        table[name] = np.full(n, columns[name].missing, columns[name].dtype)
     good = usable(group, table, columns, whole=whole)
     odd = Oddities(str(group.name).rpartition("/")[2], closed=closed)
     odd.add(good, table["monotonic_s"][good])

@@ -138,9 +138,10 @@ class _Elastic:
 def _elastic(loading: Loading, options: TensileOptions) -> _Elastic | str:
     """The elastic line and what its interval hangs on, found in turns until they agree; or why there is none."""
     limit, zero = 0.5 * float(loading.stress[loading.top]), StrainZero(0.0, Message("as measured"))
+    of = Message("half of the highest stress")
     found: _Elastic | None = None
     for _ in range(_ROUNDS):
-        first, last, words = _interval(loading, options.standard, limit, zero.strain)
+        first, last, words = _interval(loading, options.standard, limit, zero.strain, of)
         if found and (first, last) == (found.line.first, found.line.last):
             break
         line = line_through(loading, first, last)
@@ -155,11 +156,14 @@ def _elastic(loading: Loading, options: TensileOptions) -> _Elastic | str:
         found = _Elastic(line, yield_point(loading, line), zero)
         known = [f for f in (found.flow.upper, proof_strength(loading, line, 0.002)) if f.known]
         limit = known[0].value if known else float(loading.stress[loading.top])
+        of = Message("the yield strength") if known else Message("the highest stress")
     return found or Message("no points")
 
 
-def _interval(loading: Loading, standard: Standard, limit: float, zero: float) -> tuple[int, int, str]:
-    """First and last point of the elastic interval, and the interval in words."""
+def _interval(
+    loading: Loading, standard: Standard, limit: float, zero: float, of: str
+) -> tuple[int, int, str]:
+    """First and last point of the elastic interval, and the interval in words; ``of`` says what ``limit`` is."""
     rule, course = standard.interval, loading.course[: loading.top + 1] - zero
     low, high = rule.low, rule.high
     if rule.by == "yield":
@@ -167,7 +171,7 @@ def _interval(loading: Loading, standard: Standard, limit: float, zero: float) -
         return (
             first,
             last,
-            Message("between {low:g} % and {high:g} % of the yield strength", 100 * low, 100 * high),
+            Message("between {low:g} % and {high:g} % of {limit}", 100 * low, 100 * high, of),
         )
     if standard.brittle and course[-1] < standard.brittle[0]:
         low, high = (share * float(course[-1]) for share in standard.brittle[1:])

@@ -52,6 +52,13 @@ def square_rows(line: NDArray[np.float64], length: int) -> NDArray[np.float32]:
     return np.pad(rows, ((0, 0), (0, length - size))).astype(np.float32)
 
 
+def ridged(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A normal matrix (P, P) as it is inverted: with the ridges on its scaled diagonal."""
+    ridge = np.full(len(normal), RIDGE)
+    ridge[-BLURS:] = BLUR_RIDGE
+    return normal + np.diag(ridge * np.diag(normal))
+
+
 @helper
 def _moments_of(table: Any) -> Any:
     """Where the products of the columns of J are among the moments of a ZOI, (P, P), flat."""

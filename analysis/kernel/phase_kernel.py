@@ -16,11 +16,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.compiled.forked import FORK_GUARD
-from analysis.field import Motion, StrainField, ZoiGrid
+from analysis.field import PAIR_INDEX, Motion, StrainField, ZoiGrid, profile
 from analysis.follow.parts import coherent
 from analysis.follow.renewal import taken
-from analysis.kernel.images import Noise, as_image, as_model, as_recorded, clipped_pixels
+from analysis.kernel.images import (
+    Noise,
+    as_image,
+    as_model,
+    as_recorded,
+    clipped_pixels,
+    with_second_differences,
+)
 from analysis.kernel.lines import mend
+from analysis.kernel.quadrature import zois_of
 from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.repeating import repetition
 from analysis.kernel.result import PredictedMotion, field_of
@@ -253,12 +261,37 @@ def check_machine(settings: KernelSettings, size: int) -> None:
 
 def _measure_known(
     reference: NDArray[np.float32], deformed: NDArray[np.float32], grid: ZoiGrid, case: SelfTestCase
-) -> tuple[StrainField, NDArray[np.float32]]:
-    """As a new kernel measures its first picture; and the gradients of the reference, (2, H, W)."""
+) -> tuple[StrainField, NDArray[np.float32], float]:
+    """As a new kernel measures its first picture; the gradients of the reference, (2, H, W); ``_sigma_off``."""
     estimator: Estimator = "phase" if case.estimator == "phase" else "spectral"
     settings = KernelSettings(case.window, estimator, case.order, case.interpolant)
     made = ReferencePicture.first(as_image(reference, "the pattern"), grid, settings, None, None)
     moved = as_recorded(deformed, "the moved pattern")
     solution = Solution(made, moved, None, made.searched(moved))
     retry_lost(solution, None)
-    return field_of(solution), made.prepared.images[:2, : reference.shape[0], : reference.shape[1]]
+    gradients = made.prepared.images[:2, : reference.shape[0], : reference.shape[1]]
+    return field_of(solution), gradients, _sigma_off(made)
+
+
+def _sigma_off(made: ReferencePicture) -> float:
+    """Largest share by which sigma of a parameter of the first ZOI is off H^-1 (J' w w J) H^-1, with H = J' w J.
+
+    Of the estimator by phases: off the squares of its sensors, which displacements are measured with.
+    """
+    from analysis.fit.sensitivity import columns, ridged
+
+    ready, size = made.prepared, made.grid.size
+    if made.sensors is not None:
+        known = (made.sensors.weights[0, :6].astype(np.float64) ** 2).sum(axis=(1, 2))
+    else:
+        line, x = profile(made.settings.window, size), np.arange(size) - (size - 1) / 2
+        channels = [zois_of(one, ready.origins[:1], size)[0] for one in with_second_differences(ready.images)]
+        channels[3] = np.ones((size, size), np.float32)
+        table = columns(made.settings.order)
+        j = np.stack([channels[c] * (x / x[-1]) ** a * (x[:, None] / x[-1]) ** b for c, a, b in table])
+        jw, flat = (j * line * line[:, None]).reshape(len(j), -1), j.reshape(len(j), -1)
+        inverse = np.linalg.inv(ridged(jw @ flat.T))
+        of_units = np.diag(inverse @ (jw @ jw.T) @ inverse)[made.affine]
+        known = of_units / x[-1] ** (2 * table[made.affine, 1:].sum(1))
+    found = ready.covariance[0, [PAIR_INDEX[k, k] for k in range(6)]]
+    return float(np.abs(np.sqrt(found / known) - 1).max())

@@ -1,7 +1,7 @@
 """The event log: every event goes once to the log, the screen, the session and the view.
 
 A listener that is added later (the session is opened after the devices) gets the past events too, except
-the one event for each burst, which would fill the memory in a long test.
+the one event for each burst, and those that came again and again (``Repeats``): they would fill the memory.
 """
 
 from __future__ import annotations
@@ -10,16 +10,25 @@ import dataclasses
 import logging
 import threading
 import time
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from acquire.events import Event, EventKind, EventSink, Level
+from acquire.events import Event, EventKind, EventSink, Level, RateLimiter
+from acquire.text import Message
 from acquire.text.message import about, without_name
 from acquire.text.printable import brief
+from live.pipeline.repeats import AS_THEY_COME, Likeness, Repeats, likeness
 
 log = logging.getLogger(__name__)
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
+SHOWN_EVERY_S = 60.0
 _SESSION_ONLY = {EventKind.MEASURED}  # one for each burst: not for a person
+
+
+def counted_text(text: str, count: int) -> str:
+    """The text of an event with the number of its like; the plain text of one that is alone."""
+    return Message("{text} ({count} times)", text, f"{count:,}") if count > 1 else text
 
 
 def sentence(event: Event, names: Mapping[str, str] | None = None) -> str:
@@ -43,7 +52,8 @@ class EventLog:
     def __init__(self) -> None:
         self.origin = 0.0
         self.names: dict[str, str] = {}
-        self._events: list[Event] = []
+        self._events, self._levels = Repeats(), Counter[Level]()
+        self._shown: dict[Likeness, RateLimiter] = {}
         self._listeners: list[EventSink] = []
         self._lock = threading.RLock()
 
@@ -54,13 +64,24 @@ class EventLog:
     def record(self, event: Event) -> None:
         """Take an event stamped with the time of a frame."""
         with self._lock:
+            count = 0
             if event.kind not in _SESSION_ONLY:
-                self._events.append(event)
+                count = self._events.add(event)
+                self._levels[event.level] += 1
             listeners = list(self._listeners)
-        if event.kind not in _SESSION_ONLY:
-            log.log(_LEVELS[event.level], "%s", sentence(event, self.names))
+        if count:
+            self._log(event, count)
         for listener in listeners:
             listener(event)
+
+    def _log(self, event: Event, count: int) -> None:
+        """Each of the first of its like; of those that follow one a minute, with their number."""
+        level, words = _LEVELS[event.level], sentence(event, self.names)
+        if count > AS_THEY_COME:
+            words = counted_text(words, count)
+            if not self._shown.setdefault(likeness(event), RateLimiter(SHOWN_EVERY_S)).due(event.t):
+                level = logging.DEBUG
+        log.log(level, "%s", words)
 
     def emit(
         self,
@@ -77,11 +98,16 @@ class EventLog:
         """Pass all past and future events to ``listener``."""
         with self._lock:
             self._listeners.append(listener)
-            past = list(self._events)
+            past = self.events()
         for event in past:
             listener(event)
 
     def events(self, *levels: Level) -> list[Event]:
-        """The events so far, of the given levels (of all where none is given)."""
+        """The events so far, of the given levels (of all where none is given); of repeated ones a few."""
         with self._lock:
-            return [e for e in self._events if not levels or e.level in levels]
+            return [e for e, _ in self._events if not levels or e.level in levels]
+
+    def count(self, level: Level) -> int:
+        """How many events of this level there were, each repeated one counted."""
+        with self._lock:
+            return self._levels[level]

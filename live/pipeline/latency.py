@@ -29,6 +29,8 @@ REPEAT_S = 30.0
 LATE_PERIODS = 2.0
 BUSY_CORES = 0.5
 WAITING_SHARE = 0.1
+BUSY = 0.8
+"""Share of the time between bursts that the kernel may take."""
 MEASURE, LOAD, OUTPUT = 3, 5, 10
 """Nice values of threads. Grabbing and recording keep the value that the program was started with."""
 
@@ -65,6 +67,23 @@ class LatencySample:
     kernel_s: float
 
 
+@dataclass(frozen=True, slots=True)
+class KernelWork:
+    """What the time of the kernel depends on: size and distance of the ZOIs, px, and frames in a burst."""
+
+    zoi: int
+    step: int
+    burst: int
+
+    def keeping_up(self, share: float) -> str:
+        """What would keep up, where the kernel takes ``share`` of the time between bursts."""
+        over = share / BUSY
+        step, zoi = math.ceil(self.step * math.sqrt(over)), math.floor(self.zoi / math.sqrt(over))
+        return Message(
+            "--step {step}, --zoi {zoi} or --burst {burst}", step, zoi, math.ceil(self.burst * over)
+        )
+
+
 class LatencyMonitor:
     """Warns when the latency of the last seconds is too large, with the cause.
 
@@ -74,6 +93,8 @@ class LatencyMonitor:
         Share of the recorder's buffer that waits for the disk.
     use : callable
         Gives the processor use so far (``processor_use``).
+    work : KernelWork, optional
+        Of the settings; None: a kernel that is too slow is told again and again, without what would keep up.
 
     Attributes
     ----------
@@ -82,9 +103,12 @@ class LatencyMonitor:
     """
 
     def __init__(
-        self, backlog: Callable[[], float], use: Callable[[], ProcessorUse | None] = processor_use
+        self,
+        backlog: Callable[[], float],
+        use: Callable[[], ProcessorUse | None] = processor_use,
+        work: KernelWork | None = None,
     ) -> None:
-        self._backlog, self._use = backlog, use
+        self._backlog, self._use, self._work, self._told = backlog, use, work, False
         self._samples: deque[LatencySample] = deque()
         # The use when the latency was first too large; not read before.
         self._before: ProcessorUse | None = None
@@ -93,7 +117,7 @@ class LatencyMonitor:
         self._begin_t = math.nan
         self.p95_s = math.nan
 
-    def check(self, sample: LatencySample, period_s: float) -> str:
+    def check(self, sample: LatencySample, period_s: float, *, newest_only: bool = False) -> str:
         """Add a measurement; a warning where the latency has been too large for a second, else empty.
 
         Parameters
@@ -101,6 +125,8 @@ class LatencyMonitor:
         sample : LatencySample
         period_s : float, s
             Between bursts.
+        newest_only : bool
+            The kernel has been slower than the camera, and gets the newest bursts; that is told once.
         """
         if math.isnan(self._begin_t):
             self._begin_t = sample.t + sample.latency_s + START_S
@@ -115,7 +141,8 @@ class LatencyMonitor:
         if len(self._samples) < MIN_SAMPLES:
             return ""
         self._checked_t = sample.t
-        if not self.p95_s > LATE_PERIODS * period_s or sample.t - self._warned_t < REPEAT_S:
+        late = self.p95_s > LATE_PERIODS * period_s or newest_only
+        if not late or sample.t - self._warned_t < REPEAT_S:
             self._before = None
             return ""
         now, before = self._use(), self._before
@@ -123,22 +150,34 @@ class LatencyMonitor:
             self._before = now
             return ""
         self._warned_t, self._before = sample.t, None
-        cause = self._cause(before, now, period_s)
-        return Message(
+        cause = self._cause(before, now, period_s, newest_only)
+        return cause and Message(
             "results come up to {p95_s:.0f} ms late (p95), bursts every {period_s:.0f} ms: {cause}",
             self.p95_s * 1e3,
             period_s * 1e3,
             cause,
         )
 
-    def _cause(self, before: ProcessorUse | None, now: ProcessorUse | None, period_s: float) -> str:
+    def _cause(
+        self, before: ProcessorUse | None, now: ProcessorUse | None, period_s: float, newest_only: bool
+    ) -> str:
+        """Why results are late; empty where that was told."""
         if self._backlog() > WAITING_SHARE:
             return Message("the disk is too slow; record less (--record bursts) or on a faster disk")
         others, view = (0.0, 0.0) if before is None or now is None else now.since(before)
         if others > BUSY_CORES:
             return Message("another program takes {others:.1f} processor cores; end it", others)
         kernel = float(np.median([one.kernel_s for one in self._samples]))
-        if kernel > 0.8 * period_s:
+        if kernel > BUSY * period_s and newest_only and self._work is not None:
+            if self._told:
+                return ""
+            self._told = True
+            return Message(
+                "measuring takes {kernel:.0f} ms, so only the newest are measured; {what} would keep up",
+                kernel * 1e3,
+                self._work.keeping_up(kernel / period_s),
+            )
+        if kernel > BUSY * period_s:
             return Message(
                 "the kernel needs {kernel:.0f} ms; take fewer ZOIs (--step, --roi) or longer bursts",
                 kernel * 1e3,

@@ -32,7 +32,7 @@ from analysis.optics import (
 )
 from live.pipeline.guards import Guard
 from live.pipeline.measurement import Measurement, PlateReading
-from live.pipeline.reference import Correction, averaged, unchanged
+from live.pipeline.reference import Correction, averaged, blank_text, unchanged
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel
@@ -280,10 +280,8 @@ def measure(
     for item in bursts:
         number += isinstance(item, Burst)
         try:
-            if not (item if isinstance(item, Burst) else item.burst).alike:
-                raise DataError(
-                    "a picture of it is blank, or has half the contrast of another; look at light and cable"
-                )
+            if why := blank_text(item if isinstance(item, Burst) else item.burst):
+                raise DataError(why)
             if isinstance(item, NewReference):
                 tracker.renew_on_demand(corrections.sensor(item.burst))
                 continue

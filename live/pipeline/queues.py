@@ -11,10 +11,15 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from itertools import pairwise
+from statistics import median_low
 from typing import Generic, TypeVar
 
 CATCH_UP_S = 3.0
 """A reader that has not caught up after this time continues with the newest item."""
+
+SLOW_S, IDLE = 1.0, 0.05
+"""A reader without as large a share of spare time, behind which more items wait than so long ago, is too slow."""
 
 Item = TypeVar("Item")
 Stored = TypeVar("Stored")
@@ -54,10 +59,15 @@ class LatestQueue(_Queue[Item]):
         Size of the queue until the reader, which has to prepare first, has caught up. It continues with the newest
         where the queue does not get shorter while as many items are taken, and after ``CATCH_UP_S`` in any case.
     keeps : int
-        Size of the queue for a reader that is late now and then. One that lets it fill is too slow: it gets the
-        newest item each time, until it has to wait for one again.
+        Size of the queue for a reader that is late now and then. One that lets it fill, or that has been slower than
+        the items for ``SLOW_S``, gets the newest item each time, until it has time to spare again.
     brief : callable
         What is kept of an item that is skipped, without its pictures: many are while the reader prepares.
+
+    Attributes
+    ----------
+    newest_only : bool
+        The reader is too slow.
     """
 
     def __init__(
@@ -73,6 +83,9 @@ class LatestQueue(_Queue[Item]):
         self._size = self._at_first = self._patience = at_first
         self._reading, self._catching_up, self._catch_up_t = False, True, 0.0
         self._fewest = math.inf
+        self.newest_only, self._idle_s, self._puts = False, 0.0, 0
+        self._takes: deque[tuple[float, float, int, int]] = deque()
+        """Time, idle time so far, items that waited, items that had come: of the last ``SLOW_S``."""
         self._skipped: list[Item] = []
 
     def begin(self) -> None:
@@ -88,6 +101,7 @@ class LatestQueue(_Queue[Item]):
                 self._skipped.append(self._brief(item))
                 return
             self._items.append(item)
+            self._puts += 1
             if len(self._items) > self._size:
                 self._skip_oldest(self._size if self._catching_up else 1)
             self._change.notify_all()
@@ -95,19 +109,36 @@ class LatestQueue(_Queue[Item]):
     def get(self, timeout_s: float | None = None) -> Item | None:
         """Take an item, waiting up to ``timeout_s``; None where there is none, or when closed and empty."""
         with self._change:
+            began = time.monotonic()
             if self._reading:
-                self._resize()
+                self._resize(began)
             self._change.wait_for(lambda: self._items or self._closed, timeout_s)
+            self._idle_s += time.monotonic() - began
             item = self._items.popleft() if self._items else None
             self._change.notify_all()
             return item
 
-    def _resize(self) -> None:
-        if not self._items:
-            self._size, self._catching_up = self._keeps, False
-        elif self._catching_up and not self._gets_shorter():
+    def _resize(self, now: float) -> None:
+        takes, waiting = self._takes, len(self._items)
+        takes.append((now, self._idle_s, waiting, self._puts))
+        while len(takes) > 1 and takes[1][0] <= now - SLOW_S:
+            takes.popleft()
+        spare = self._idle_s - takes[0][1] > IDLE * (now - takes[0][0])
+        if not waiting and (spare or not self.newest_only):
+            self._size, self._catching_up, self.newest_only = self._keeps, False, False
+        elif self._catching_up and waiting and not self._gets_shorter():
             self._catching_up = False
             self._skip_oldest(1)
+        elif not (self._catching_up or spare) and self._is_slower():
+            self._skip_oldest(1)
+
+    def _is_slower(self) -> bool:
+        """Whether more items wait than ``SLOW_S`` ago and most took longer than from one to the next: no hiccup."""
+        (since, _, waited, puts), (now, _, waiting, all_puts) = self._takes[0], self._takes[-1]
+        if waiting <= waited or now - since < SLOW_S or len(self._takes) < 3:
+            return False
+        busy = (after[0] - after[1] - one[0] + one[1] for one, after in pairwise(self._takes))
+        return median_low(busy) > (now - since) / max(all_puts - puts, 1)
 
     def _gets_shorter(self) -> bool:
         """Whether a reader that is behind comes nearer to the newest item."""
@@ -118,7 +149,7 @@ class LatestQueue(_Queue[Item]):
 
     def _skip_oldest(self, size: int) -> None:
         """Skip all but the newest ``size`` items; the queue holds no more from now on."""
-        self._size = size
+        self._size, self.newest_only = size, self._reading and size == 1 < self._keeps
         while len(self._items) > size:
             self._skipped.append(self._brief(self._items.popleft()))
 

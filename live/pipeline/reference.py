@@ -75,6 +75,17 @@ def averaged(noise_GL: float | None, n: int) -> float | None:
     return None if noise_GL is None else max(noise_GL, 12**-0.5) / math.sqrt(n)
 
 
+def blank_text(burst: Burst) -> str:
+    """Which picture of the burst is blank; empty where none is."""
+    if not burst.blank:
+        return ""
+    return Message(
+        "picture {blank} of {n} is blank or has less than half the contrast of another; look at light and cable",
+        burst.blank,
+        burst.n,
+    )
+
+
 def prepare(
     reference: Burst,
     grid: ZoiGrid,
@@ -93,7 +104,7 @@ def prepare(
     ConfigError
         The grid leaves the picture.
     DataError
-        The reference, called ``what`` in the message, has no pattern.
+        The reference, called ``what`` in the message, has no pattern, or one of its pictures is blank.
     MachineUnfit
         The machine measures a known pattern wrong.
     TooLittleMemory
@@ -102,6 +113,8 @@ def prepare(
     from analysis import PhaseKernel
     from analysis.picture.pattern import hidden_noise
 
+    if why := blank_text(reference):
+        raise DataError("{what}: {why}, or give --reference", what, why)
     need = _checked_memory(reference, grid)
     noise_GL = frame_noise(reference, stated_noise_GL)
     noise, sound = averaged(noise_GL, reference.n), correct(reference)

@@ -22,6 +22,7 @@ from acquire.camera import with_scheme
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind, EventSink
 from acquire.frame import Burst, Frame
+from acquire.hdf5 import FolderWatch
 from acquire.opencv.images import picture_times
 from acquire.text.printable import counted
 from live.config.loading import Config, load_config
@@ -218,7 +219,7 @@ def _run(
     outputs = Outputs(made, run_state.loads, event_log, stream)
     event_log.add_listener(stream.publish)
     began, work = time.perf_counter(), prefetch(bursts)
-    failures = BurstFailures(run_state, folder)
+    failures, held = BurstFailures(run_state, folder), FolderWatch(folder)
     try:
         _publish_recorded(source, stream)
         for m in measured(
@@ -237,6 +238,7 @@ def _run(
         work.close()
         run_state.health.ended = True
         outputs.end()
+        folder = held.end()
     speed = f"joined of {len(request.parts)} chunks" if request.parts else speed_line(run_state.history, took)
     lines = [*_account(source, run_state), speed]
     left_out = source.count.left_out if source.count else 0

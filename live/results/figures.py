@@ -255,12 +255,11 @@ def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str
     if not figures.E.known or figures.span is None:
         return []
     rows = _rows(figures, specimen)
-    hint = "" if specimen.area_m2 else " (give [specimen] width_mm and thickness_mm for E)"
     of = f" of {figures.elastic_strain}" if figures.elastic_strain else ""
-    beyond = f", of E with {beyond_scatter(figures)}" if beyond_scatter(figures) else ""
+    beyond = f", of E with {beyond_scatter(figures)}" if beyond_scatter(figures) else " of the scatter alone"
     words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, ±: {CONFIDENCE:.0%} interval{beyond})"
     strengths = _known_texts(rows, _STRENGTHS)
-    return [_text(rows, "E") + hint + words, *([strengths] if strengths else [])]
+    return [_text(rows, "E") + words, *([strengths] if strengths else [])]
 
 
 def beyond_scatter(figures: TensileFigures) -> str:

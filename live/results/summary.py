@@ -25,6 +25,7 @@ from live.results.figures import (
     sharpness_line,
     tare_line,
 )
+from live.results.finished.answers import checks_line
 from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
 
@@ -71,9 +72,10 @@ def why_nothing(run_state: RunState) -> str:
     return f"nothing was measured: {grabbed} frames gave no burst after the reference; take shorter bursts"
 
 
-def doubt_lines(test: FinishedTest) -> list[str]:
-    """What the data say against the figures, for the top of a summary."""
-    return [f"look: {text}" for text in doubts(findings(test))]
+def belief_lines(test: FinishedTest) -> list[str]:
+    """Whether the figures can be believed: the checks made, and what the data say against the figures."""
+    found = findings(test)
+    return [*film_line(test.specimen), checks_line(found), *(f"look: {text}" for text in doubts(found))]
 
 
 def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
@@ -92,15 +94,13 @@ def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     means = f"none, {last.apart}" if last.apart else means
     means = means if last.n_valid else f"no value, 0 of {last.n_zoi} ZOIs valid"
     lines = [
-        *doubt_lines(test),
         valid_line(history),
         f"last strain of the region: {means}{f' {part}' if part else ''};"
         f" largest of any ZOI {Quantity('strain', largest)}",
-        *film_line(specimen),
         noise_line(history),
     ]
     lines += sharpness_line(history.column("blur").tolist(), history.column("sigma_blur").tolist())
-    lines += latency_lines(history)
+    lines += latency_lines(history) + belief_lines(test)
     figures = figure_lines(test.figures, specimen)
     if figures:
         figures += tare_line(history, run_state.loads) + lag_line(history, run_state.loads, specimen)

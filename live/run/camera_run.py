@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 
 from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind
-from acquire.hdf5 import path_of
+from acquire.hdf5 import FolderWatch
 from acquire.text import Message
 from live.pipeline.consumer import Compose, RunInfo
-from live.pipeline.latency import LatencyMonitor
+from live.pipeline.latency import KernelWork, LatencyMonitor
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
@@ -83,7 +82,7 @@ class CameraRun(Subscriber):
     ) -> None:
         self.name, self._prepared, self._run_state = name, prepared, run_state
         self.folder = prepared.folder
-        self._held = os.open(self.folder, os.O_RDONLY) if os.name == "posix" and self.folder.is_dir() else -1
+        self._held = FolderWatch(self.folder)
         self._screen, self._stop, self._stream = screen, stop, stream
         self._recording: PreTriggerBuffer | None = None
         self._has_recorded = self._hinted = False
@@ -106,7 +105,10 @@ class CameraRun(Subscriber):
         stream.add(self, name)
         self.source = CameraSource(rig.camera, plan, run_state, stream, name)
         self._incoming = IncomingBursts(stream, run_state.frame_counts, rig.camera.info, plan, name)
-        latency = LatencyMonitor(lambda: self._recording.backlog if self._recording else 0.0)
+        latency = LatencyMonitor(
+            lambda: self._recording.backlog if self._recording else 0.0,
+            work=KernelWork(prepared.plan.grid.size, prepared.plan.grid.step, plan.burst),
+        )
         self._measurer = Measurer(prepared, run_state, self._incoming, latency, stream, stop, name)
 
     def open_recording(self) -> None:
@@ -303,9 +305,7 @@ class CameraRun(Subscriber):
         self._run_state.event_log.emit(EventKind.STOP, "phasedic", Message("the test ends: {reason}", reason))
         if self._recording is not None:
             self._recording.close({"stop_reason": reason})
-        self.folder = path_of(self._held, self.folder)
-        if self._held >= 0:
-            os.close(self._held)
+        self.folder = self._held.end()
 
     @property
     def exit_code(self) -> int:

@@ -70,6 +70,11 @@ class IncomingBursts(Subscriber):
         else:
             self.close()
 
+    @property
+    def newest_only(self) -> bool:
+        """Whether measuring is slower than the camera, so that it gets the newest burst each time."""
+        return self._bursts.newest_only
+
     def close(self) -> None:
         """What comes from now on is skipped."""
         self._bursts.close()

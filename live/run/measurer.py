@@ -17,7 +17,7 @@ from acquire.text import Message
 from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample
 from live.pipeline.measure import NewReference
 from live.pipeline.measurement import Measurement
-from live.pipeline.reference import ReferenceBurst, ReferenceMotion, motion_between
+from live.pipeline.reference import ReferenceBurst, ReferenceMotion, blank_text, motion_between
 from live.pipeline.run_state import RunState
 from live.results.folder import BurstFailures
 from live.run.incoming_bursts import IncomingBursts
@@ -27,7 +27,7 @@ from live.setup.prepared import PreparedKernel
 from live.stream.stream import Stream
 
 log = logging.getLogger(__name__)
-TRIES = 3
+TRIES, NOT_MEASURED = 3, Message("fast motion, glare, no focus?")
 
 
 class ReferenceSelector:
@@ -63,13 +63,14 @@ class ReferenceSelector:
             return None
         what = Message("the reference from {address}", self._prepared.config.camera.address)
         for attempt in itertools.count(1):
-            ready = self._prepared.plan.on(reference.burst, what)
-            motion = _motion(ready, reference)
+            blank = blank_text(reference.burst)
+            ready = None if blank else self._prepared.plan.on(reference.burst, what)
+            motion = ReferenceMotion(math.nan) if ready is None else _motion(ready, reference)
             if motion.px <= self._prepared.config.measure.reference_shift_px:
                 if motion.pulled:  # the test has begun: the next one would be under more load
                     self._moved(motion)
                 break
-            again = self._another(motion, attempt)
+            again = self._another(motion, attempt, blank)
             if again is None and math.isnan(motion.px):
                 text = Message(
                     "no reference could be measured; keep the specimen still, look at light and focus"
@@ -84,7 +85,7 @@ class ReferenceSelector:
         self._report(reference.burst, motion)
         return ready
 
-    def _another(self, motion: ReferenceMotion, attempt: int) -> ReferenceBurst | None:
+    def _another(self, motion: ReferenceMotion, attempt: int, blank: str) -> ReferenceBurst | None:
         """The next reference; None where the run ends, or where one that moved must be used.
 
         A reference that cannot be measured is never used: the next one is tried until one is good.
@@ -93,7 +94,7 @@ class ReferenceSelector:
             return None
         what = Message("the picture moved by {amount} px during the reference burst", motion.amount)
         if math.isnan(motion.px):
-            what = Message("the reference burst cannot be measured (fast motion, glare, no focus?)")
+            what = Message("the reference burst cannot be measured ({why})", blank or NOT_MEASURED)
         if attempt < TRIES:
             self._run_state.event_log.emit(
                 EventKind.MEASUREMENT, "reference", Message("{what}; taking another", what), "warning"
@@ -294,7 +295,8 @@ class Measurer:
         if math.isnan(m.time_step.latency_s):
             return
         sample = LatencySample(m.t, m.time_step.latency_s, m.time_step.measure_s)
-        warning = self._latency.check(sample, m.burst.n / max(self._run_state.health.fps, 1e-3))
+        period_s = m.burst.n / max(self._run_state.health.fps, 1e-3)
+        warning = self._latency.check(sample, period_s, newest_only=self._incoming.newest_only)
         self._run_state.health.latency_p95_s = self._latency.p95_s
         if warning:
             event = Event(m.t, EventKind.MEASUREMENT, "measurement", warning, "warning")

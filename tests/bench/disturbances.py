@@ -29,6 +29,7 @@ from acquire.load_sample import LoadSample
 from acquire.session import SessionWriter
 from live.commands.consumers import standard_consumers
 from live.config.loading import load_config
+from live.pipeline.measure import Tracker
 from live.pipeline.measurement import Measurement
 from live.run import live_run
 from live.run.live_run import run_live
@@ -146,6 +147,20 @@ def flood() -> Callable[[], object]:
     return told.set
 
 
+def slower(factor: float) -> Disturbed:
+    """The kernel of this test takes ``factor`` times as long as from one burst to the next, from the first burst on."""
+    plain, rng = Tracker.measure, np.random.default_rng(1)
+
+    def slow(tracker: Tracker, burst: Any) -> Any:
+        begin = time.monotonic()
+        field = plain(tracker, burst)
+        time.sleep(max(0.0, factor * rng.normal(1.0, 0.1) / FPS - (time.monotonic() - begin)))
+        return field
+
+    Tracker.measure = slow  # type: ignore[method-assign]
+    return Disturbed(lambda: None)
+
+
 CASES: dict[str, Callable[[], Disturbed]] = {
     "nothing": lambda: Disturbed(lambda: None),
     "the viewer is stopped for 5 s": lambda: Disturbed(stop_viewer),
@@ -154,6 +169,8 @@ CASES: dict[str, Callable[[], Disturbed]] = {
     "10,000 load lines at once": lambda: Disturbed(flood()),
     "the measuring thread stands for 2 s": lambda: Disturbed(lambda: time.sleep(2.0), here=True),
     "another program takes a core for 5 s": lambda: Disturbed(burn),
+    "slower than the camera by 1.3": lambda: slower(1.3),
+    "slower than the camera by 2": lambda: slower(2.0),
 }
 
 
@@ -174,7 +191,9 @@ def run(name: str, folder: Path) -> dict[str, Any]:
     return {
         "skipped": frame_counts.skipped, "lost": frame_counts.lost, "not recorded": frame_counts.unrecorded,
         "in time again after s": round(float(late[-1, 0] - watch.over_t), 2) if len(late) else 0.0,
+        "p50 ms after it": round(float(np.percentile(after[:, 3], 50)) * 1e3, 1),
         "p95 ms after it": round(float(np.percentile(after[:, 3], 95)) * 1e3, 1),
+        "said": [e.text for e in outcome.run_state.event_log.events("warning") if "late (p95)" in e.text],
         "load samples": frame_counts.load_samples, "exit code": outcome.exit_code,
     }  # fmt: skip
 

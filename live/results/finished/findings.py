@@ -21,6 +21,7 @@ from analysis.evaluate.figure import quantile
 from live.results.figures import LAG_MATTERS_S, figure_text
 from live.results.finished.finished_test import FinishedTest
 
+NO_FORCE = Message("no force is known")
 SHOWN = 3
 """Findings at the top of summary and report."""
 Outcome = Literal["good", "doubt", "not checked"]
@@ -67,7 +68,7 @@ def doubts(found: Sequence[DataCheck]) -> list[str]:
 
 def _finding(name: str, check: Callable[[FinishedTest], str | None], test: FinishedTest) -> DataCheck:
     if name not in _WITHOUT_FORCE and not test.has_force:
-        return DataCheck(name, "not checked", Message("no force is known"))
+        return DataCheck(name, "not checked", NO_FORCE)
     text = check(test)
     if text is None:
         return DataCheck(name, "not checked", Message("the test does not show it"))
@@ -77,7 +78,7 @@ def _finding(name: str, check: Callable[[FinishedTest], str | None], test: Finis
 def _sign_of_force(test: FinishedTest) -> str | None:
     """Stress and strain must have one sign; a test that is pressed is named."""
     strain, stress = _both_known(test)
-    if not (_changes(strain, _CLEAR_STRAIN) and _changes(stress, 0.0)):
+    if not (changes(strain, _CLEAR_STRAIN) and changes(stress, 0.0)):
         return None
     follows = float(np.corrcoef(strain, stress)[0, 1])
     longest = strain[np.argmax(np.abs(strain))]
@@ -255,7 +256,8 @@ def _both_known(test: FinishedTest) -> tuple[NDArray[np.float64], NDArray[np.flo
     return test.curve.strain[known], test.curve.stress[known]
 
 
-def _changes(values: NDArray[np.float64], least: float) -> bool:
+def changes(values: NDArray[np.float64], least: float) -> bool:
+    """Whether values leave their noise, and change by more than ``least``."""
     return len(values) > 3 and float(np.ptp(values)) > max(_CLEAR * noise(values), least)
 
 

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from acquire.text.quantity import Quantity
 from analysis.evaluate import CONFIDENCE
+from live.pipeline.event_log import counted_text
+from live.pipeline.repeats import Repeats
 from live.pipeline.screen import Screen
 from live.results.figures import figure_text
 from live.results.finished.finished_test import FinishedTest
@@ -92,17 +94,20 @@ def frame_counts(run: RunFolder) -> Html:
 
 
 def events(run: RunFolder) -> Html:
-    """The events, at most the first 3000."""
-    found = run.events
+    """The events, at most the first 3000; repeated ones in one line, with the time of the last."""
+    repeats = Repeats()
+    for event in run.events:
+        repeats.add(event)
+    found = list(repeats)
     rows = [
         (
             f"{event.t - run.start_monotonic:.3f}",
             element("span", event.level, class_=event.level),
             event.kind.value,
             event.source,
-            event.text,
+            counted_text(event.text, count),
         )
-        for event in found[:_MAX_EVENTS]
+        for event, count in found[:_MAX_EVENTS]
     ]
     if not rows:
         return paragraph("No events were recorded.", "dim")

@@ -14,6 +14,7 @@ from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
 from live.results.budget import CameraView, budget_cells
 from live.results.figures import axis_text, budget_of, figure_lines, film_line, headline, sharpness_line
+from live.results.finished.answers import MeasuredAgain, checks_line, missing_lines
 from live.results.finished.figures_file import finished_in
 from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
@@ -162,10 +163,24 @@ def _head(run: RunFolder, curve: EvaluatedCurve, test: FinishedTest) -> Html:
             element("h1", run.title),
             paragraph(f"{words} Report made by phasedic on {now}.", "dim"),
             paragraph(unfinished, "warning") if run.strain.unfinished else Html(""),
-            *(paragraph(text, "warning") for text in doubts(findings(test))),
-            tiles({**tensile(curve), **_extent(run, curve)}),
+            tiles(_extent(run, curve)),
+            *_answers(run, curve, test),
         ]
     )
+
+
+def _answers(run: RunFolder, curve: EvaluatedCurve, test: FinishedTest) -> list[Html]:
+    """Whether the figures can be believed, the figures or why there are none, and what is missing."""
+    found, counts = findings(test), run.frame_counts or {}
+    n_frames = float(np.median(run.strain.values["n_frames"]))
+    again = MeasuredAgain.of(run.path, n_frames, int(counts.get("skipped", 0)) * bool(counts.get("recorded")))
+    why = f"E is not known: {test.figures.E.why if test.has_force else 'no force is known'}."
+    return [
+        paragraph(f"{checks_line(found)}."),
+        *(paragraph(text, "warning") for text in doubts(found)),
+        tiles(tensile(curve)) if test.figures.E.known else paragraph(why, "open"),
+        *(paragraph(text, "open") for text in missing_lines(test, again)),
+    ]
 
 
 def tensile(curve: EvaluatedCurve) -> dict[str, str]:

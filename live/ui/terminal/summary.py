@@ -15,17 +15,10 @@ from live.pipeline.event_log import sentence
 from live.pipeline.history import History
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
-from live.results.figures import (
-    alignment_line,
-    elastic_lines,
-    figure_lines,
-    film_line,
-    plastic_lines,
-    tare_line,
-)
-from live.results.finished.findings import doubts, findings
+from live.results.figures import alignment_line, elastic_lines, figure_lines, tare_line
+from live.results.finished.answers import MeasuredAgain, missing_lines
 from live.results.finished.finished_test import FinishedTest
-from live.results.summary import doubt_lines, file_lines, noise_line, summary_lines, valid_line, why_nothing
+from live.results.summary import belief_lines, file_lines, noise_line, summary_lines, valid_line, why_nothing
 from live.ui.terminal.status_line import strain_text
 
 SMALL_MB = 10.0  # below it with a decimal
@@ -44,27 +37,33 @@ def print_summary(
 ) -> None:
     """Print the figures of a test, then ``lines``, then where the files are; ``with_report``: one will be made."""
     screen.print()
+    missing = [*missing_lines(test, _again(run_state, folder))] * run_state.history.has_values
     if verbose:
-        shown = [*summary_lines(run_state, test), *lines, *file_lines(folder)]
+        shown = [*summary_lines(run_state, test), *missing, *lines, *file_lines(folder)]
     else:
         following = "" if with_report else f"; next: phasedic report {shlex.quote(str(folder))}"
-        shown = [*brief_lines(run_state, test), *lines, _files(folder) + following]
+        shown = [*brief_lines(run_state, test), *missing, *lines, _files(folder) + following]
     for line in shown:
         screen.print(line)
 
 
+def _again(run_state: RunState, folder: Path) -> MeasuredAgain:
+    counts = run_state.frame_counts
+    recorded = counts.skipped * (counts.recorded > 0)
+    return MeasuredAgain.of(folder, counts.measured / max(len(run_state.history.time_steps), 1), recorded)
+
+
 def brief_lines(run_state: RunState, test: FinishedTest) -> list[str]:
-    """State, strain, E, nu and strengths or why they are not known, noise, and what is odd."""
-    history, specimen = run_state.history, test.specimen
+    """What was measured, whether it can be believed, E, nu and strengths or why they are not known."""
+    history = run_state.history
     if not history.has_values:
         return [why_nothing(run_state)]
     lines = [
-        *doubt_lines(test),
         valid_line(history),
         *_at_end(history, test.axis.axis),
-        *film_line(specimen),
-        *_figures(run_state, test),
         noise_line(history),
+        *belief_lines(test),
+        *_figures(run_state, test),
         *_remarks(run_state, test),
     ]
     return [line.strip() for line in lines]
@@ -85,18 +84,16 @@ def _at_end(history: History, axis: str) -> list[str]:
 def _figures(run_state: RunState, test: FinishedTest) -> list[str]:
     figures, specimen = test.figures, test.specimen
     if figures.E.known:
-        return [
-            line for line in [*elastic_lines(figures, specimen), *plastic_lines(figures, specimen)] if line
-        ]
-    if not test.has_force:
+        return [*elastic_lines(figures, specimen), *figures.notes]
+    why = figures.E.why
+    if not run_state.with_load:
+        why = "no force is known"
+    elif not test.has_force:
         last_t = run_state.history.time_steps[-1].t
         why = f"no burst has a force: {run_state.loads.why_none_at(last_t)}"
-        return [f"E is not known: {why if run_state.with_load else 'no force is known (--load)'}"]
-    odd = doubts(findings(test))
-    why = figures.E.why + "; the first line above says what to look at" * bool(odd)
-    return list(
-        dict.fromkeys([f"E is not known: {why}", *figure_lines(figures, specimen)[:1], *figures.notes])
-    )
+    strengths = figure_lines(figures, specimen)[:1] if test.has_force else []
+    notes = figures.notes if test.has_force else ()
+    return list(dict.fromkeys([f"E is not known: {why}", *strengths, *notes]))
 
 
 def _remarks(run_state: RunState, test: FinishedTest) -> Iterator[str]:
@@ -117,8 +114,8 @@ def trouble_lines(
     warnings = run_state.event_log.events("warning", "error")
     if warnings:
         last = sentence(warnings[-1], run_state.event_log.names)
-        levels = [event.level for event in warnings]
-        counts = [counted(levels.count(one), one) for one in ("warning", "error") if one in levels]
+        numbers = {level: run_state.event_log.count(level) for level in ("warning", "error")}
+        counts = [counted(n, level) for level, n in numbers.items() if n]
         yield f"{' and '.join(counts)}, the last: {last}"
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -24,8 +23,9 @@ from live.config.gauges import complete_gauges
 from live.config.loading import Config
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
-from live.pipeline.event_log import sentence
+from live.pipeline.event_log import counted_text, sentence
 from live.pipeline.measurement import AXIAL, Measurement, TimeStep
+from live.pipeline.repeats import Repeats
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import BURST, DISK, FORCE, FPS, STRESS, Snapshot, peak_force
 from live.pipeline.timed.figure import TimedFigure
@@ -122,7 +122,7 @@ class PageConsumer(Consumer):
         self._peak_N = math.nan
         self._frame: Frame | None = None
         self._fresh = False
-        self._events: deque[tuple[float, dict[str, Any]]] = deque(maxlen=MAX_EVENTS)
+        self._events = Repeats()
         self._start_t = now()
         self._t0 = math.nan
         self._channels: ChannelValues | None = None
@@ -180,12 +180,11 @@ class PageConsumer(Consumer):
             self._frame, self._fresh = frame, True
 
     def event(self, event: Event) -> None:
-        """Keep the last events."""
+        """Keep the last events; of repeated ones the newest with their number."""
         if event.kind is EventKind.MEASURED:
             return
         names = {} if self._running is None else self._running.run_state.event_log.names
-        text = printable(sentence(event, names))
-        self._events.append((self._now(), {"level": event.level, "kind": str(event.kind), "text": text}))
+        self._events.add(replace(event, t=self._now(), text=printable(sentence(event, names))))
 
     def idle(self) -> float:
         """Send and draw what is due."""
@@ -222,6 +221,10 @@ class PageConsumer(Consumer):
 
     # -- messages to the page -----------------------------------------------------------------
 
+    def _shown_event(self, event: Event, count: int) -> dict[str, Any]:
+        text, s = counted_text(event.text, count), max(event.t - self._start_t, 0.0)
+        return {"s": s, "level": event.level, "kind": str(event.kind), "text": text}
+
     def state(self) -> dict[str, Any]:
         """The state of the run, as the page shows it."""
         running, now = self._running, self._now()
@@ -246,7 +249,7 @@ class PageConsumer(Consumer):
                 "range": self.map.choice.span,
                 **self._scale,
             },
-            "events": [{"s": max(at - self._start_t, 0.0), **event} for at, event in self._events],
+            "events": [self._shown_event(*one) for one in [*self._events][-MAX_EVENTS:]],
             "late_s": s.latency_p95_s if s.figure(BURST).known else math.nan,
             "fps": s.figure(FPS).value,
             "ledger": s.frames,

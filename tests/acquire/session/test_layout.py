@@ -10,8 +10,10 @@ import h5py
 import numpy as np
 import pytest
 
+from acquire.burst import burst_of
 from acquire.errors import DataError
 from acquire.events import Event, EventKind
+from acquire.record_mode import RecordMode
 from acquire.session import Session, layout
 from acquire.session.layout import event_rows
 from tests.acquire.session.fixtures import frame, sample, writer
@@ -59,6 +61,7 @@ COLUMNS = {
     "bursts": {
         "time_s": TIME, "monotonic_s": TIME, "n": ("u4", "none", 1, 65536), "noise": ("f8", "GL", 0, 65535),
         "duration": TIME, "first_index": INDEX, "last_index": INDEX, "lost": COUNT, "clock": CLOCK,
+        "blank": ("u4", "none", 0, 65536),
     },
     "clock": {"monotonic_s": TIME, "utc": ("S27", "none", -np.inf, np.inf)},
 }  # fmt: skip
@@ -78,6 +81,21 @@ def test_columns_their_units_and_ranges(path: Path, group: str) -> None:
         for name, (dtype, unit, _, _) in COLUMNS[group].items():
             column = file["entry"][group][name]
             assert (column.dtype, column.attrs["units"]) == (np.dtype(dtype), unit.encode())
+
+
+def test_a_file_of_before_has_no_blank_pictures(path: Path) -> None:
+    with writer(path, mode=RecordMode("bursts")) as session:
+        session.write_burst(dataclasses.replace(burst_of([frame(k) for k in range(2)]), blank=1))
+    with Session.open(path) as back:
+        assert back.burst(0).blank == 1
+    with h5py.File(path, "r+") as file:
+        del file["entry/bursts/blank"]
+    with Session.open(path) as back:
+        assert back.burst(0).blank == 0
+    with h5py.File(path, "r+") as file:
+        del file["entry/bursts/noise"]
+    with pytest.raises(DataError, match="noise is missing"):
+        Session.open(path)
 
 
 def test_numbers_that_do_not_increase_are_refused(path: Path) -> None:

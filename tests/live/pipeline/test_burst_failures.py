@@ -43,11 +43,11 @@ class FailingTracker:
 def test_a_burst_with_a_blank_picture_is_not_measured(tmp_path: Path) -> None:
     state, work = RunState.new(0.5), bursts(3)
     tracker: Any = FailingTracker()
-    given = [work[0], replace(work[1], alike=False), NewReference(replace(work[1], alike=False)), work[2]]
+    given = [work[0], replace(work[1], blank=2), NewReference(replace(work[1], blank=2)), work[2]]
     found = list(measure(given, tracker, LoadLog(0.5), on_failure=BurstFailures(state, tmp_path)))
     assert [m.number for m in found] == [0, 2] and state.frame_counts.failed == work[1].n
     texts = [event.text for event in state.event_log.events("error")]
-    assert len(texts) == 2 and all("DataError: a picture of it is blank" in text for text in texts)
+    assert len(texts) == 2 and all("DataError: picture 2 of" in text for text in texts)
 
 
 def bursts(n: int) -> list[Burst]:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import threading
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from acquire.system import lower_priority
 from live.pipeline import queues
-from live.pipeline.latency import LatencyMonitor, LatencySample, ProcessorUse, processor_use
+from live.pipeline.latency import KernelWork, LatencyMonitor, LatencySample, ProcessorUse, processor_use
 from live.pipeline.queues import BoundedQueue, LatestQueue
 from tests.live.ui.waiting import LONG_S
 
@@ -128,22 +130,95 @@ def test_a_reader_that_is_late_now_and_then_gets_all() -> None:
     assert box.take_skipped() == []
 
 
-def test_a_reader_that_is_too_slow_gets_the_newest_until_it_waits_again() -> None:
-    box: LatestQueue[int] = LatestQueue(keeps=3)
-    box.begin()
-    assert box.get(0) is None
-    for i in range(4):
-        box.put(i)
-    assert box.take_skipped() == [0, 1, 2], "it was full: the newest alone counts"
-    box.put(4)
-    assert box.get(0) == 4 and box.take_skipped() == [3]
-    box.put(5)
-    box.put(6)
-    assert box.get(0) == 6 and box.take_skipped() == [5]
-    assert box.get(0) is None, "it has caught up"
-    for i in (7, 8, 9):
-        box.put(i)
-    assert [box.get(0), box.get(0), box.get(0)] == [7, 8, 9] and box.take_skipped() == []
+class Simulated:
+    """A queue with a reader that takes ``took(t)`` s an item, fed with an item every 0.1 s; no real time."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, keeps: int = 3) -> None:
+        self.now, self.number, self.latencies = 0.0, 0, list[float]()
+        self.box: LatestQueue[int] = LatestQueue(keeps=keeps)
+        clock = SimpleNamespace(monotonic=lambda: self.now)
+        monkeypatch.setattr(queues, "time", clock)
+        monkeypatch.setattr(self.box, "_change", Waits(self.wait_for))
+        self.box.begin()
+
+    def wait_for(self, ready: Any, timeout_s: float) -> None:
+        """Time passes until the next item, where none is there."""
+        if not ready():
+            self.until((self.number + 1) * 0.1)
+
+    def until(self, t: float) -> None:
+        """What comes before ``t``, which is then."""
+        while (self.number + 1) * 0.1 <= t + 1e-9:
+            self.number += 1
+            self.box.put(self.number)
+        self.now = max(self.now, t)
+
+    def read(self, seconds: float, took: float) -> list[int]:
+        """What the reader takes; the latency of each result behind its item."""
+        taken, end, self.latencies = [], self.now + seconds, []
+        while self.now < end:
+            item = self.box.get(1.0)
+            assert item is not None
+            self.until(self.now + took)
+            taken.append(item)
+            self.latencies.append(self.now - 0.1 * item)
+        return taken
+
+
+class Waits:
+    """A condition of one thread, whose time is simulated."""
+
+    def __init__(self, wait_for: Any) -> None:
+        self.wait_for = wait_for
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, *error: object) -> None:
+        pass
+
+    def notify_all(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("slower", [1.1, 1.3, 2.0, 3.0])
+def test_a_reader_that_is_slower_over_a_second_gets_the_newest(
+    monkeypatch: pytest.MonkeyPatch, slower: float
+) -> None:
+    test = Simulated(monkeypatch, keeps=30)
+    test.read(1.5, 0.05)
+    assert not test.box.newest_only and test.box.take_skipped() == []
+    test.read(2.5, 0.1 * slower)
+    assert test.box.newest_only and test.box.take_skipped()
+    test.read(10.0, 0.1 * slower)
+    assert max(test.latencies) <= 0.2 * slower + 1e-9, "at most two of its own times"
+    test.read(1.5, 0.05)
+    assert not test.box.newest_only, "it has time to spare again"
+    test.box.take_skipped()
+    test.until(test.now + 0.9)
+    test.read(2.0, 0.05)
+    assert test.box.take_skipped() == [], "and is waited for again"
+
+
+def test_a_hiccup_skips_nothing_even_of_a_reader_that_is_hardly_faster(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    test = Simulated(monkeypatch, keeps=4)
+    for _ in range(3):
+        taken = test.read(3.0, 0.09)
+        test.until(test.now + 0.25)
+        assert taken == list(range(taken[0], taken[0] + len(taken)))
+    test.read(5.0, 0.09)
+    assert test.box.take_skipped() == [] and not test.box.newest_only
+
+
+def test_one_that_stands_gets_the_newest_and_then_all_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    test = Simulated(monkeypatch, keeps=3)
+    test.read(2.0, 0.05)
+    test.until(test.now + 2.0)
+    assert test.box.newest_only and len(test.box.take_skipped()) == 19
+    test.read(1.0, 0.05)
+    assert not test.box.newest_only and test.box.take_skipped() == []
 
 
 def test_closing_frees_a_waiting_producer() -> None:
@@ -296,3 +371,20 @@ def test_of_what_is_skipped_only_the_brief_is_kept() -> None:
     box.close()
     box.put([5] * 1000)
     assert box.take_skipped() == [[0], [1], [2], [5]]
+
+
+def test_a_kernel_that_is_too_slow_is_told_once_with_what_would_keep_up() -> None:
+    monitor = LatencyMonitor(lambda: 0.0, lambda: None, KernelWork(64, 16, 2))
+    samples = (LatencySample(k * PERIOD_S, 1.5 * PERIOD_S, 1.3 * PERIOD_S) for k in range(3000))
+    (told,) = filter(None, (monitor.check(one, PERIOD_S, newest_only=True) for one in samples))
+    assert told.endswith(
+        "measuring takes 43 ms, so only the newest are measured; --step 21, --zoi 50 or --burst 4 would keep up"
+    )
+    assert len(told) <= 160
+
+
+def test_what_is_said_to_keep_up_does() -> None:
+    for share in (0.9, 1.3, 2.0, 5.0):
+        work = KernelWork(64, 16, 3)
+        step, zoi, burst = map(int, re.findall(r"\d+", work.keeping_up(share)))
+        assert max((16 / step) ** 2, (zoi / 64) ** 2, 3 / burst) * share <= 0.8 + 1e-9

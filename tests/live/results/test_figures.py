@@ -90,7 +90,7 @@ def test_a_metal_by_its_standard() -> None:
 
 def test_the_interval_of_e_names_the_limits_in_it() -> None:
     history, loads = kept(ramberg_osgood())
-    assert "interval)" in figure_lines(evaluate(history, loads, FLAT), FLAT)[0]
+    assert "interval of the scatter alone)" in figure_lines(evaluate(history, loads, FLAT), FLAT)[0]
     stated = replace(FLAT, force_error_percent=1.0, strain_error_um_m=200.0)
     figures = evaluate(history, loads, stated)
     assert "interval, of E with limits of load cell, strain)" in figure_lines(figures, stated)[0]
@@ -187,7 +187,7 @@ def test_without_a_section_forces_stand_for_stresses() -> None:
     history, loads = kept(ramberg_osgood())
     specimen = SpecimenConfig(zero="preload")
     lines = elastic_lines(evaluate(history, loads, specimen), specimen)
-    assert lines[0].startswith("EA = 1") and " kN (give [specimen]" in lines[0]
+    assert lines[0].startswith("EA = 1") and " kN  nu = " in lines[0]
     assert "Fp0.2 = " in lines[1] and "Fm = " in lines[1]
 
 

@@ -26,6 +26,7 @@ from tests.live.made_up import START, make_measurement
 from tests.live.streaming import Noted
 
 N = 8  # frames of a reference
+BLANK = 3  # for a motion: the picture of a reference that is blank
 
 
 def as_motion(motion: float | ReferenceMotion) -> ReferenceMotion:
@@ -49,8 +50,9 @@ class References:
     def next_reference(self) -> Any:
         if self._taken == len(self._motions):
             return None
-        burst = replace(make_measurement(self._taken).burst, n=self._n)
         motion = self._motions[self._taken]
+        blank = BLANK * (motion is BLANK)
+        burst = replace(make_measurement(self._taken).burst, n=self._n, blank=blank)
         self._taken += 1
         self.state.frame_counts.add(grabbed=burst.n, reference=burst.n)
         return SimpleNamespace(burst=burst, halves=None if burst.n < 4 else motion)
@@ -72,6 +74,10 @@ class References:
 
 MOVED = "the reference moved by {:.3f} px; keep the specimen still when strains must be absolute"
 AGAIN = "the picture moved by {:.3f} px during the reference burst; taking another"
+IS_BLANK = (
+    "the reference burst cannot be measured (picture 3 of 8 is blank or has less than half the contrast of another; "
+    "look at light and cable)"
+)
 UNSEEN = "the reference burst cannot be measured (fast motion, glare, no focus?)"
 
 
@@ -90,6 +96,7 @@ UNSEEN = "the reference burst cannot be measured (fast motion, glare, no focus?)
         ((math.nan, math.nan, math.nan, math.nan, 0.01), 4,
          [("warning", f"{UNSEEN}; taking another")] * 2
          + [("error", f"{UNSEEN}; tried again until the picture is still")]),
+        ((BLANK, BLANK, 0.01), 2, [("warning", f"{IS_BLANK}; taking another")] * 2),
         ((math.nan, math.nan, math.nan, math.nan, 0.2), 4,
          [("warning", f"{UNSEEN}; taking another")] * 2
          + [("error", f"{UNSEEN}; tried again until the picture is still"), ("warning", MOVED.format(0.2))]),
@@ -109,8 +116,11 @@ def test_a_reference_that_moves_is_taken_again_twice_and_one_that_is_not_seen_un
     assert (counts.reference, counts.left_out) == (N, used * N) and counts.adds_up
 
 
-def test_a_run_that_ends_before_a_reference_can_be_measured_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = References(math.nan)
+@pytest.mark.parametrize("motion", [math.nan, BLANK])
+def test_a_run_that_ends_before_a_reference_can_be_measured_has_none(
+    monkeypatch: pytest.MonkeyPatch, motion: float
+) -> None:
+    bench = References(motion)
     assert bench.taken(monkeypatch) is None
     assert bench.told()[-1][1].startswith("no reference could be measured")
     empty = References()
@@ -158,14 +168,16 @@ def test_each_measurement_is_counted_told_and_published(monkeypatch: pytest.Monk
     made = [make_measurement(k) for k in range(2)]
     made[1] = replace(made[1], burst=replace(made[1].burst, motion_px=0.3))
     ready: Any = SimpleNamespace(measurements=lambda *given: iter(made))
-    queue: Any = SimpleNamespace(bursts=lambda: None)
+    queue: Any = SimpleNamespace(bursts=lambda: None, newest_only=False)
     state.health.fps, stream = 80.0, Stream()
 
     def note(record: Any) -> None:
         order.append((record.body.number, round(record.body.time_step.latency_s, 6)))
 
     Noted(stream, Measurement, each=note)
-    monitor: Any = SimpleNamespace(check=lambda sample, period_s: order.append(period_s) or "", p95_s=0.2)
+    monitor: Any = SimpleNamespace(
+        check=lambda sample, period_s, newest_only: order.append(period_s) or "", p95_s=0.2
+    )
     prepared: Any = SimpleNamespace(folder=Path())
     Measurer(prepared, state, queue, monitor, stream, StopSignal())._measure(ready)
     assert order == [(0, 0.465), 0.1, (1, 0.365), 0.1]
@@ -181,11 +193,11 @@ def test_the_latency_is_judged_by_the_period_of_the_bursts(latency_s: float) -> 
     """8 frames at 20 a second."""
     asked: list[tuple[LatencySample, float]] = []
 
-    def check(sample: LatencySample, period_s: float) -> str:
+    def check(sample: LatencySample, period_s: float, *, newest_only: bool) -> str:
         asked.append((sample, period_s))
         return "results come late"
 
-    state, nothing = RunState.new(0.5), SimpleNamespace()
+    state, nothing = RunState.new(0.5), SimpleNamespace(newest_only=False)
     monitor: Any = SimpleNamespace(check=check, p95_s=0.044)
     state.health.fps = 20.0
     thread = Measurer(nothing, state, nothing, monitor, nothing, nothing)  # type: ignore[arg-type]

@@ -82,6 +82,17 @@ def test_events_count_from_the_start_and_are_bounded(run: RunFolder, monkeypatch
     assert "No events were recorded." in plain(events(run))
 
 
+def test_repeated_events_are_one_line_with_their_number_and_the_time_of_the_last(run: RunFolder) -> None:
+    start = run.start_monotonic
+    run.__dict__["events"] = [
+        Event(start + t, EventKind.ALARM, "alarm", f"alarm high: force is {t} N", "warning")
+        for t in range(1494)
+    ]
+    found = plain(events(run))
+    assert found.count("alarm high") == 4
+    assert "|1493.000|warning|alarm|alarm|alarm high: force is 1493 N (1,494 times)|" in found
+
+
 def test_versions_then_and_now(run: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(record, "versions", lambda: {"phasedic": "9.9", "numpy": "2"})
     found = plain(version_table(run))

@@ -74,7 +74,7 @@ def test_verbose_has_all(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("strains", "loads", "why"),
     [
-        (PULLED, False, "no force is known (--load)"),
+        (PULLED, False, "no force is known"),
         (
             (0.0, 1e-5, 2e-5),
             True,

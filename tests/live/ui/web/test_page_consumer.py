@@ -97,6 +97,10 @@ def test_the_state_of_a_run(config: Config) -> None:
     assert state["gauges"][1] == {"name": "b", "value": None, "sigma": None, "reason": "lost", "part": ""}
     assert state["part"] == state["gauges"][0]["part"] == "of 83 % of the area"
     assert state["events"][0]["level"] == "error" and "\x1b" not in state["events"][0]["text"]
+    for k in range(4555):
+        consumer.event(Event(0.0, EventKind.ALARM, "alarm", f"force is {k} N", "warning"))
+    shown = consumer.state()["events"]
+    assert len(shown) == 5 and shown[-1]["text"] == "alarm: force is 4554 N (4,555 times)"
 
 
 def test_the_map_is_drawn_only_while_a_page_is_open(config: Config) -> None:

@@ -1,0 +1,82 @@
+"""What a person asks of a test: can its figures be believed, what is missing, and what to type for it.
+
+Summary and report show the same lines, made of the figures and checks that ``figures.json`` has.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from live.results.finished.findings import NO_FORCE, DataCheck, changes
+from live.results.finished.finished_test import FinishedTest
+from live.results.run_folder import SESSION
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredAgain:
+    """How the test can be measured once more.
+
+    Attributes
+    ----------
+    command : str
+        That measures it again; words where no recording is there.
+    n_frames : float
+        Frames in a burst.
+    skipped : int
+        Frames of bursts that were recorded and not measured; 0 where they were not recorded.
+    """
+
+    command: str
+    n_frames: float = 1.0
+    skipped: int = 0
+
+    @classmethod
+    def of(cls, folder: Path, n_frames: float, skipped: int) -> MeasuredAgain:
+        """Of a run or replay in ``folder``."""
+        if not (folder / SESSION).exists():
+            return cls("the same command with", n_frames)
+        return cls(f"phasedic replay {shlex.quote(str(folder))}", n_frames, skipped)
+
+
+def checks_line(found: Sequence[DataCheck]) -> str:
+    """Which checks of the data are good, which are in doubt, and which could not be made."""
+    words = {"good": "good", "doubt": "in doubt", "not checked": "not possible"}
+    names = {outcome: [one.name for one in found if one.outcome == outcome] for outcome in words}
+    without = [one for one in found if one.text == NO_FORCE]
+    if without:
+        names["not checked"] = [f"{len(without)} that need a force"]
+    parts = [f"{', '.join(held)} {words[outcome]}" for outcome, held in names.items() if held]
+    return f"checks of the data: {'; '.join(parts)}"
+
+
+def missing_lines(test: FinishedTest, again: MeasuredAgain) -> Iterator[str]:
+    """What is missing for E and the rest, each with what to type."""
+    section = "" if test.specimen.area_m2 else " --section W,T"
+    if not test.has_force and not len(test.samples.t):
+        yield f"missing: forces, for E: {again.command} --load FORCES.csv{section}"
+    elif not test.has_force:
+        yield f"missing: forces at the time of the pictures, for E: {again.command} --load FORCES.csv --lag S"
+    elif not test.figures.E.known and test.figures.kind == "tensile":
+        yield _more_points(test, again)
+    elif section and test.figures.E.known:
+        yield f"missing: the section in mm, for E in GPa: {again.command}{section}"
+    if test.has_force and test.axis.assumed:
+        yield f"missing: the axis of the load ({test.axis.axis} is assumed): {again.command} --axis x or y"
+    if again.skipped:
+        yield f"missing: {again.skipped} frames came too fast to be measured: {again.command} measures them"
+
+
+def _more_points(test: FinishedTest, again: MeasuredAgain) -> str:
+    """What gives the elastic line more points."""
+    stress = test.curve.stress[np.isfinite(test.curve.stress)]
+    if not changes(stress, 0.0):
+        return "missing: a force that changes, for E: look at load cell and file of forces"
+    what = "missing: points while the force rises, for E"
+    if again.n_frames > 1:
+        return f"{what}: {again.command} --burst 1 gives {again.n_frames:.3g} times as many"
+    return f"{what}: take more pictures there, or pull more slowly"
