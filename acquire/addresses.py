@@ -64,11 +64,8 @@ def parse_address(text: str) -> Address:
     """
     if not text.strip():
         raise ConfigError("an address is empty; give for example sim:, /dev/video0 or files:shots/*.tif")
-    found = _SETTINGS.search(text)
-    if found and _is_there(text):
-        found = None
-    body = text[: found.start()] if found else text
-    pairs = [pair.partition("=") for pair in found[1].split("&")] if found else []
+    body, given = _apart(text)
+    pairs = [pair.partition("=") for pair in given.split("&")] if given else []
     settings = tuple((key, unquote(value)) for key, _, value in pairs)
     if len({key for key, _ in settings}) < len(settings):
         raise ConfigError("{text}: a setting is given twice; give each once", text)
@@ -76,6 +73,12 @@ def parse_address(text: str) -> Address:
     if not scheme:
         return Address(text, "", body, settings)
     return Address(text, scheme[1].lower(), body[scheme.end() :], settings)
+
+
+def _apart(text: str) -> tuple[str, str]:
+    """An address before its settings, and the settings; a ``?`` of a pattern of names belongs to the first."""
+    found = _SETTINGS.search(text)
+    return (text, "") if not found or _is_there(text) else (text[: found.start()], found[1])
 
 
 def _is_there(text: str) -> bool:
@@ -91,7 +94,7 @@ def _is_there(text: str) -> bool:
 def with_setting(address: str, key: str, value: float | str) -> str:
     """The address with one setting changed; an empty text removes it."""
     changed = dict(parse_address(address).settings)
-    body = address.partition("?")[0] if changed else address
+    body = _apart(address)[0]
     changed[key] = value if isinstance(value, str) else f"{value:g}"
     settings = "&".join(f"{k}={quote(v, safe=_SAFE)}" for k, v in changed.items() if v or k != key)
     return f"{body}?{settings}" if settings else body

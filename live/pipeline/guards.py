@@ -188,9 +188,7 @@ class TiltGuard:
 
     def check(self, field: StrainField, step: TimeStep) -> None:
         """Check one field with its time step."""
-        if not max(abs(step.exx), abs(step.eyy)) < MAX_ELASTIC:
-            return
-        if self._seeks_dilatation:
+        if self._seeks_dilatation:  # of any size: of two pictures the second may show much
             noise = FALSE_STRAIN + CERTAIN * max(step.sigma_exx, step.sigma_eyy)
             false = alike(step.exx, step.eyy, noise)
             if false:
@@ -202,7 +200,7 @@ class TiltGuard:
                     abs(false),
                 )
                 self._emit(step, text, false)
-        if self._seeks_tilt:
+        if self._seeks_tilt and max(abs(step.exx), abs(step.eyy)) < MAX_ELASTIC:
             self._check_tilt(field, step)
 
     def _check_tilt(self, field: StrainField, step: TimeStep) -> None:

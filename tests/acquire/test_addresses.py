@@ -75,6 +75,9 @@ def test_what_is_no_address(text: str, words: str) -> None:
         ("sim:?fps=60", "fps", "", "sim:"),
         ("sim:?a=&fps=60", "fps", 1e6, "sim:?a=&fps=1e+06"),
         ("files:x?.tif", "gray", "luma", "files:x?.tif?gray=luma"),
+        ("files:x?.tif?gray=luma", "gray", "r", "files:x?.tif?gray=r"),
+        ("files:x?.tif?gray=luma", "gray", "", "files:x?.tif"),
+        ("files:x??/y?.tif?fps=5", "first", "a", "files:x??/y?.tif?fps=5&first=a"),
         ("ab:", "x", "a&b=c d/e,f:g", "ab:?x=a%26b%3Dc%20d/e,f:g"),
     ],
 )

@@ -71,3 +71,18 @@ def test_pages_are_listed_and_an_unknown_one_is_refused(capsys: pytest.CaptureFi
     assert "troubleshooting            Troubleshooting\n" in capsys.readouterr().out
     assert phasedic(["docs", "optcs"]) == 2
     assert "did you mean optics?" in capsys.readouterr().err
+
+
+def test_every_page_that_a_message_names_is_shown_and_stands_on_the_site(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    code = (
+        path for place in ("acquire", "analysis", "hw_mocks", "live") for path in (ROOT / place).rglob("*.py")
+    )
+    named = {page for path in code for page in re.findall(r"docs/([\w-]+\.md)", path.read_text("utf-8"))}
+    site = (ROOT / "mkdocs.yml").read_text("utf-8").partition("not_in_nav")[0]
+    assert len(named) > 8 and "optics.md" in named
+    for page in sorted(named):
+        assert phasedic(["docs", f"docs/{page}"]) == 0, page
+        assert capsys.readouterr().out == (ROOT / "docs" / page).read_text("utf-8") + "\n"
+        assert f"docs/{page}\n" in site, page

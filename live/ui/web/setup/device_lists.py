@@ -11,7 +11,8 @@ from typing import Any
 from acquire.camera import CameraListing, list_cameras
 from acquire.errors import PhasedicError
 from acquire.serial_line import identify
-from acquire.serial_line.ports import PortInfo, list_serial_ports
+from acquire.serial_line.identify import Finding
+from acquire.serial_line.ports import LineSettings, PortInfo, list_serial_ports
 from acquire.text import Message
 from acquire.text.printable import brief, printable
 
@@ -87,14 +88,30 @@ class DeviceLists:
         return (f"session:{path}" for path in files[-MAX_SESSIONS:])
 
     def _identify(self, port: str) -> None:
-        self._finding = Message("listening at all speeds …")
-        for _, _, finding in identify.listen(port):
+        self._finding, heard = Message("listening at all speeds …"), []
+        for baud, received, finding in identify.listen(port):
+            heard.append((baud, received))
             if finding is not None:
-                known = [one for one in self._loads if one["address"] != finding.address]
-                self._loads = [{"address": finding.address, "name": finding.protocol}, *known]
+                self._offer(finding)
                 self._finding = Message("found: {protocol}; choose it in the list", finding.protocol)
                 return
+        proposals = (identify.proposed(LineSettings(port, baud), received) for baud, received in heard)
+        made = next((one for one in proposals if one is not None), None)
+        if made is not None:
+            self._offer(made)
+            shown = printable(made.lines[-1].decode("ascii", "backslashreplace").strip())
+            self._finding = Message(
+                "no protocol knows lines such as {shown}: a pattern made from them is in the list; {remark}",
+                repr(shown),
+                made.remark,
+            )
+            return
         self._finding = Message("nothing recognised: check cable and power, or write the address")
+
+    def _offer(self, finding: Finding) -> None:
+        """The address of a port first in the list of load cells."""
+        known = [one for one in self._loads if one["address"] != finding.address]
+        self._loads = [{"address": finding.address, "name": finding.protocol}, *known]
 
 
 def _shown(one: CameraListing) -> dict[str, str]:

@@ -149,8 +149,28 @@ def test_the_devices_that_can_be_chosen(tmp_path: Path, monkeypatch: pytest.Monk
     assert lists.state()["loads"] == [{"address": finding.address, "name": "ascii"}, *loads]
     assert lists.state()["finding"] == "found: ascii; choose it in the list"
     monkeypatch.setattr(device_lists.identify, "listen", lambda port: iter([(0, 0, None)]))
+    monkeypatch.setattr(device_lists.identify, "proposed", lambda line, received: None)
     lists._identify("/dev/ttyUSB0")
     assert lists.state()["finding"].startswith("nothing recognised")
+
+
+def test_a_port_that_talks_and_is_not_understood_offers_a_pattern(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lists = DeviceLists(lambda: tmp_path, cameras=list, ports=list)
+    lines = b"".join(b"#%d;x=%.2f;ok\r\n" % (k % 7, 12.5 + k) for k in range(40))
+    heard = [(9600, b"\x80\x13garbage", None), (19200, lines, None)]
+    monkeypatch.setattr(device_lists.identify, "listen", lambda port: iter(heard))
+    lists._identify("/dev/ttyUSB0")
+    (offered,) = lists.state()["loads"]
+    assert offered["name"] == "lines"
+    assert (
+        offered["address"].startswith("/dev/ttyUSB0?protocol=lines&baud=19200&")
+        and "pattern=" in offered["address"]
+    )
+    found = lists.state()["finding"]
+    assert "x=51.50" in found and "a pattern made from them is in the list" in found
+    assert "is read as" in found
 
 
 @pytest.mark.parametrize(
