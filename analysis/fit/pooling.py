@@ -40,7 +40,7 @@ SHOWN = 8
 BENT, SOME_BENT = 4.0, 0.1
 """What a fit leaves of a displacement that bends, over the median of noise, that one ZOI in a hundred exceeds by
 chance; share of the ZOIs that bend from which on those that do not are pooled alone, ..."""
-STRAIGHT_COLOUR = 1.15, 1.5
+STRAIGHT_COLOUR = 1.3, 1.7
 """... as long as they are one in ``LOWEST`` and show no more colour than the first: coloured errors bend all. Towards
 the second, more and more all of them count; a step would judge pictures near it now twice as mildly, now not."""
 WHITE_BENT = 0.83
@@ -53,6 +53,8 @@ AS_STATED = 1.1
 """... leave no more than this of what the noise as stated explains, what the others leave more is their own: blur or
 glare on a part of the picture."""
 MAD = 1.4826
+SAMPLE, AROUND = 512, 0.1
+"""Of many values so many show where their median is, to this share of them on either side."""
 
 
 def pooled(
@@ -120,22 +122,49 @@ def _common(out: Floats, known: ReferenceArgs, every: int, given: bool) -> Poole
         stated = stated._replace(bent=bent)
         return stated if np.abs(np.log(colour)).max() < np.log(COLOURED) else stated._replace(colour=colour)
     trend, of_each = _at(known.signal, middle, usual), _at(contrast, middle, usual)
-    scatter = MAD * float(np.median(np.abs(ratio / of_each - 1)))
+    scatter = MAD * median(np.abs(ratio / of_each - 1))
     lowest = _lowest(ratio[groups], spread[groups])
     as_stated = (lowest < AS_STATED) | (np.median(lowest) < AS_STATED)
     common = np.where(as_stated, np.minimum(usual, 1.0), usual)
     forgiven = trend if np.array_equal(common, usual) else _at(known.signal, middle, common)
     colour = _shrunk(medians(shares / of_each), number)
-    return PooledError(trend, forgiven, float(np.median(trend)), scatter, colour, bent, False)
+    return PooledError(trend, forgiven, median(trend), scatter, colour, bent, False)
+
+
+def median(values: Floats) -> float:
+    """The median of (N,) finite values."""
+    return float(medians(np.ascontiguousarray(values)[None])[0])
 
 
 @helper
 def medians(rows: Any) -> Any:
-    """The median of each row of (K, N), (K,)."""
+    """The median of each row of (K, N) finite values, (K,)."""
     out = np.empty(len(rows))
     for i in range(len(rows)):
-        out[i] = np.median(rows[i])
+        out[i] = np.median(_middle(rows[i]))
     return out
+
+
+@helper
+def _middle(values: Any) -> Any:
+    """Some of many values, and infinite ones, that have the same median: those that a sample shows to be near it."""
+    n = len(values)
+    if n < 4 * SAMPLE:
+        return values
+    some = np.sort(values[:: n // SAMPLE].copy())
+    low, high = some[int((0.5 - AROUND) * len(some))], some[int((0.5 + AROUND) * len(some))]
+    out, count, below, above = np.empty(n), 0, 0, 0
+    for k in range(n):
+        value = values[k]
+        out[count] = value
+        below += value < low
+        above += value > high
+        count = k + 1 - below - above
+    if abs(below - above) > count - 2:  # not near it
+        return values
+    end = count + abs(below - above)
+    out[count:end] = -np.inf if below > above else np.inf
+    return out[:end]
 
 
 @helper
@@ -189,9 +218,20 @@ def _straight(out: Floats, white: Floats) -> tuple[NDArray[np.bool_], float]:
 
 def _at(contrast: Floats, middle: Floats, values: Floats) -> Floats:
     """What holds for groups of middle contrasts, at each contrast."""
-    if values.min() == values.max():
-        return np.full(len(contrast), values[0])
-    return np.asarray(np.interp(contrast, middle, values))
+    out = np.full(len(contrast), values[0])
+    if values.min() < values.max():
+        interpolate(contrast, middle, values, out)
+    return out
+
+
+@helper
+def interpolate(x: Any, at: Any, values: Any, out: Any) -> None:
+    """``np.interp`` between few places (G,), which are in order, written to ``out``: in vectors."""
+    out[:] = values[0]
+    for k in range(len(at)):
+        slope = (values[k + 1] - values[k]) / (at[k + 1] - at[k]) if k + 1 < len(at) else 0.0
+        for n in range(len(x)):
+            out[n] = values[k] + slope * (x[n] - at[k]) if x[n] >= at[k] else out[n]
 
 
 def _alike(count: int) -> NDArray[np.intp]:

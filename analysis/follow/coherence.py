@@ -65,10 +65,13 @@ def stand_out(p: Any, variance: Any, step: float, ok: Any, out: Any) -> None:
 @helper
 def _stand_out_in_row(p: Any, variance: Any, step: float, ok: Any, r: int, out: Any) -> None:
     rows, columns = ok.shape
+    smooth = np.zeros(columns, np.bool_)
+    if 2 <= r < rows - 2 and columns > 4:
+        _smooth_in_row(p, variance, r, smooth)
     for c in range(columns):
-        inner = 2 <= r < rows - 2 and 2 <= c < columns - 2
-        if not ok[r, c] or (inner and _is_smooth(p, variance, r, c)):
+        if not ok[r, c] or smooth[c]:
             continue
+        inner = 2 <= r < rows - 2 and 2 <= c < columns - 2
         if _is_supported(p, variance, step, ok, r, c):
             out[c] = inner * ROUGH
         elif _lies_off(p[0], variance[0, r, c], ok, r, c) or _lies_off(p[3], variance[15, r, c], ok, r, c):
@@ -78,15 +81,19 @@ def _stand_out_in_row(p: Any, variance: Any, step: float, ok: Any, r: int, out: 
 
 
 @helper
-def _is_smooth(p: Any, variance: Any, r: int, c: int) -> Any:
-    """Whether a ZOI with all its neighbours lies where plain least squares expect it."""
-    u, v = p[0, r, c], p[3, r, c]
+def _smooth_in_row(p: Any, variance: Any, r: int, out: Any) -> None:
+    """Which ZOIs of a row, with all their neighbours, lie where plain least squares expect them, but the ends."""
+    count = len(out) - 4
+    u, v = p[0, r, 2:-2].copy(), p[3, r, 2:-2].copy()
     for y in range(5):
         for x in range(5):
-            u -= _WEIGHTS[y, x] * p[0, r + y - 2, c + x - 2]
-            v -= _WEIGHTS[y, x] * p[3, r + y - 2, c + x - 2]
-    sigma = math.sqrt(max(variance[0, r, c], variance[15, r, c]))
-    return max(abs(u), abs(v)) <= ALLOWED_PX + ALLOWED_SIGMAS * sigma
+            weight = _WEIGHTS[y, x]
+            for c in range(count):
+                u[c] -= weight * p[0, r + y - 2, c + x]
+                v[c] -= weight * p[3, r + y - 2, c + x]
+    for c in range(count):
+        sigma = math.sqrt(max(variance[0, r, c + 2], variance[15, r, c + 2]))
+        out[c + 2] = max(abs(u[c]), abs(v[c])) <= ALLOWED_PX + ALLOWED_SIGMAS * sigma
 
 
 @helper

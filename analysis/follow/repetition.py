@@ -31,8 +31,8 @@ MAX_PEAKS = 4
 """The nearest ones of a tile; longer ones are sums of them."""
 NEAR = 0.6
 """Sides of a tile from its centre within which a ZOI may repeat with it."""
-FAR_PIXELS = 4_000_000
-"""Pixels from which on a picture is halved before farther displacements are sought."""
+FAR_PIXELS = 1_000_000, 16_000_000
+"""Pixels from which on a picture is halved before farther displacements are sought, and halved once more."""
 SLOWEST_PX = 64.0
 """Longest wave that counts there: light and background are slower."""
 FAR_PEAK = 0.25
@@ -137,12 +137,10 @@ def _far_peaks(image: Image, region: Roi, reach: int) -> list[tuple[int, int]]:
     """Displacements beyond ``reach`` px at which a region looks like the picture, the nearest first."""
     from scipy.fft import irfft2, rfft2
 
-    times = 1
-    while image.size > FAR_PIXELS * times**2:
-        times *= 2
+    times = 2 ** int(np.searchsorted(FAR_PIXELS, image.size))
     height, width = (n // times for n in image.shape)
-    small = image[: height * times, : width * times].reshape(height, times, width, times).mean(axis=(1, 3))
-    small, spectrum = _without_slow(small, SLOWEST_PX / times)
+    parts = [image[i::times, k::times][:height, :width] for i in range(times) for k in range(times)]
+    small, spectrum = _without_slow(sum(parts[1:], parts[0]) / np.float32(times**2), SLOWEST_PX / times)
     top, left = region.y // times, region.x // times
     rows, columns = max(region.height // times, 1), max(region.width // times, 1)
     part = np.zeros_like(small)
@@ -181,8 +179,8 @@ def _without_slow(image: Image, slowest: float) -> tuple[Image, NDArray[np.compl
     from scipy.fft import fftfreq, irfft2, rfft2, rfftfreq
 
     height, width = image.shape
-    fast = np.hypot(fftfreq(height)[:, None], rfftfreq(width)[None]) * slowest > 1
-    spectrum = rfft2(image) * fast
+    spectrum, some = rfft2(image), int(width / slowest) + 1
+    spectrum[:, :some] *= np.hypot(fftfreq(height)[:, None], rfftfreq(width)[None, :some]) * slowest > 1
     return np.asarray(irfft2(spectrum, image.shape), np.float32), spectrum
 
 
@@ -233,7 +231,8 @@ def _correlation(tile: Image) -> Image:
 
     side = len(tile)
     reach = int(REACH * side)
-    power = (np.abs(rfft2(tile)) ** 2).astype(np.complex64)
+    spectrum = rfft2(tile)
+    power = (spectrum.real**2 + spectrum.imag**2).astype(np.complex64)
     down = ifft(power, axis=0, norm="forward", overwrite_x=True)[: reach + 1]
     product = irfft(down, n=side, norm="forward") * np.float32(1 / np.longdouble(side * side))
     return np.concatenate([product[:, side - reach :], product[:, : reach + 1]], axis=1)

@@ -77,7 +77,7 @@ def field_of(solution: Solution, predicted: PredictedMotion | None = None) -> St
         None: the field has no motion.
     """
     from analysis.fit.assembly import weigh, weigh_blur
-    from analysis.fit.pooling import medians
+    from analysis.fit.pooling import median
 
     reference, found = solution.reference, solution.found
     ok = solution.status == Status.OK
@@ -117,7 +117,7 @@ def field_of(solution: Solution, predicted: PredictedMotion | None = None) -> St
         status=reference.spread(solution.status[:, None], Status.NOT_MEASURED)[0],
         iterations=reference.spread(found.iterations[:, None], 0)[0],
         gain=reference.spread(gain[:, None].astype(np.float32))[0],
-        noise=math.sqrt(medians(noise.current[ok][None])[0]) if ok.any() else float("nan"),
+        noise=math.sqrt(median(noise.current[ok])) if ok.any() else float("nan"),
         window=reference.settings.window,
         motion=None if predicted is None else _motion(solution, values, predicted),
         sums=reference.sums,
@@ -164,6 +164,8 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_], expected: ExpectedNo
 
     ``expected`` is the noise as stated.
     """
+    from analysis.fit.pooling import median
+
     gain, white = solution.found.nuisance[:, 0], np.ones(6)
     reference, current = solution.variances(np.s_[:], solution.found.nuisance)
     common = solution.common
@@ -171,16 +173,16 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_], expected: ExpectedNo
         common = solution.pooled(np.flatnonzero(ok))
     if common is not None:
         share = _left_of_felt(solution, common, expected)
-        ratio, usual, some_left = common.ratio / share, float(np.median(share[ok])), None
+        ratio, usual, some_left = common.ratio / share, median(share[ok]), None
         seen = common.colour * usual
-        colour, over = seen.repeat(3), common.usual / usual if ok.all() else float(np.median(ratio[ok]))
+        colour, over = seen.repeat(3), common.usual / usual if ok.all() else median(ratio[ok])
         doubtful = max(colour.max(), over) > DOUBTFUL and not (common.apart or solution.had_lines)
         rest = beside_strain(solution, ok) if doubtful else None
         if rest is not None:
             over = 1.0 if solution.is_given and AGREES[0] < rest < AGREES[1] else rest
             seen = np.minimum(seen, 1)  # what bends adds to the shapes
             colour, ratio = seen.repeat(3), np.full(len(ok), over)
-        if colour.min() < 1 and abs(float(np.median(solution.found.nuisance[ok, 2]))) > SOME_BLUR:
+        if colour.min() < 1 and abs(median(solution.found.nuisance[ok, 2])) > SOME_BLUR:
             # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
             colour = np.maximum(colour, 1)
         elif np.abs(np.log(seen)).max() > np.log(COLOURED):
@@ -192,7 +194,7 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_], expected: ExpectedNo
     if solution.noise is not None or not ok.any():
         return _Noise(reference, current, white, float("nan"), white[:2])
     left = solution.found.left / solution.reference.prepared.freedom
-    found = max(float(np.median(left[ok])), solution.rounding)
+    found = max(median(left[ok]), solution.rounding)
     whole = np.full(len(ok), found)
     return _Noise(*_parted(whole, reference, np.ones(len(ok)), solution), white, float("nan"), white[:2])
 

@@ -237,7 +237,7 @@ class Solution:
         left = self._left(which, found)
         most = 2 * len(found.p) > len(self._places[0])  # some that are retried forgive nothing
         if self.common is None and most:
-            self.common = self._pooled(which, found, left, expected)
+            self.common = self._pooled(which, found, left, expected, known)
         common = PooledError.none(len(known.signal)) if self.common is None else self.common
         status = np.empty(len(found.p), np.uint8)
         judge(found, left, expected, common.at(which), known.at(which), rule, status)
@@ -247,13 +247,15 @@ class Solution:
         """What the fits of the ZOIs ``which``, as they are kept, leave in common."""
         found = self.found.at(which)
         expected = self.expected(which, found.nuisance).felt
-        return self._pooled(which, found, self._left(which, found), expected)
+        return self._pooled(which, found, self._left(which, found), expected, self._known)
 
-    def _pooled(self, which: Places, found: OutArgs, left: Floats, expected: Floats) -> PooledError | None:
+    def _pooled(
+        self, which: Places, found: OutArgs, left: Floats, expected: Floats, known: ReferenceArgs
+    ) -> PooledError | None:
         from analysis.fit.pooling import pooled
 
         places = np.arange(len(self.guess))[which]
-        return pooled(found, left, expected, self._known, places, self.is_given)
+        return pooled(found, left, expected, known, places, self.is_given)
 
     @property
     def noise_taken(self) -> Floats:

@@ -51,7 +51,7 @@ def _loops(phase: bool) -> list[Any]:
         sensitivity.prepare, iteration.track, shared.share_warps, block_match.match, hill_climb.climb,
         prediction.advance, verdict.judge, coherence.stand_out, coherence.label,
         assembly.expect, assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.medians,
-        assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
+        pooling.interpolate, assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
     ]  # fmt: skip
     return loops + [iteration.compose_all, iteration.within_image] * phase
 
@@ -201,7 +201,7 @@ def _rest() -> None:
     from analysis.fit.assembly import ExpectedNoise, clipped_share, expect, scale, weigh, weigh_blur
     from analysis.fit.iteration import warp_zois
     from analysis.fit.kernel_args import OutArgs, PooledError, ReferenceArgs, VerdictArgs
-    from analysis.fit.pooling import explained, medians
+    from analysis.fit.pooling import explained, interpolate, median
     from analysis.fit.verdict import judge
     from analysis.follow.parts import coherent
     from analysis.follow.prediction import motion_after
@@ -225,7 +225,8 @@ def _rest() -> None:
     rule = VerdictArgs(True, np.empty(2), 1.0, 0.05, 4.0, 6.0)
     judge(found, none, none, PooledError.none(0), known, rule, np.empty(0, np.uint8))
     explained(found, none, none, known, np.empty(0, np.intp), 1, pairs)
-    medians(np.ones((2, 2)))
+    median(np.ones(2))
+    interpolate(np.ones(1), np.arange(2.0), np.ones(2), np.ones(1))
     weigh_blur(single, single, single)
     expected = ExpectedNoise(np.empty(2), np.empty(2))
     expect(np.ones(2), (0.5, 0.5), np.ones(2), np.ones(2), 0.0, expected)

@@ -84,11 +84,12 @@ def filtered_pattern(
     radius, power = _radial_spectrum(image, np.float32(mean), room[0])
     floor = float(np.median(power[radius > NOISE_BAND]))
     variance = floor if noise is None else noise**2
-    spectrum, work = (part[: height * (width // 2 + 1)].reshape(height, -1) for part in room)
     gain = radius, wiener_gain(radius, power, variance)
+    kept = _passed(gain, width)
+    spectrum, work = (part[: height * kept].reshape(height, -1) for part in room)
     response = _filtered_spectrum(image, np.float32(mean), places, gain, spectrum)
     along_y = _gradient_response(degree, height)[:, None]
-    along_x = _gradient_response(degree, width)[None, : width // 2 + 1]
+    along_x = _gradient_response(degree, width)[None, :kept]
     of_noise = _of_noise(response, along_x, width, work)
     grad_x, grad_y, level = out or (np.empty(image.shape, np.float32) for _ in range(3))
     for to, along in ((grad_x, along_x), (grad_y, along_y)):
@@ -118,17 +119,18 @@ def _filtered_spectrum(
 ) -> Image:
     """The spectrum of an image less ``mean``, padded and filtered, is written to ``spectrum``; returns the filter.
 
-    ``gain`` are radii (cycles/px) and the gain there.
+    Both have the columns that the filter passes. ``gain`` are radii (cycles/px) and the gain there.
     """
     from scipy import fft
 
-    height, width = (len(place) for place in places)
-    ky, kx = np.fft.fftfreq(height)[:, None], np.fft.rfftfreq(width)[None, :]
+    (height, width), kept = (len(place) for place in places), spectrum.shape[1]
+    ky, kx = np.fft.fftfreq(height)[:, None], np.fft.rfftfreq(width)[None, :kept]
     for rows in _some_rows(height):
-        spectrum[rows] = fft.rfft((image[places[0][rows]] - mean).take(places[1], axis=1), workers=2)
+        padded = (image[places[0][rows]] - mean).take(places[1], axis=1)
+        spectrum[rows] = fft.rfft(padded, workers=2)[:, :kept]
     fft.fft(spectrum, axis=0, overwrite_x=True, workers=2)
-    response = np.empty(spectrum.shape, np.float32)
-    for rows in _some_rows(height // 2 + 1):
+    response = np.zeros(spectrum.shape, np.float32)
+    for rows in _some_rows(_passed(gain, height)):
         response[rows] = np.interp(np.hypot(ky[rows], kx), *gain)
     response[height // 2 + 1 :] = response[1 : (height + 1) // 2][::-1]  # of the frequencies below zero
     for rows in _some_rows(height):
@@ -136,22 +138,32 @@ def _filtered_spectrum(
     return response
 
 
+def _passed(gain: tuple[Floats, Floats], length: int) -> int:
+    """How many frequencies along a side, from 0 on, a filter (``_filtered_spectrum``) passes."""
+    radius, passes = gain
+    end = radius[min(int(np.flatnonzero(passes).max(initial=0)) + 1, len(radius) - 1)]
+    return min(int(end * length) + 1, length // 2 + 1)
+
+
 def _of_noise(
     response: Image, along_x: NDArray[np.complex64], width: int, room: NDArray[np.complex64]
 ) -> tuple[float, Floats, float]:
     """``left_gradient``, ``own_noise`` and ``left_level`` of a filter (``Pattern``); ``room`` has its shape."""
+    kept = response.shape[1]
+    share = kept / (width // 2 + 1)
     floats = room.view(np.float32).reshape(-1)[: response.size].reshape(response.shape)
     for rows in _some_rows(len(response)):
         floats[rows] = np.abs(response[rows] * along_x) ** 2
     left = float(np.mean(floats))
     doubles = room.view(np.float64)
-    kx, ky = np.fft.rfftfreq(width)[None, :], np.fft.fftfreq(len(response))[:, None]
+    kx, ky = np.fft.rfftfreq(width)[None, :kept], np.fft.fftfreq(len(response))[:, None]
     own = [np.mean(response)]
     for k in (kx, ky):
         np.multiply(response, 2 * np.cos(2 * np.pi * k) - 2, out=doubles)
         own.append(np.mean(doubles))
     np.multiply(response, response, out=floats)
-    return left, np.array(own, np.float64), float(np.mean(floats, dtype=np.float64))
+    level = float(np.mean(floats, dtype=np.float64))
+    return share * left, share * np.array(own, np.float64), share * level
 
 
 def _back(spectrum: NDArray[np.complex64], width: int, out: Image) -> None:

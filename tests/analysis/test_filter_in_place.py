@@ -66,3 +66,11 @@ def test_matrices_are_the_same_however_many_zois_are_taken_at_a_time(
             if first is not None
             else others == [None, None]
         )
+
+
+def test_frequencies_that_are_left_out_are_those_that_the_filter_does_not_pass() -> None:
+    gain = np.array([0.0, 0.1, 0.2, 0.31, 0.4]), np.array([1.0, 0.9, 0.5, 0.0, 0.0])
+    for length in (40, 101, 1350):
+        share = np.interp(np.arange(length // 2 + 1) / length, *gain)
+        assert spectrum._passed(gain, length) == np.count_nonzero(share)
+    assert [spectrum._passed((gain[0], of), 101) for of in (np.ones(5), np.zeros(5))] == [41, 11]

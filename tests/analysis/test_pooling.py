@@ -437,6 +437,22 @@ def test_a_colour_that_few_zois_show_is_nearer_to_white() -> None:
     assert pooling._shrunk(np.array([1.3, 0.8]), 9.0).tolist() == [1.0, 1.0]
 
 
+@pytest.mark.parametrize("count", [1, 2, 25, 2047, 2048, 18_001])
+def test_medians_of_many_are_exact(count: int) -> None:
+    """Also where the sample that shows about where they are misleads, and where most values are equal."""
+    rng = np.random.default_rng(count)
+    even, sampled = rng.normal(size=count), np.arange(count) % max(count // pooling.SAMPLE, 1) == 0
+    cases = even, np.sort(even), np.ones(count), np.rint(even), np.exp(5 * even), even + 9 * sampled
+    for values in cases:
+        assert pooling.median(values) == np.median(values)
+
+
+def test_between_groups_holds_what_numpy_interpolates() -> None:
+    x, at, values = np.linspace(-1, 6, 1001), np.array([0.0, 1.0, 1.0, 2.5, 5.0]), np.array([2.0, 1, 4, 4, 3])
+    assert pooling._at(x, at, values) == pytest.approx(np.interp(x, at, values), rel=1e-14)
+    assert pooling._at(x, at[:1], values[:1]).tolist() == [2.0] * len(x)
+
+
 def test_the_factor_of_a_picture_is_that_of_the_worse_of_u_and_v() -> None:
     assert PictureError(2.0, (0.25, 4.0)).factor == PictureError(2.0, (4.0, 0.25)).factor == 4.0
 
