@@ -31,7 +31,7 @@ ANALYSIS = {
     "analysis.optics": "analysis.field analysis.evaluate",
     "analysis.quality": "analysis.field analysis.picture",
     "analysis.fit": "analysis.field analysis.compiled analysis.picture",
-    "analysis.self_test": "analysis.field analysis.compiled",
+    "analysis.self_test": "analysis.field analysis.compiled acquire acquire.text",
     "analysis.kernel": "analysis.field analysis.compiled analysis.picture analysis.fit analysis.follow"
     " analysis.self_test",
     "analysis": "analysis.field analysis.kernel analysis.self_test",
