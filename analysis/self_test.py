@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.errors import Spoken
+from acquire.text import Message
 from analysis.field import Roi, Status, StrainField, Window, ZoiGrid
 
 MARGIN = 24
@@ -235,7 +237,7 @@ _CHECKS: dict[str, Callable[[], bool]] = {
 }
 
 
-class MachineError(RuntimeError):
+class MachineError(Spoken, RuntimeError):
     """This machine computes wrong numbers: nothing may be measured on it."""
 
 
@@ -257,7 +259,7 @@ def check(measure: Measure, case: SelfTestCase) -> None:
 def _check_algebra() -> None:
     wrong = algebra_fault()
     if wrong:
-        raise MachineError(f"{wrong} gives a wrong result on this machine; {_what_to_do()}")
+        raise MachineError("{fault} gives a wrong result on this machine; {advice}", wrong, _what_to_do())
 
 
 @lru_cache(maxsize=256)
@@ -265,8 +267,10 @@ def _check_measuring(measure: Measure, case: SelfTestCase) -> None:
     wrong = measuring_fault(measure, case)
     if wrong:
         raise MachineError(
-            f"this machine does not measure a known pattern right (self-test with ZOIs of {case.size} px: {wrong}); "
-            f"{_what_to_do()}"
+            "this machine does not measure a known pattern right (self-test with ZOIs of {size} px: {fault}); {advice}",
+            case.size,
+            wrong,
+            _what_to_do(),
         )
 
 
@@ -279,24 +283,33 @@ def measuring_fault(measure: Measure, case: SelfTestCase) -> str:
         return f"{type(error).__name__}: {error}"
     allowed = limits(case)
     if found.refused:
-        return f"{found.refused} of 4 ZOIs have no value"
+        return Message("{n} of 4 ZOIs have no value", found.refused)
     if not (found.gradient <= allowed.gradient and found.noise <= allowed.noise):
-        return (
-            f"what sigma is made of: gradients or their sums {found.gradient:.1%} off, limit {allowed.gradient:.1%}, "
-            f"noise {found.noise:.2g} GL, limit {allowed.noise:.2g}"
+        return Message(
+            "what sigma is made of: gradients or their sums {gradient:.1%} off, limit {most_gradient:.1%},"
+            " noise {noise:.2g} GL, limit {most_noise:.2g}",
+            found.gradient,
+            allowed.gradient,
+            found.noise,
+            allowed.noise,
         )
     if found.length <= allowed.length and found.slope <= allowed.slope:
         return ""
-    return (
-        f"displacements {found.length:.4f} px off, limit {allowed.length:g}, "
-        f"strains {found.slope * 1e6:.0f} um/m off, limit {allowed.slope * 1e6:.0f}"
+    return Message(
+        "displacements {length:.4f} px off, limit {most_length:g},"
+        " strains {slope:.0f} um/m off, limit {most_slope:.0f}",
+        found.length,
+        allowed.length,
+        found.slope * 1e6,
+        allowed.slope * 1e6,
     )
 
 
 def _what_to_do() -> str:
-    return (
-        f"nothing is measured with {libraries()}; install other versions of these, or use another machine "
-        "(under an emulator: another emulated processor)"
+    return Message(
+        "nothing is measured with {libraries}; install other versions of these, or use another machine"
+        " (under an emulator: another emulated processor)",
+        libraries(),
     )
 
 

@@ -314,7 +314,9 @@ def _plates(options: Options) -> tuple[Box, ...]:
         found = [()]
     if not all(len(plate) == 4 and plate[2] > 0 and plate[3] > 0 for plate in found):
         raise ConfigError(
-            f"{options.address.text}: plates={text} is not possible; allowed: x,y,width,height in px,"
-            " with a semicolon between two plates"
+            "{address}: plates={given} is not possible; allowed: x,y,width,height in px, with a semicolon between two"
+            " plates",
+            options.address.text,
+            text,
         )
     return tuple((plate[0], plate[1], plate[2], plate[3]) for plate in found)

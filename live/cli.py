@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.text import Message
+from acquire.text.message import about
 from acquire.text.printable import brief, printable
 from live.commands.arguments import Command, parse
 from live.commands.environment import check_environment, limit_resources
@@ -112,12 +114,13 @@ def _run(command: Command, arguments: argparse.Namespace) -> int:
 
 def _system_error(error: OSError) -> PhasedicError:
     """What the system refused, and what to do; the one place for files that no other message covers."""
-    name = error.filename if isinstance(error.filename, str | bytes | os.PathLike) else ""
-    what = f"{os.fsdecode(name)}: " if name else ""
+    name = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes | os.PathLike) else ""
     why = error.strerror or str(error)
     if error.errno in _WRONG_PATH:
-        return ConfigError(f"{what[:200]}{why}; give another name")
-    return DataError(f"{what}{why}; check the path, the permissions and the room on the disk")
+        text = Message("{why}; give another name", why)
+        return ConfigError(about(name[:200], text) if name else text)
+    text = Message("{why}; check the path, the permissions and the room on the disk", why)
+    return DataError(about(name, text) if name else text)
 
 
 def _refused(error: PhasedicError) -> int:

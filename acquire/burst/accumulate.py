@@ -25,6 +25,7 @@ from numpy.typing import DTypeLike, NDArray
 from acquire.burst.memory import PictureMemory
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Burst, Frame, frozen
+from acquire.text import Message
 
 Made = TypeVar("Made")
 LIMIT_PX = 0.05  # above it a burst is smeared
@@ -123,7 +124,7 @@ class Accumulator(ABC, Generic[Made]):
 
     def __init__(self, n: int, *, not_before: float = -math.inf, memory: PictureMemory | None = None) -> None:
         if not 1 <= n <= MAX_FRAMES:
-            raise ConfigError(f"a burst of {n} frames is not possible; allowed: 1 to {MAX_FRAMES}")
+            raise ConfigError("a burst of {n} frames is not possible; allowed: 1 to {most}", n, MAX_FRAMES)
         self._n, self._not_before = n, not_before
         self._memory = memory or PictureMemory()
         self._times: list[float] = []
@@ -261,8 +262,10 @@ class FrameSums:
 
         if (frame.image.shape, frame.image.dtype, frame.bits) != self._kind:
             raise DataError(
-                f"frame {frame.index} is {_words(frame)}, but the burst began with {_words(self._like)}; "
-                "one burst needs frames of one kind"
+                "frame {index} is {this}, but the burst began with {first}; one burst needs frames of one kind",
+                frame.index,
+                _words(frame),
+                _words(self._like),
             )
         step = max(1, math.isqrt(frame.image.size // TILE_PIXELS))
         self.contrasts.append(float(frame.image[::step, ::step].std()))
@@ -315,7 +318,7 @@ class FrameSums:
 
 def _words(frame: Frame) -> str:
     height, width = frame.image.shape
-    return f"{width}x{height} {frame.image.dtype} with {frame.bits} bits"
+    return Message("{width}x{height} {dtype} with {bits} bits", width, height, frame.image.dtype, frame.bits)
 
 
 def average_bursts(frames: Iterable[Frame], n: int, *, not_before: float = -math.inf) -> Iterator[Burst]:
@@ -353,7 +356,9 @@ def burst_of(frames: Sequence[Frame]) -> Burst:
     bursts = list(average_bursts(frames, len(frames)))
     if not bursts:
         raise DataError(
-            f"frames {frames[0].index} to {frames[-1].index} are not {len(frames)} consecutive whole frames; "
-            "choose others"
+            "frames {first} to {last} are not {n} consecutive whole frames; choose others",
+            frames[0].index,
+            frames[-1].index,
+            len(frames),
         )
     return bursts[0]

@@ -75,8 +75,10 @@ class FlatField:
         """
         if burst.mean.shape != self.dark.shape:
             raise DataError(
-                f"the correction is for {_size(self.dark)} pictures, the camera gives {_size(burst.mean)}; "
-                "take dark and flat with this camera setting"
+                "the correction is for {own} pictures, the camera gives {given}; take dark and flat with this camera"
+                " setting",
+                _size(self.dark),
+                _size(burst.mean),
             )
         mean = (burst.mean - self.dark) * self.gain
         return replace(burst, mean=frozen(mean), clipped=frozen(burst.clipped | self.useless))
@@ -100,9 +102,11 @@ def save_mean(mean: Image, path: Path) -> None:
         It cannot be written.
     """
     if path.suffix.lower() not in (".tif", ".tiff"):
-        raise ConfigError(f"{path}: dark and flat frames are kept as TIFF; choose a name that ends in .tif")
+        raise ConfigError(
+            "{path}: dark and flat frames are kept as TIFF; choose a name that ends in .tif", path
+        )
     if path.exists():
-        raise ConfigError(f"{path} exists, and nothing is overwritten; choose another name")
+        raise ConfigError("{path} exists, and nothing is overwritten; choose another name", path)
     write_picture(path, mean.astype(np.float32))
 
 
@@ -118,8 +122,8 @@ def load_mean(path: str | None) -> Image | None:
         return None
     file = Path(path)
     if not file.exists():
-        raise DataError(f"{path}: there is no such dark or flat frame; take one with phasedic average")
+        raise DataError("{path}: there is no such dark or flat frame; take one with phasedic average", path)
     image = read_picture(file)
     if image.ndim != 2 or not np.isfinite(image).all():
-        raise DataError(f"{path}: is not a grey TIFF; take the frame anew with phasedic average")
+        raise DataError("{path}: is not a grey TIFF; take the frame anew with phasedic average", path)
     return np.asarray(image, np.float32)

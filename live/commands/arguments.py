@@ -15,8 +15,10 @@ from functools import cache
 from typing import Any
 
 from acquire.errors import PhasedicError
+from acquire.text import Message
 from live.commands.exit_codes import EXIT_CODES
 from live.commands.words import understood
+from live.words.language import said_here
 
 # Shown at the end of the help of each command; a test parses them all.
 EXAMPLES = {
@@ -145,10 +147,15 @@ def _expert_keys() -> frozenset[str]:
     return frozenset(key for key, field in options().values() if field.metadata["option"].expert)
 
 
+def bad_value(text: str, *values: Any) -> argparse.ArgumentTypeError:
+    """The error of a value that is refused, as ``Message`` takes it, in the language of the terminal."""
+    return argparse.ArgumentTypeError(said_here(Message(text, *values)))
+
+
 def not_empty(word: str) -> str:
     """``word``; an empty one is refused, as a variable of a shell that is not set gives it."""
     if not word:
-        raise argparse.ArgumentTypeError("is empty; give a value, or leave it out")
+        raise bad_value("is empty; give a value, or leave it out")
     return word
 
 
@@ -161,12 +168,13 @@ def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
     try:
         argv = understood(argv)
     except PhasedicError as error:
-        parser.error(str(error))
+        parser.error(said_here(error.text))
     wanted = next((word for word in argv if not word.startswith("-")), "")
     if wanted and wanted not in COMMANDS:
         near = difflib.get_close_matches(wanted, COMMANDS, 1)
-        meant = f" (did you mean {near[0]}?)" if near else ""
-        parser.error(f"there is no command {wanted!r}{meant}; phasedic --help lists all")
+        meant = Message(" (did you mean {near}?)", near[0]) if near else ""
+        text = Message("there is no command {name}{meant}; phasedic --help lists all", repr(wanted), meant)
+        parser.error(said_here(text))
     arguments = parser.parse_args(argv)
     command: Command = importlib.import_module(COMMANDS[arguments.command].module).command
     return command, arguments

@@ -35,7 +35,9 @@ def command(arguments: argparse.Namespace) -> int:
     finally:
         rig.close()
     if burst is None:
-        raise DataError(f"{arguments.camera}: gave fewer than {arguments.frames} frames without a gap")
+        raise DataError(
+            "{camera}: gave fewer than {n} frames without a gap", arguments.camera, arguments.frames
+        )
     save_mean(burst.mean, Path(arguments.out))
     noise = f", noise of one frame {burst.noise:.2f} GL" if burst.n > 1 else ""
     screen.print(f"{arguments.out}: {burst.n} frames, mean {burst.mean.mean():.1f} GL{noise}")

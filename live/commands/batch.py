@@ -68,7 +68,7 @@ def command(arguments: argparse.Namespace) -> int:
     from live.replay.batch.test_list import find_tests
 
     if arguments.workers < 1:
-        raise ConfigError(f"--workers {arguments.workers} is not possible; allowed: from 1")
+        raise ConfigError("--workers {n} is not possible; allowed: from 1", arguments.workers)
     request = CampaignRequest(
         tests=[
             replace(test, source=in_picture_order(test.source, arguments.picture_order))
@@ -100,7 +100,7 @@ def command(arguments: argparse.Namespace) -> int:
 def _chunk_s(arguments: argparse.Namespace) -> float | None:
     chunk_s: float | None = arguments.chunk_s
     if chunk_s is not None and not (math.isfinite(chunk_s) and chunk_s > 0):
-        raise ConfigError(f"--chunk {chunk_s} is not possible; allowed: seconds above 0")
+        raise ConfigError("--chunk {seconds} is not possible; allowed: seconds above 0", chunk_s)
     if chunk_s is not None and arguments.as_measured:
         raise ConfigError(
             "--as-measured is bit-identical to the live run and chunks are not; leave --chunk out"

@@ -58,5 +58,7 @@ def made_folder(folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise DataError(f"{folder} cannot be made: {error.strerror}; give another --out") from error
+        raise DataError(
+            "{folder} cannot be made: {why}; give another --out", folder, error.strerror
+        ) from error
     return folder

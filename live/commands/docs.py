@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from acquire.errors import ConfigError, DataError
+from acquire.text import Message
 
 TOP = Path(__file__).parents[2]
 
@@ -30,8 +31,8 @@ def command(arguments: argparse.Namespace) -> int:
     name = arguments.name.partition("#")[0].removeprefix("docs/").removesuffix(".md")
     if name not in pages:
         near = difflib.get_close_matches(name, pages, 1)
-        meant = f" (did you mean {near[0]}?)" if near else ""
-        raise ConfigError(f"there is no page {name!r}{meant}; phasedic docs lists all")
+        meant = Message(" (did you mean {near}?)", near[0]) if near else ""
+        raise ConfigError("there is no page {name}{meant}; phasedic docs lists all", repr(name), meant)
     text = pages[name].read_text(encoding="utf-8")
     if sys.stdout.isatty() and sys.stdin.isatty():
         pydoc.pager(text)
@@ -51,7 +52,7 @@ def shipped(name: str) -> Path:
     for folder in (TOP / "phasedic" / name, TOP / name):
         if folder.is_dir():
             return folder
-    raise DataError(f"{TOP / 'phasedic' / name} is missing; install phasedic again")
+    raise DataError("{folder} is missing; install phasedic again", TOP / "phasedic" / name)
 
 
 def _heading(path: Path) -> str:

@@ -34,7 +34,10 @@ def check_environment() -> None:
         value = os.environ.get(name, "1")
         if not (value.isascii() and value.isdecimal() and int(value) >= least):
             raise ConfigError(
-                f"{name}={value} is not possible; give a whole number from {least}, or unset the variable"
+                "{name}={value} is not possible; give a whole number from {least}, or unset the variable",
+                name,
+                value,
+                least,
             )
     if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         raise ConfigError(
@@ -59,7 +62,7 @@ def keep_loops() -> None:
         folder = private_folder("phasedic-loops")
     except OSError as error:
         raise ConfigError(
-            f"no folder can be written for compiled loops ({error}); set NUMBA_CACHE_DIR to one that can"
+            "no folder can be written for compiled loops ({why}); set NUMBA_CACHE_DIR to one that can", error
         ) from error
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
     log.warning(
@@ -76,4 +79,6 @@ def _check_threading_layer(given: str) -> None:
         threading_library()
     except (ValueError, ImportError) as error:
         why = str(error).splitlines()[0].rstrip(".")
-        raise ConfigError(f"{given} is not possible ({why}); give omp or workqueue, or unset it") from error
+        raise ConfigError(
+            "{given} is not possible ({why}); give omp or workqueue, or unset it", given, why
+        ) from error

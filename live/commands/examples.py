@@ -27,7 +27,7 @@ def command(arguments: argparse.Namespace) -> int:
 
     folder = Path(arguments.folder)
     if folder.exists() or folder.is_symlink():
-        raise ConfigError(f"{folder} exists; nothing is overwritten, choose another name")
+        raise ConfigError("{path} exists; nothing is overwritten, choose another name", folder)
     ignored = shutil.ignore_patterns("__*", "*.egg-info", "build")
     shutil.copytree(shipped("examples"), folder, ignore=ignored)
     cells = (folder / "notebook.py").read_text(encoding="utf-8").split(f"\n{CELL}")

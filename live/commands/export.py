@@ -76,9 +76,9 @@ def command(arguments: argparse.Namespace) -> int:
     _refuse_without_effect(arguments)
     arguments.fps = FPS if arguments.fps is None else arguments.fps
     if not 0.1 <= arguments.fps <= 240:
-        raise ConfigError(f"--fps {arguments.fps:g} is not possible; give 0.1 to 240")
+        raise ConfigError("--fps {fps:g} is not possible; give 0.1 to 240", arguments.fps)
     if arguments.limit is not None and not 0 < arguments.limit < math.inf:
-        raise ConfigError(f"--limit {arguments.limit:g} is not possible; give a number above 0")
+        raise ConfigError("--limit {limit:g} is not possible; give a number above 0", arguments.limit)
     screen = TerminalScreen()
     with open_run(arguments.run) as run:
         if arguments.more_gauges:
@@ -94,7 +94,10 @@ def _refuse_without_effect(arguments: argparse.Namespace) -> None:
         if getattr(arguments, name) not in (None, False) and arguments.to not in formats:
             option = f"--{name.replace('_', '-')}"
             raise ConfigError(
-                f"{option} has no effect with --to {arguments.to}; it belongs to {', '.join(formats)}"
+                "{option} has no effect with --to {format}; it belongs to {formats}",
+                option,
+                arguments.to,
+                ", ".join(formats),
             )
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from acquire.addresses import parse_address
 from acquire.errors import DeviceError
 from acquire.files.picture import write_picture
+from acquire.text.message import about, joined
 from acquire.text.printable import printable
 from live.commands.exit_codes import LOSS
 from live.commands.options import (
@@ -133,9 +134,9 @@ def _camera() -> tuple[str, str, tuple[str, ...]]:
     cameras = list_cameras()
     usable = [camera for camera in cameras if not camera.trouble]
     if not usable:
-        why = "; ".join(f"{camera.address}: {camera.trouble}" for camera in cameras) or "none is plugged in"
+        why = joined("; ", (about(one.address, one.trouble) for one in cameras)) or "none is plugged in"
         raise DeviceError(
-            f"no camera can be used ({why}); plug one in, or give --camera ADDRESS (files:shots, sim:)"
+            "no camera can be used ({why}); plug one in, or give --camera ADDRESS (files:shots, sim:)", why
         )
     first, *others = usable
     return _stable(first.address, first.stable_address), first.name, tuple(c.address for c in others)

@@ -42,7 +42,10 @@ def command(arguments: argparse.Namespace) -> int:
         rows, columns = grid.shape
         if not (0 <= row < rows and 0 <= column < columns):
             raise ConfigError(
-                f"--zoi {arguments.zoi}: the grid has rows 0 to {rows - 1} and columns 0 to {columns - 1}"
+                "--zoi {given}: the grid has rows 0 to {last_row} and columns 0 to {last_column}",
+                arguments.zoi,
+                rows - 1,
+                columns - 1,
             )
         pictures = [_picture(session, n) for n in (arguments.reference, arguments.frame)]
     left, top = int(grid.first_x[column]), int(grid.first_y[row])
@@ -63,7 +66,7 @@ def _row_and_column(text: str) -> tuple[int, int]:
     try:
         row, column = (int(part) for part in text.split(","))
     except ValueError:
-        raise ConfigError(f"--zoi {text}: give row,column of the ZOI, for example 3,5") from None
+        raise ConfigError("--zoi {given}: give row,column of the ZOI, for example 3,5", text) from None
     return row, column
 
 
@@ -86,4 +89,4 @@ def _grid_of(session: Any, arguments: argparse.Namespace) -> ZoiGrid:
     try:
         return ZoiGrid.cover(Roi(*roi), size, step)
     except ValueError as error:
-        raise DataError(f"{session.path}: {error}; give --size and --step") from error
+        raise DataError("{path}: {why}; give --size and --step", session.path, error) from error

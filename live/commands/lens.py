@@ -92,7 +92,9 @@ def _pictures(arguments: argparse.Namespace) -> Iterator[np.ndarray]:
     rig = open_rig(with_scheme(arguments.source), "none:")
     try:
         if rig.camera.info.live:
-            raise ConfigError(f"{arguments.source}: give recorded pictures of the board, as 'board/*.png'")
+            raise ConfigError(
+                "{source}: give recorded pictures of the board, as 'board/*.png'", arguments.source
+            )
         with rig.camera as camera:
             yield from (frame.image for frame in camera if not frame.damaged)
     finally:

@@ -11,6 +11,7 @@ from acquire.addresses import parse_address, with_setting
 from acquire.errors import ConfigError, DataError
 from acquire.load_cell import calibration, check, stillness
 from acquire.load_sample import LoadFlag, LoadSample
+from acquire.text import Message
 from live.commands.exit_codes import NOT_READY
 from live.setup.devices import open_load
 
@@ -76,7 +77,10 @@ def command(arguments: argparse.Namespace, print_line: PrintLine = print, ask: A
                 return found
             print_line(f"  not taken: {why_not}")
         raise DataError(
-            f"{arguments.load}: {MAX_TRIES} times {why_not}; look at it with 'phasedic load-check'"
+            "{load}: {n} times {why}; look at it with 'phasedic load-check'",
+            arguments.load,
+            MAX_TRIES,
+            why_not,
         )
 
     points = [read(0.0, "take off all load"), read(known_N, f"put on {known_N:.6g} N")]
@@ -99,7 +103,7 @@ def _unfit(samples: Sequence[LoadSample]) -> str:
     found = stillness([sample.t for sample in good], [sample.force for sample in good])
     if found.n < 3 or found.still:
         return "" if found.n else "no reading had a value"
-    return f"the load moved, by {found.range_N:.4g} on the line"
+    return Message("the load moved, by {range:.4g} on the line", found.range_N)
 
 
 def _raw(address: str) -> str:

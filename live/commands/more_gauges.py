@@ -31,7 +31,7 @@ def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
     """
     config = load_config(path, {"specimen.axis": run.specimen.axis})
     if not config.gauges:
-        raise ConfigError(f"{path}: holds no gauge; give a table [gauges.NAME] each")
+        raise ConfigError("{path}: holds no gauge; give a table [gauges.NAME] each", path)
     gauges, strain = gauges_for(config.gauges, config.specimen.first_axis, run.strain.grid), run.strain
     values, sigmas = _read(run, gauges)
     stored = run.section("gauges")

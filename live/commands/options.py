@@ -14,7 +14,8 @@ from typing import Any
 from acquire.addresses import parse_address, with_setting
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError
-from live.commands.arguments import HELP_ALL, not_empty
+from acquire.text import Message
+from live.commands.arguments import HELP_ALL, bad_value, not_empty
 from live.config.loading import Config, lens_in, load_config, options
 
 MEASURE = (
@@ -58,7 +59,8 @@ def _reader(read: Any) -> Any:
             return read(not_empty(word))
         except ValueError as error:
             kind = {int: "a whole number", float: "a number"}.get(read)
-            raise argparse.ArgumentTypeError(f"{word!r}: give {kind}" if kind else str(error)) from None
+            text = Message("{given}: give {kind}", repr(word), kind) if kind else error
+            raise bad_value("{text}", text) from None
 
     return reader
 
@@ -89,7 +91,9 @@ def in_picture_order(source: str, order: str | None) -> str:
     if order is None:
         return source
     if parse_address(with_scheme(source)).scheme != "files":
-        raise ConfigError(f"--order {order}: {source} has an order of its own; it is for pictures in files")
+        raise ConfigError(
+            "--order {order}: {source} has an order of its own; it is for pictures in files", order, source
+        )
     return with_setting(source, "order", order)
 
 
@@ -157,11 +161,15 @@ def add_gauge_option(parser: argparse.ArgumentParser) -> None:
 def require_new(path: Path, *endings: str) -> None:
     """Raises ConfigError if the file exists, its folder does not, or its name ends in none of ``endings``."""
     if path.exists() or path.is_symlink():
-        raise ConfigError(f"{path} exists; nothing is overwritten, choose another name")
+        raise ConfigError("{path} exists; nothing is overwritten, choose another name", path)
     if not path.parent.is_dir():
-        raise ConfigError(f"{path}: there is no folder {path.parent}; make it, or choose another name")
+        raise ConfigError(
+            "{path}: there is no folder {folder}; make it, or choose another name", path, path.parent
+        )
     if endings and path.suffix.lower() not in endings:
-        raise ConfigError(f"{path}: no such picture can be written; end its name in {' or '.join(endings)}")
+        raise ConfigError(
+            "{path}: no such picture can be written; end its name in {endings}", path, " or ".join(endings)
+        )
 
 
 def add_verbose(parser: argparse.ArgumentParser) -> None:
@@ -193,5 +201,5 @@ def _section(text: str) -> dict[str, float]:
     try:
         width, thickness = (float(part) for part in text.split(","))
     except ValueError:
-        raise ConfigError(f"--section {text}: give width,thickness in mm, for example 10,2") from None
+        raise ConfigError("--section {given}: give width,thickness in mm, for example 10,2", text) from None
     return {"specimen.width_mm": width, "specimen.thickness_mm": thickness}

@@ -71,7 +71,7 @@ def _of_motion(arguments: argparse.Namespace, screen: TerminalScreen) -> Readout
     )
     with open_source(request) as (source, config):
         if source.camera.clock == "nominal" and not source.camera.fps:
-            raise ConfigError(f"{arguments.source}: the pictures have no times; record a session")
+            raise ConfigError("{source}: the pictures have no times; record a session", arguments.source)
         ready = prepare_replay(source, config, arguments.source, screen)
         found = []
         for m in ready.measurements(source.bursts, source.loads, ignore_event):

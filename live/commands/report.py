@@ -9,6 +9,7 @@ from itertools import chain, count
 from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
+from acquire.text.message import about
 from live.commands.more_gauges import add_gauges
 from live.commands.options import add_gauge_option
 from live.config.cameras import BACK, FRONT, SIDES
@@ -55,7 +56,7 @@ def command(arguments: argparse.Namespace) -> int:
         raise ConfigError("give the folder of a run, or several after --compare")
     screen = TerminalScreen()
     if arguments.pdf and find_browser() is None:
-        raise ConfigError(f"--pdf: {NO_BROWSER}")
+        raise ConfigError(about("--pdf", NO_BROWSER))
     if arguments.run and not arguments.compare and cameras_in(Path(arguments.run)):
         return _of_cameras(Path(arguments.run), arguments, screen)
     with ExitStack() as opened:
@@ -83,8 +84,9 @@ def _of_cameras(folder: Path, arguments: argparse.Namespace, screen: Screen) -> 
     """Report a test with several cameras, and each camera where it has no report yet."""
     if arguments.pdf or arguments.more_gauges or arguments.times or arguments.fields:
         raise ConfigError(
-            f"{folder} has several cameras; --pdf, --gauges, --at and --field are for one, such as"
-            f" {folder / cameras_in(folder)[0]}"
+            "{folder} has several cameras; --pdf, --gauges, --at and --field are for one, such as {one}",
+            folder,
+            folder / cameras_in(folder)[0],
         )
     out = Path(arguments.out) if arguments.out else _first_free(folder / "report.html", arguments)
     check_free(*_targets(out, arguments))

@@ -88,7 +88,9 @@ def _check(arguments: argparse.Namespace) -> None:
     ways = ("points", "checkerboard", "charuco", "width")
     given = [way for way in ways if getattr(arguments, way) is not None]
     if len(given) != 1:
-        raise ConfigError(f"give one of {', '.join(f'--{way}' for way in ways)}, not {len(given)} of them")
+        raise ConfigError(
+            "give one of {options}, not {n} of them", ", ".join(f"--{way}" for way in ways), len(given)
+        )
     for name, low in (
         ("length", 0.0),
         ("square", 0.0),
@@ -98,7 +100,9 @@ def _check(arguments: argparse.Namespace) -> None:
     ):
         value = getattr(arguments, name)
         if value is not None and not low < value < math.inf:
-            raise ConfigError(f"--{name.replace('_', '-')} {value:g} is not possible; give mm above 0")
+            raise ConfigError(
+                "--{name} {value:g} is not possible; give mm above 0", name.replace("_", "-"), value
+            )
 
 
 def _scale(arguments: argparse.Namespace, config: Config, stand_off: float | None, screen: Screen) -> Scale:
@@ -136,7 +140,7 @@ def board_of(arguments: argparse.Namespace) -> Board | None:
 def _needed(arguments: argparse.Namespace, name: str) -> float:
     value: float | None = getattr(arguments, name)
     if value is None:
-        raise ConfigError(f"--{name} MM is needed with this")
+        raise ConfigError("--{name} MM is needed with this", name)
     return value
 
 
@@ -148,7 +152,7 @@ def _numbers(
     except ValueError:
         values = []
     if len(values) != count or not all(math.isfinite(value) for value in values):
-        raise ConfigError(f"{option} {text}: give {count} numbers, as {example}")
+        raise ConfigError("{option} {given}: give {n} numbers, as {example}", option, text, count, example)
     return values
 
 

@@ -44,8 +44,8 @@ def command(arguments: argparse.Namespace) -> int:
 
 def _check(arguments: argparse.Namespace) -> None:
     if arguments.every is not None and arguments.every < 1:
-        raise ConfigError(f"--every {arguments.every} is not possible; give a whole number from 1")
+        raise ConfigError("--every {n} is not possible; give a whole number from 1", arguments.every)
     if not 1024 <= arguments.port <= 65535:
-        raise ConfigError(f"--port {arguments.port} is not possible; give 1024 to 65535")
+        raise ConfigError("--port {port} is not possible; give 1024 to 65535", arguments.port)
     if arguments.rrd and Path(arguments.rrd).exists():
-        raise ConfigError(f"{arguments.rrd} exists already and is not overwritten; give another name")
+        raise ConfigError("{path} exists already and is not overwritten; give another name", arguments.rrd)

@@ -13,6 +13,7 @@ import numpy as np
 
 from acquire.errors import ConfigError
 from acquire.text.printable import counted
+from live.commands.arguments import bad_value
 from live.commands.options import (
     add_config_file,
     add_help_all,
@@ -192,16 +193,16 @@ def _numbers(word: str) -> list[int]:
     try:
         found = [int(part) for part in word.split(",")]
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{word!r}: give whole numbers, as 24,32,48") from None
+        raise bad_value("{given}: give whole numbers, as 24,32,48", repr(word)) from None
     if min(found) < 1:
-        raise argparse.ArgumentTypeError(f"{word!r}: give numbers from 1")
+        raise bad_value("{given}: give numbers from 1", repr(word))
     return found
 
 
 def _windows(word: str) -> list[str]:
     for part in word.split(","):
         if part not in WINDOWS:
-            raise argparse.ArgumentTypeError(f"{part!r}: there are {', '.join(WINDOWS)}")
+            raise bad_value("{given}: there are {known}", repr(part), ", ".join(WINDOWS))
     return word.split(",")
 
 
@@ -215,7 +216,7 @@ def _seconds(word: str) -> tuple[float, float]:
     try:
         low, high = (float(part) for part in word.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{word!r}: give two numbers, as 0,1.5") from None
+        raise bad_value("{given}: give two numbers, as 0,1.5", repr(word)) from None
     if not low < high:
-        raise argparse.ArgumentTypeError(f"{word!r}: the first must be the smaller")
+        raise bad_value("{given}: the first must be the smaller", repr(word))
     return low, high

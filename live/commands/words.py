@@ -54,7 +54,7 @@ def _joined(files: Sequence[str], of_option: bool) -> list[str]:
             return [*files[:own], source]
     example = Path(files[-1]).with_stem("*")
     raise ConfigError(
-        f"{len(files)} files are neither a folder nor a pattern; quote the pattern: '{example}'"
+        "{n} files are neither a folder nor a pattern; quote the pattern: '{example}'", len(files), example
     )
 
 

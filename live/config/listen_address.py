@@ -58,7 +58,11 @@ class ListenAddress:
             found = listening_socket(self.host, self.port)
         except OSError as error:
             raise ConfigError(
-                f"{what}: {self.host}:{self.port} cannot be listened to ({error.strerror}); choose another port"
+                "{what}: {host}:{port} cannot be listened to ({why}); choose another port",
+                what,
+                self.host,
+                self.port,
+                error.strerror,
             ) from None
         found.setblocking(False)
         return found
@@ -101,7 +105,7 @@ def private_socket(folder: Path, name: str, what: str) -> tuple[socket.socket, C
     """
     family = getattr(socket, "AF_UNIX", None)
     if family is None:
-        raise ConfigError(f"{what}: this system has no unix sockets; give [HOST:]PORT and a token file")
+        raise ConfigError("{what}: this system has no unix sockets; give [HOST:]PORT and a token file", what)
     found, at = (
         socket.socket(family),
         os.open(folder, os.O_RDONLY),
@@ -120,7 +124,10 @@ def private_socket(folder: Path, name: str, what: str) -> tuple[socket.socket, C
         found.close()
         os.close(at)
         raise ConfigError(
-            f"{what}: {folder / name} cannot be made ({error.strerror or error}); choose another --out, or give PORT"
+            "{what}: {path} cannot be made ({why}); choose another --out, or give PORT",
+            what,
+            folder / name,
+            error.strerror or error,
         ) from None
     found.setblocking(False)
     return found, remove
@@ -139,15 +146,24 @@ def read_token(address: ListenAddress, path: str | None, what: str, *, commands:
             return ""
         who = "every user" if address.is_loopback else "other machines"
         raise ConfigError(
-            f"{what}: {who} can reach {address.host}; give token_file, a file of yours alone with a word of"
-            f" {MIN_TOKEN_LENGTH} letters, or {'--orders alone' if commands else LOOPBACK}"
+            "{what}: {who} can reach {host}; give token_file, a file of yours alone with a word of {n} letters, or"
+            " {instead}",
+            what,
+            who,
+            address.host,
+            MIN_TOKEN_LENGTH,
+            "--orders alone" if commands else LOOPBACK,
         )
     try:
         if os.name == "posix" and Path(path).stat().st_mode & 0o077:
-            raise ConfigError(f"{what}: {path}: other users can read the token; make a new one, of mode 600")
+            raise ConfigError(
+                "{what}: {path}: other users can read the token; make a new one, of mode 600", what, path
+            )
         token = Path(path).read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{what}: {path}: no token can be read ({error})") from None
+        raise ConfigError("{what}: {path}: no token can be read ({why})", what, path, error) from None
     if len(token) < MIN_TOKEN_LENGTH or len(token.split()) != 1:
-        raise ConfigError(f"{what}: {path}: a token is one word of {MIN_TOKEN_LENGTH} letters or more")
+        raise ConfigError(
+            "{what}: {path}: a token is one word of {n} letters or more", what, path, MIN_TOKEN_LENGTH
+        )
     return token

@@ -49,7 +49,7 @@ def on_fit_machine() -> Iterator[None]:
     try:
         yield
     except MachineError as error:
-        raise MachineUnfit(str(error)) from error
+        raise MachineUnfit(error.text) from error
 
 
 Correction = Callable[[Burst], Burst]

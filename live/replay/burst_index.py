@@ -118,7 +118,7 @@ def open_store(session: Session, path: Path) -> BurstStore:
     if session.mode.kind == "bursts":
         return _Bursts(session, path)
     if len(session) == 0:
-        raise DataError(f"{path}: the session holds no frames; there is nothing to replay")
+        raise DataError("{path}: the session holds no frames; there is nothing to replay", path)
     return _Frames(session, path) if session.mode.every == 1 else _EveryKth(session, path)
 
 
@@ -134,8 +134,13 @@ class _Frames:
         frames = [frame for frame in self._between(first, last) if not frame.damaged]
         if len(frames) != n:
             raise DataError(
-                f"{self._path}: of the burst of frames {first} to {last} only {len(frames)} of {n} are"
-                " recorded; replay without --as-measured measures what is there"
+                "{path}: of the burst of frames {first} to {last} only {found} of {n} are recorded; replay without"
+                " --as-measured measures what is there",
+                self._path,
+                first,
+                last,
+                len(frames),
+                n,
             )
         return burst_of(frames)
 
@@ -143,7 +148,7 @@ class _Frames:
         for burst in average_bursts(self._session.frames(), n):
             return burst, burst.last_index
         raise DataError(
-            f"{self._path}: fewer than {n} frames without a gap; give a smaller --reference-burst"
+            "{path}: fewer than {n} frames without a gap; give a smaller --reference-burst", self._path, n
         )
 
     def index_after(self, last: int, n: int | None) -> BurstIndex:
@@ -169,21 +174,28 @@ class _EveryKth(_Frames):
         )
         if not frames:
             raise DataError(
-                f"{self._path}: of the frames {first} to {last}, and after them, none is recorded"
+                "{path}: of the frames {first} to {last}, and after them, none is recorded",
+                self._path,
+                first,
+                last,
             )
         return _averaged(frames)
 
     def first_burst(self, n: int) -> tuple[Burst, int]:
         frames = [frame for frame in self._session.frames(0, n) if not frame.damaged]
         if len(frames) < n:
-            raise DataError(f"{self._path}: fewer than {n} whole frames; give a smaller --reference-burst")
+            raise DataError(
+                "{path}: fewer than {n} whole frames; give a smaller --reference-burst", self._path, n
+            )
         return _averaged(frames), frames[-1].index
 
     def index_after(self, last: int, n: int | None) -> BurstIndex:
         if n is not None and n > 1:
             raise ConfigError(
-                f"{self._path} holds only one frame in {self._session.mode.every}, {n} of them are no burst;"
-                " give --burst 1"
+                "{path} holds only one frame in {every}, {n} of them are no burst; give --burst 1",
+                self._path,
+                self._session.mode.every,
+                n,
             )
         return super().index_after(last, 1)
 
@@ -206,26 +218,29 @@ class _Bursts:
         )
         self._numbers = {pair: number for number, pair in enumerate(ends)}
         if not self._numbers:
-            raise DataError(f"{path}: the session holds no bursts; there is nothing to replay")
+            raise DataError("{path}: the session holds no bursts; there is nothing to replay", path)
 
     def burst(self, data: Mapping[str, Any]) -> Burst:
         number = self._numbers.get((int(data["first"]), int(data["last"])))
         if number is None:
             raise DataError(
-                f"{self._path}: the burst of frames {data['first']} to {data['last']} was not recorded;"
-                " replay without --as-measured measures what is there"
+                "{path}: the burst of frames {first} to {last} was not recorded; replay without --as-measured measures"
+                " what is there",
+                self._path,
+                data["first"],
+                data["last"],
             )
         return self._session.burst(number)
 
     def first_burst(self, n: int) -> tuple[Burst, int]:
-        raise ConfigError(f"{self._path} holds bursts, not frames; --reference-burst cannot be changed")
+        raise ConfigError("{path} holds bursts, not frames; --reference-burst cannot be changed", self._path)
 
     def index_after(self, last: int, n: int | None) -> BurstIndex:
         index = index_of_bursts(self._session, last)
         lengths = self._session.burst_column("n")[index.starts]
         if n is not None and np.any(other := lengths != n):
             length = int(lengths[np.argmax(other)])
-            raise ConfigError(f"{self._path} holds bursts of {length} frames; give --burst {length}")
+            raise ConfigError("{path} holds bursts of {n} frames; give --burst {n}", self._path, length)
         return index
 
     def bursts_at(self, index: BurstIndex, numbers: range) -> Iterator[Burst]:

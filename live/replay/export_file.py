@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
+from acquire.text import Message
 from acquire.text.printable import counted
 from live.config.sections import LoadConfig
 from live.replay.export_headings import name_and_unit, newtons_of, seconds_per
@@ -127,7 +128,9 @@ class _Reader:
         if not self._unit and not self._table.is_ours:
             called = self._table.heads[self._table.force]
             raise DataError(
-                f"{self._where}: the column {called!r} has no unit; give --load-unit N, kN, kgf or lbf"
+                "{where}: the column {name} has no unit; give --load-unit N, kN, kgf or lbf",
+                self._where,
+                repr(called),
             )
         if not self._unit:
             self._unit = "N"
@@ -137,12 +140,16 @@ class _Reader:
         newtons, seconds = newtons_of(self._unit), seconds_per(self._time_unit or "s")
         if newtons is None:
             raise DataError(
-                f"{self._where}: forces in {self._unit!r} are not known; give N, kN, kgf or lbf: --load-unit kN"
+                "{where}: forces in {unit} are not known; give N, kN, kgf or lbf: --load-unit kN",
+                self._where,
+                repr(self._unit),
             )
         if seconds is None and not self._table.by_name:
             raise DataError(
-                f"{self._where}: times in {self._time_unit!r} are not known; give s, ms, us, min or h behind the"
-                " unit of the force: --load-unit N,ms"
+                "{where}: times in {unit} are not known; give s, ms, us, min or h behind the unit of the force:"
+                " --load-unit N,ms",
+                self._where,
+                repr(self._time_unit),
             )
         return newtons, seconds or 1.0
 
@@ -168,7 +175,10 @@ class _Reader:
         self._forces.extend(forces)
         if len(self._forces) > MAX_ROWS or len(self._names) > MAX_NAMES:
             raise DataError(
-                f"{self._where}: has more than {MAX_ROWS:,} rows, or {MAX_NAMES:,} names; export fewer a second"
+                "{where}: has more than {most_rows:,} rows, or {most_names:,} names; export fewer a second",
+                self._where,
+                MAX_ROWS,
+                MAX_NAMES,
             )
 
     def _of_width(self, lines: Sequence[int], rows: Rows) -> Rows:
@@ -185,8 +195,10 @@ class _Reader:
         for number, row in zip(lines, rows, strict=True):
             if any(cell.strip() for cell in row[n:]) and NUMBERISH.fullmatch(cell_of(row, force)):
                 why = "is the comma the decimal mark too? give --load-decimal comma, or" if commas else ""
-                words = f"line {number} has {len(row)} cells for {n} columns"
-                raise DataError(f"{self._where}: {words}; {why} export it with other separators")
+                words = Message("line {line} has {cells} cells for {columns} columns", number, len(row), n)
+                raise DataError(
+                    "{where}: {what}; {hint} export it with other separators", self._where, words, why
+                )
         return rows
 
     def _all_plain(self, rows: Rows) -> tuple[Sequence[Any], Sequence[float]] | None:
@@ -244,8 +256,13 @@ class _Reader:
             bad = value if force is None else key
             shown = self._table.separator.join(row)[:60]
             raise DataError(
-                f"{self._where}: line {line}: {bad[:40]!r} in {shown!r} is not a number with a decimal {self._decimal};"
-                " mend it, or give --load-decimal point or comma"
+                "{where}: line {line}: {bad} in {row} is not a number with a decimal {mark}; mend it, or give"
+                " --load-decimal point or comma",
+                self._where,
+                line,
+                repr(bad[:40]),
+                repr(shown),
+                self._decimal,
             )
         else:
             self._n_texts += 1
@@ -280,8 +297,11 @@ class _Reader:
         days = days_of([date for _, date in self._dates])
         if days is None:
             raise DataError(
-                f"{self._where}: the dates {self._dates[0][1]!r} to {self._dates[-1][1]!r} do not rise, or can be"
-                " read in two ways; give times in seconds: time_s"
+                "{where}: the dates {first} to {last} do not rise, or can be read in two ways; give times in seconds:"
+                " time_s",
+                self._where,
+                repr(self._dates[0][1]),
+                repr(self._dates[-1][1]),
             )
         for k, (first, _) in enumerate(self._dates[1:], start=1):
             times[first:] += _DAY_S * (days[k] - days[k - 1] - 1)
@@ -296,10 +316,16 @@ class _Reader:
         before = self._times[-1] if self._times else -math.inf
         for k in np.flatnonzero(np.diff(times, prepend=before) <= 0)[:1]:
             earlier, later = float(times[k - 1] if k else before), float(times[k])
-            words = f"the times run backwards ({later:.10g} s after {earlier:.10g} s); give each part its own file"
+            words = Message(
+                "the times run backwards ({later:.10g} s after {earlier:.10g} s); give each part its own file",
+                later,
+                earlier,
+            )
             if later == earlier:
-                words = f"the time {later:.10g} s stands twice; export the times with more decimals"
-            raise DataError(f"{self._where}: line {lines[k]}: {words}")
+                words = Message(
+                    "the time {later:.10g} s stands twice; export the times with more decimals", later
+                )
+            raise DataError("{where}: line {line}: {why}", self._where, lines[k], words)
         self._times.extend(times)
 
     def _note_kinds(self, kinds: dict[str, str], cells: set[str]) -> None:
@@ -317,7 +343,7 @@ class _Reader:
         """All that was taken; raises DataError where there is nothing, or numbers have two readings."""
         forces = np.array(self._forces) * (self._newtons * self._given.sign)
         if not np.isfinite(forces).any():
-            raise DataError(f"{self._where}: holds no forces")
+            raise DataError("{where}: holds no forces", self._where)
         for kinds in self._kinds.values():
             if self._given.decimal is None and kinds.keys() >= {"?", "plain"} and self._mark not in kinds:
                 raise two_readings(self._where, kinds["?"])

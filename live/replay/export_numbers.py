@@ -79,8 +79,11 @@ def decimal_mark(parts: Iterable[Rows], names: int | None, where: str) -> str:
 def two_readings(where: str, cell: str) -> DataError:
     """The error for a number that may have thousands."""
     return DataError(
-        f"{where}: {cell!r} has two readings, {re.sub('[.,]', '.', cell)} and {re.sub('[.,]', '', cell)}; give"
-        " --load-decimal point or comma"
+        "{where}: {given} has two readings, {one} and {other}; give --load-decimal point or comma",
+        where,
+        repr(cell),
+        re.sub("[.,]", ".", cell),
+        re.sub("[.,]", "", cell),
     )
 
 

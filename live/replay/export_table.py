@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import BinaryIO
 
 from acquire.errors import DataError
+from acquire.text import Message
 from acquire.text.printable import counted
 from live.config.sections import LoadConfig
 from live.replay.export_headings import (
@@ -104,9 +105,13 @@ def blocks(file: BinaryIO, table: Table, where: str) -> Iterator[tuple[int, Rows
         try:
             rows, broken = split_rows(lines[skipped:], table.separator)
         except csv.Error as error:
-            raise DataError(f"{where}: no table after line {line + skipped + 1}: {error}") from error
+            raise DataError(
+                "{where}: no table after line {line}: {why}", where, line + skipped + 1, error
+            ) from error
         if broken is not None:
-            raise DataError(f"{where}: a quote in line {line + skipped + broken + 1} is not closed; mend it")
+            raise DataError(
+                "{where}: a quote in line {line} is not closed; mend it", where, line + skipped + broken + 1
+            )
         if rows:
             yield line + skipped + 1, rows
         line += len(lines)
@@ -131,7 +136,7 @@ def find_table(file: BinaryIO, where: str, given: LoadConfig) -> Table:
             break
     lines = lines[:20_000]
     if not any(line.strip() and not line.startswith("#") for line in lines):
-        raise DataError(f"{where}: holds no forces")
+        raise DataError("{where}: holds no forces", where)
     parted = {mark: _head_rows(lines, mark) for mark in _SEPARATORS if any(mark in line for line in lines)}
     parted, empty = parted or {",": _head_rows(lines, ",")}, False
     for needs_key in (True, False):
@@ -146,7 +151,7 @@ def find_table(file: BinaryIO, where: str, given: LoadConfig) -> Table:
                 )
             empty = empty or bool(found)
     if empty:
-        raise DataError(f"{where}: holds no forces below their heading")
+        raise DataError("{where}: holds no forces below their heading", where)
     return _without_heading(parted, where, given, encoding)
 
 
@@ -215,7 +220,10 @@ class _Search:
             own, unit = name_and_unit(head)[1], plain_unit(cell_of(rows[0], n)) if rows else ""
             if own and unit and None is not newtons_of(own) != newtons_of(unit) is not None:
                 raise DataError(
-                    f"{self.where}: {head!r} has the unit {unit!r} below it: which one? give --load-unit"
+                    "{where}: {name} has the unit {unit} below it: which one? give --load-unit",
+                    self.where,
+                    repr(head),
+                    repr(unit),
                 )
             below = f"{head} [{unit}]"
             found.append(below if not own and name_and_unit(below)[1] else head)
@@ -265,7 +273,10 @@ class _Search:
             if len(called) > 1 and (given is None or (option != "FORCE" and given[1] is None)):
                 words = ", ".join(repr(table.heads[k]) for k in called)
                 raise DataError(
-                    f"{self.where}: {words}: which one? give --load-column {option}, by heading or number"
+                    "{where}: {columns}: which one? give --load-column {wanted}, by heading or number",
+                    self.where,
+                    words,
+                    option,
                 )
         left = (
             f"line {t.first + 1}: another table ({', '.join(t.heads)[:60]!r}): its"
@@ -311,10 +322,15 @@ def _without_heading(parted: dict[str, Rows], where: str, given: LoadConfig, enc
         (row for rows in parted.values() for row in rows[:1000] if not _has_value(row)), key=len, default=[]
     )
     shown = shown or next((row for rows in parted.values() for row in rows if row), [])
-    what = f"no column {given.column!r}" if given.column else "no force against time or picture"
+    what: str = "no force against time or picture"
+    if given.column:
+        what = Message("no column {name}", repr(given.column))
     raise DataError(
-        f"{where}: {what} under the heading {', '.join(shown)[:100]!r}; wanted: a column force_N (or kN, lbf ...), and"
-        " one of: file, time_s; or name them: --load-column FORCE,TIME, by heading or number"
+        "{where}: {what} under the heading {heading}; wanted: a column force_N (or kN, lbf ...), and file or time_s;"
+        " or name them: --load-column FORCE,TIME",
+        where,
+        what,
+        repr(", ".join(shown)[:100]),
     )
 
 

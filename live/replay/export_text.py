@@ -33,7 +33,7 @@ def encoding_of(file: BinaryIO, where: str) -> str:
     head = file.read(HEAD)
     for magic, kind in _MAGIC.items():
         if head.startswith(magic):
-            raise DataError(f"{where}: is {kind}, no text; export the forces as CSV or text")
+            raise DataError("{where}: is {kind}, no text; export the forces as CSV or text", where, kind)
     for bom, encoding in _BOMS.items():
         if head.startswith(bom):
             return encoding
@@ -44,7 +44,7 @@ def encoding_of(file: BinaryIO, where: str) -> str:
     elif _decoded(head, "utf-8") is None:
         found = "cp932" if _JAPANESE.search(_decoded(head, "cp932") or "") else "cp1252"
     if _CONTROL.search(head.decode(found, "replace")):
-        raise DataError(f"{where}: is binary, no text; export the forces as CSV or text")
+        raise DataError("{where}: is binary, no text; export the forces as CSV or text", where)
     return found
 
 
@@ -64,7 +64,12 @@ def lines_of(file: BinaryIO, encoding: str, where: str) -> Iterator[list[str]]:
             *lines, left = (left + read).split("\n")
             count += len(lines)
             if len(left) > _LONGEST:
-                raise DataError(f"{where}: line {count + 1} has more than {_LONGEST:,} characters; no table")
+                raise DataError(
+                    "{where}: line {line} has more than {most:,} characters; no table",
+                    where,
+                    count + 1,
+                    _LONGEST,
+                )
             yield lines
         if left:
             yield [left]

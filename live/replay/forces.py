@@ -21,6 +21,7 @@ from acquire.errors import ConfigError, DataError
 from acquire.files.picture import MAX_BYTES, check_regular
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
+from acquire.text import Message
 from acquire.text.printable import counted
 from live.config.sections import LoadConfig
 from live.replay.export_file import Export, read_export
@@ -88,10 +89,15 @@ class PlacedForces:
         words = f"{known} of {len(times)} pictures have a force"
         if not known:
             start = float(times[0])
-            own, theirs = (f"{x[0] - start:.6g} to {x[-1] - start:.6g} s" for x in (self.times, times))
+            own, theirs = (
+                Message("{low:.6g} to {high:.6g} s", x[0] - start, x[-1] - start) for x in (self.times, times)
+            )
             raise DataError(
-                f"{where}: no picture has a force: its times are {own} from the first picture, those of the pictures"
-                f" {theirs}; mend them, or give fps= or stamps= of the pictures, or --load-unit N,ms"
+                "{where}: no picture has a force: its times are {own} from the first picture, the pictures' {theirs};"
+                " mend them, or give fps=, stamps= or --load-unit N,ms",
+                where,
+                own,
+                theirs,
             )
         if known > (1 - _SHARE) * len(times):
             return dataclasses.replace(self, remarks=(words, *self.remarks))
@@ -131,15 +137,19 @@ class ForceTable:
             return self._at_times(e.times, pictures, start, recorded=recorded)
         if pictures is None:
             raise ConfigError(
-                f"{self.path}: has a row for each picture, but this source has times alone; give a column time_s, or"
-                " its name: --load-column FORCE,TIME"
+                "{path}: has a row for each picture, but this source has times alone; give a column time_s, or its"
+                " name: --load-column FORCE,TIME",
+                self.path,
             )
         if e.names:
             return self._by_name(pictures)
         if len(e.forces) != len(pictures):
             raise DataError(
-                f"{self.path}: has no times and no names, and {len(e.forces):,} rows for {len(pictures):,} pictures;"
-                " give a column time_s or file, or name it: --load-column FORCE,TIME"
+                "{path}: has no times and no names, and {rows:,} rows for {pictures:,} pictures; give a column time_s"
+                " or file, or name it: --load-column FORCE,TIME",
+                self.path,
+                len(e.forces),
+                len(pictures),
             )
         remark = "no times and no names: row k is taken as the force of picture k"
         return PlacedForces(np.array(list(pictures.values())), e.forces, True, (remark, *e.remarks))
@@ -153,8 +163,9 @@ class ForceTable:
             origin -= start.utc.timestamp()
         elif e.clock and recorded:
             raise ConfigError(
-                f"{self.path}: has times of the day, the recording has Unix times; give these, or seconds from its"
-                " start: time_s"
+                "{path}: has times of the day, the recording has Unix times; give these, or seconds from its start:"
+                " time_s",
+                self.path,
             )
         elif e.clock and not (e.clock == "unix" and first > _UNIX_S):
             origin = first - float(times[0])
@@ -171,12 +182,16 @@ class ForceTable:
         names = names[: len(names) - len(footer)]
         known = dict(zip(names, self.export.forces.tolist(), strict=False))
         if len(known) < len(names):
-            raise DataError(f"{self.path}: a picture is named twice; give each one force")
+            raise DataError("{path}: a picture is named twice; give each one force", self.path)
         lost = [name for name in names if name not in here]
         if len(lost) == len(names):
             raise DataError(
-                f"{self.path}: none of its {len(names)} names is that of a picture; they begin with {names[0]!r}, the"
-                f" pictures with {next(iter(pictures), '')!r}"
+                "{path}: none of its {n} names is that of a picture; they begin with {first}, the pictures with"
+                " {picture}",
+                self.path,
+                len(names),
+                repr(names[0]),
+                repr(next(iter(pictures), "")),
             )
         words = f"{len(lost)} of {len(names)} names are that of no picture: {', '.join(map(repr, lost[:3]))}"
         forces = [known.get(name, known.get(Path(name).stem, math.nan)) for name in pictures]
@@ -211,9 +226,11 @@ def read_forces(path: Path, load: LoadConfig | None = None) -> ForceTable:
     """
     size = check_regular(path)
     if size > MAX_BYTES:
-        raise DataError(f"{path}: {size / 1e9:.1f} GB are more than 2 GB; export fewer rows a second")
+        raise DataError(
+            "{path}: {size_GB:.1f} GB are more than 2 GB; export fewer rows a second", path, size / 1e9
+        )
     try:
         with path.open("rb") as file:
             return ForceTable(path, read_export(file, str(path), load or LoadConfig()))
     except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
+        raise DataError("{path}: cannot be read ({strerror})", path, error.strerror) from error

@@ -58,7 +58,7 @@ def measure_part(request: ReplayRequest, file: IO[bytes], run_in: int, screen: S
     """
     path = session_path(request.source)
     if path is None:
-        raise DataError(f"{request.source}: pictures are not measured in parts")
+        raise DataError("{source}: pictures are not measured in parts", request.source)
     check_window(request)
     renewed: list[Event] = []
 
@@ -142,7 +142,7 @@ def _read(path: Path, ready: PreparedKernel) -> Iterator[_Stored]:
                 described, *arrays = [np.load(file, allow_pickle=False) for _ in range(1 + len(_ARRAYS))]
                 yield _stored(described, dict(zip(_ARRAYS, arrays, strict=True)), ready)
     except (OSError, ValueError, EOFError, KeyError) as error:
-        raise DataError(f"{path}: cannot be read ({error}); remove it and call again") from error
+        raise DataError("{path}: cannot be read ({why}); remove it and call again", path, error) from error
 
 
 def _stored(described: NDArray[Any], arrays: dict[str, Any], ready: PreparedKernel) -> _Stored:

@@ -116,7 +116,9 @@ def _expected(camera: CameraInfo, taken: int, config: Config) -> int | None:
 def _leading_burst(frames: Iterator[Frame], n: int, source: str) -> Burst:
     for burst in average_bursts(frames, n):
         return burst
-    raise DataError(f"{source}: fewer than {n} pictures for the reference; give a smaller --reference-burst")
+    raise DataError(
+        "{source}: fewer than {n} pictures for the reference; give a smaller --reference-burst", source, n
+    )
 
 
 def reference_from(path: str, camera: CameraInfo) -> Burst:
@@ -132,13 +134,22 @@ def reference_from(path: str, camera: CameraInfo) -> Burst:
     image = read_image(path, camera.controls.get("gray"))
     if image.shape != (camera.height, camera.width):
         raise DataError(
-            f"{path}: the reference has {image.shape[1]} x {image.shape[0]} px,"
-            f" the pictures {camera.width} x {camera.height}; they must be the same"
+            "{path}: the reference has {width} x {height} px, the pictures {their_width} x {their_height}; they must"
+            " be the same",
+            path,
+            image.shape[1],
+            image.shape[0],
+            camera.width,
+            camera.height,
         )
     if image.itemsize != (1 if camera.bits <= 8 else 2) or int(image.max()) >= 2**camera.bits:
         raise DataError(
-            f"{path}: the reference has {8 * image.itemsize}-bit samples up to {image.max()}, the pictures have"
-            f" {camera.bits} bits; they must be the same"
+            "{path}: the reference has {sample_bits}-bit samples up to {most}, the pictures have {bits} bits; they"
+            " must be the same",
+            path,
+            8 * image.itemsize,
+            image.max(),
+            camera.bits,
         )
     return burst_of(
         [Frame(frozen(image), 0, 0.0, "nominal", 0, camera.bits, 0.0, white_level=camera.white_level)]
@@ -162,7 +173,9 @@ def write_names(source: str, path: Path) -> None:
             rows.writerow(("frame", "file", "page"))
             rows.writerows((frame, *name) for frame, name in enumerate(picture_names(address)))
     except OSError as error:
-        raise DataError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None
+        raise DataError(
+            "{path}: cannot be written ({why}); choose another --out", path, error.strerror
+        ) from None
 
 
 def picture_of(burst: Burst) -> Frame:

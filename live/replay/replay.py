@@ -107,7 +107,7 @@ def _replay_pictures(
     request: ReplayRequest, screen: Screen, stopping: threading.Event, consumers: Compose
 ) -> Replayed:
     if request.as_measured:
-        raise ConfigError(f"{request.source}: --as-measured needs a session; pictures have none")
+        raise ConfigError("{source}: --as-measured needs a session; pictures have none", request.source)
     request = with_reference(request)
     config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
     region = AUTO if is_auto_region(config) else config.measure.roi
@@ -312,12 +312,14 @@ def _not_empty(bursts: Iterable[Work], request: ReplayRequest, count: PictureCou
     first = [*itertools.islice(rest, 1)]
     if not first and count and count.pictures - count.left_out == max(count.reference, 1) == 1:
         raise DataError(
-            f"{request.source}: one picture alone has no strain; give the folder that the others are in, or the picture"
-            " before the test as --reference FILE"
+            "{source}: one picture alone has no strain; give the folder that the others are in, or the picture before"
+            " the test as --reference FILE",
+            request.source,
         )
     if not first:
         raise DataError(
-            f"{request.source}: no whole burst after the reference, nothing to measure; give a smaller --burst"
+            "{source}: no whole burst after the reference, nothing to measure; give a smaller --burst",
+            request.source,
         )
     return _after(first, rest)
 

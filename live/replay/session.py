@@ -38,7 +38,8 @@ def session_path(source: str) -> Path | None:
     if address.scheme and address.scheme in (*CAMERAS.schemes(), "sim"):
         return None
     raise DataError(
-        f"{source}: no such session; give a session.h5, or pictures as 'files:folder/*.tif' or 'video:file.mp4'"
+        "{source}: no such session; give a session.h5, or pictures as 'files:folder/*.tif' or 'video:file.mp4'",
+        source,
     )
 
 
@@ -62,7 +63,9 @@ def _check_stored(stored: Mapping[str, Any], path: str) -> None:
     try:
         from_dict(stored, {}, path)
     except ConfigError as error:
-        raise DataError(f"{error} (stored so in the session; the command line can override it)") from error
+        raise DataError(
+            "{why} (stored so in the session; the command line can override it)", error
+        ) from error
 
 
 def _beside(section: Mapping[str, Any], keys: Iterable[str], path: Path) -> dict[str, Any]:
@@ -74,8 +77,10 @@ def _beside(section: Mapping[str, Any], keys: Iterable[str], path: Path) -> dict
 def session_source(session: Session, request: ReplayRequest, config: Config, path: Path) -> ReplaySource:
     if request.as_measured and session.mode.every > 1:
         raise ConfigError(
-            f"{path} holds only one frame in {session.mode.every}, not the bursts that were measured; replay it"
-            " without --as-measured"
+            "{path} holds only one frame in {every}, not the bursts that were measured; replay it without"
+            " --as-measured",
+            path,
+            session.mode.every,
         )
     if request.as_measured and request.reference is not None:
         raise ConfigError(

@@ -123,9 +123,11 @@ def check_window(request: ReplayRequest) -> None:
     """Raises ConfigError where --from and --to leave nothing, whatever the source."""
     for name, value in (("from", request.start_s), ("to", request.end_s)):
         if value is not None and not (math.isfinite(value) and value >= 0):
-            raise ConfigError(f"--{name} {value} is not possible; allowed: seconds since the start, from 0")
+            raise ConfigError(
+                "--{name} {value} is not possible; allowed: seconds since the start, from 0", name, value
+            )
     if request.start_s is not None and request.end_s is not None and request.start_s >= request.end_s:
-        raise ConfigError(f"--from {request.start_s} must be before --to {request.end_s}")
+        raise ConfigError("--from {start} must be before --to {end}", request.start_s, request.end_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +169,7 @@ class Window:
                 yield item
         if not found and not math.isnan(last):
             raise DataError(
-                f"no burst lies between --from and --to; the last one is at {last - self.origin:.3f} s"
+                "no burst lies between --from and --to; the last one is at {last:.3f} s", last - self.origin
             )
 
 

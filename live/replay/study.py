@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Burst
+from acquire.text import Message
 from acquire.text.quantity import Quantity
 from analysis.evaluate import MIN_STILL_INSTANTS, evenly, noise_floor, still_phase
 from analysis.picture.pattern import gauge_length, l10_strain
@@ -80,14 +81,20 @@ def take_windows(source: ReplaySource, still: Seconds | None, loaded: Seconds | 
     ):
         if len(bursts) < minimum and (low, high) != NO_WINDOW:
             raise DataError(
-                f"{len(bursts)} bursts from {low:.3g} to {high:.3g} s, {minimum} are needed; give --{name} A,B"
+                "{n} bursts from {low:.3g} to {high:.3g} s, {needed} are needed; give --{name} A,B",
+                len(bursts),
+                low,
+                high,
+                minimum,
+                name,
             )
     return Windows(_spread(found[0], MAX_STILL), _spread(found[1], MAX_LOADED))
 
 
 def _no_force(option: str) -> DataError:
     return DataError(
-        f"there is no force to find the still and the loaded window from; give --{option} A,B in seconds"
+        "there is no force to find the still and the loaded window from; give --{option} A,B in seconds",
+        option,
     )
 
 
@@ -146,7 +153,13 @@ class StudySetting:
     @property
     def words(self) -> str:
         """In a line."""
-        return f"{self.zoi} px ZOIs, step {self.step}, order {self.order}, {self.window}"
+        return Message(
+            "{zoi} px ZOIs, step {step}, order {order}, {window}",
+            self.zoi,
+            self.step,
+            self.order,
+            self.window,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,7 +251,9 @@ def _found(
     at_rest = _stacked(still, name) if still else np.zeros((2, *pulled.shape[1:]))
     known = np.isfinite(at_rest).all(0) & np.isfinite(pulled).all(0)
     if known.sum() < 2:
-        raise ConfigError(f"{setting.words}: fewer than two ZOIs have a value in both windows; leave it out")
+        raise ConfigError(
+            "{setting}: fewer than two ZOIs have a value in both windows; leave it out", setting.words
+        )
     sigmas = _stacked(still or loaded, f"sigma_{name}")
     predicted = math.sqrt(float(np.mean(sigmas[:, known] ** 2)))
     floor = noise_floor(zip(np.where(known, at_rest, np.nan), sigmas, strict=True)) if still else None

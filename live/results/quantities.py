@@ -217,7 +217,7 @@ class Display:
         scale = self.mm_per_px
         if scale is not None and not 0 < scale < float("inf"):
             raise ConfigError(
-                f"a scale of {scale:g} mm/px is not possible; give what one pixel measures, in mm"
+                "a scale of {scale:g} mm/px is not possible; give what one pixel measures, in mm", scale
             )
 
     def unit(self, name: str) -> str:

@@ -35,6 +35,8 @@ from acquire.hdf5 import (
     read_superblock,
     stored_rows,
 )
+from acquire.text import Message
+from acquire.text.message import about
 from analysis.field import ZoiGrid
 from live.results import layout
 from live.results.quantities import Display, mean_name, quantity_of
@@ -121,7 +123,9 @@ class Strain(Closing):
             OverflowError,
         ) as error:
             file.close()
-            raise DataError(f"{path}: is damaged ({error}); make it again with phasedic replay") from error
+            raise DataError(
+                "{path}: is damaged ({why}); make it again with phasedic replay", path, error
+            ) from error
 
     @property
     def whole_names(self) -> tuple[str, ...]:
@@ -138,10 +142,12 @@ class Strain(Closing):
         """
         names = (*self.names, *self.whole_names)
         if name not in names:
-            raise DataError(f"{self.path}: no map {name!r}; there are {', '.join(names)}")
+            raise DataError(
+                "{path}: no map {name}; there are {known}", self.path, repr(name), ", ".join(names)
+            )
         if isinstance(row, int) and not -self.n <= row < self.n:
-            there = f"no row {row}; there are {self.n}" if self.n else "holds no measurement"
-            raise DataError(f"{self.path}: {there}")
+            there = Message("no row {row}; there are {n}", row, self.n) if self.n else "holds no measurement"
+            raise DataError(about(self.path, there))
         rows = range(self.n)[row]
         try:
             if self.response is not None and name in self.response.names:
@@ -152,7 +158,9 @@ class Strain(Closing):
                 return np.asarray(dataset[rows])
             return np.asarray(dataset[rows.start : rows.stop : rows.step])
         except (OSError, RuntimeError) as error:
-            raise DataError(f"{self.path}: map {name!r} cannot be read ({error}); make it again") from error
+            raise DataError(
+                "{path}: map {name} cannot be read ({why}); make it again", self.path, repr(name), error
+            ) from error
 
     def reference(self, row: int) -> int | None:
         """The number of the reference at one row, for ``normal``.
@@ -178,7 +186,7 @@ class Strain(Closing):
             return np.asarray(self._references[layout.NORMAL][reference])
         except (OSError, RuntimeError, ValueError) as error:
             raise DataError(
-                f"{self.path}: the normal matrices cannot be read ({error}); make it again"
+                "{path}: the normal matrices cannot be read ({why}); make it again", self.path, error
             ) from error
 
     @property
@@ -241,9 +249,9 @@ def _open(path: Path, probed: bool) -> tuple[Any, bool]:
     import h5py
 
     if not path.exists():
-        raise DataError(f"{path}: no such file; phasedic run and replay write a strain.h5 into --out")
+        raise DataError("{path}: no such file; phasedic run and replay write a strain.h5 into --out", path)
     if not path.is_file() or not h5py.is_hdf5(path):
-        raise DataError(f"{path}: is not an HDF5 file; give a strain.h5 of phasedic")
+        raise DataError("{path}: is not an HDF5 file; give a strain.h5 of phasedic", path)
     block = read_superblock(path)
     check_size(path, block)
     if block.unfinished and not probed:
@@ -251,7 +259,9 @@ def _open(path: Path, probed: bool) -> tuple[Any, bool]:
     try:
         file = open_file(path, swmr=block.unfinished)
     except (OSError, RuntimeError) as error:
-        raise DataError(f"{path}: cannot be opened ({error}); make it again with phasedic replay") from error
+        raise DataError(
+            "{path}: cannot be opened ({why}); make it again with phasedic replay", path, error
+        ) from error
     if block.unfinished:
         _log.warning("%s was not closed by its writer; reading all its complete rows", path)
     return file, block.unfinished
@@ -261,11 +271,14 @@ def _check(path: Path, file: Any) -> None:
     found = as_text(read_attribute(file, "format", layout.ROOT["format"])) if "format" in file.attrs else None
     if found != layout.FORMAT:
         shown = "something else" if found is None else repr(found[:40])
-        raise DataError(f"{path}: holds {shown}, not {layout.FORMAT}; give a strain.h5")
+        raise DataError("{path}: holds {found}, not {wanted}; give a strain.h5", path, shown, layout.FORMAT)
     version = read_attribute(file, "format_version", layout.ROOT["format_version"])
     if int(version) > layout.FORMAT_VERSION:
         raise DataError(
-            f"{path}: format version {version}, this program reads up to {layout.FORMAT_VERSION}; update phasedic"
+            "{path}: format version {version}, this program reads up to {newest}; update phasedic",
+            path,
+            version,
+            layout.FORMAT_VERSION,
         )
 
 
@@ -286,11 +299,18 @@ def _grid(strain: Any, text: Any, path: Path) -> ZoiGrid:
         (described["roi"][name] - described["size"]) // described["step"] + 1 for name in ("height", "width")
     )
     if active.shape != shape:
-        raise DataError(f"{where} is described as {shape} ZOIs, but {active.shape} are there; make it again")
+        raise DataError(
+            "{where} is described as {shape} ZOIs, but {found} are there; make it again",
+            where,
+            shape,
+            active.shape,
+        )
     grid = ZoiGrid.from_dict(described, read_scalar(active, Declared("u1", shape, 0, 1)).astype(bool))
     for name, places in (("x", grid.x), ("y", grid.y)):
         if not np.array_equal(open_dataset(strain, name, Declared("f8", places.shape))[()], places):
-            raise DataError(f"{where} has other centres {name} than its description; make it again")
+            raise DataError(
+                "{where} has other centres {name} than its description; make it again", where, name
+            )
     return grid
 
 
@@ -314,7 +334,7 @@ def _rows(path: Path, datasets: Sequence[Any], *, whole: bool) -> int:
     lengths = {stored_rows(item) for item in datasets}
     if whole and lengths | {len(item) for item in datasets} != {min(lengths)}:
         raise DataError(
-            f"{path}: its maps and columns are not of one length; make it again with phasedic replay"
+            "{path}: its maps and columns are not of one length; make it again with phasedic replay", path
         )
     return min(lengths)
 

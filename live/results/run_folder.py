@@ -179,7 +179,7 @@ class RunFolder(Closing):
         try:
             return from_dict({"specimen": stored}, {}, str(self.strain.path)).specimen
         except ConfigError as error:
-            raise DataError(f"{error}; make the results again with phasedic replay") from None
+            raise DataError("{why}; make the results again with phasedic replay", error) from None
 
     @property
     def mm_per_px(self) -> float | None:
@@ -332,6 +332,10 @@ def open_run(path: str | os.PathLike[str]) -> RunFolder:
     if not file.exists():
         sides = [path / side for side in (*SIDES, *FIELDS) if (path / side / STRAIN).exists()]
         if sides:
-            raise DataError(f"{path}: a test with several cameras; give the folder of one, {sides[0]}")
-        raise DataError(f"{path}: no {STRAIN} there; give the folder that phasedic run or replay wrote")
+            raise DataError(
+                "{path}: a test with several cameras; give the folder of one, {one}", path, sides[0]
+            )
+        raise DataError(
+            "{path}: no {file} there; give the folder that phasedic run or replay wrote", path, STRAIN
+        )
     return RunFolder(file.parent, Strain.open(file))

@@ -99,7 +99,9 @@ def stored_pattern(strain: Strain, reference: int) -> StoredPattern:
     if not (
         np.isfinite(normal).all() and (normal[i == j] >= 0).all() and (normal[i == j] > 0).all(axis=0).any()
     ):
-        raise DataError(f"{strain.path}: its normal matrices are damaged; make it again with phasedic replay")
+        raise DataError(
+            "{path}: its normal matrices are damaged; make it again with phasedic replay", strain.path
+        )
     return StoredPattern(normal, Places.of(strain.grid, window_of(strain)))
 
 

@@ -56,7 +56,7 @@ class CsvWriter:
 
     def _trouble(self, error: OSError) -> DataError:
         return DataError(
-            f"{self._path}: cannot be written ({error.strerror}); make room or choose another --out"
+            "{path}: cannot be written ({why}); make room or choose another --out", self._path, error.strerror
         )
 
 

@@ -28,6 +28,7 @@ from acquire.hdf5 import (
     reason,
     storable,
 )
+from acquire.text import Message
 from acquire.text.printable import counted
 from analysis.evaluate import load_axis
 from live.results import layout
@@ -178,9 +179,12 @@ class StrainWriter:
             raise self._trouble(error) from error
 
     def _trouble(self, error: Exception) -> DataError:
-        kept = f"; {counted(self._flushed, 'row')} before can be read" if self._flushed else ""
+        kept = Message("; {rows} before can be read", counted(self._flushed, "row")) if self._flushed else ""
         return DataError(
-            f"{self._path}: cannot be written ({reason(error)}){kept}; make room on the disk or choose another --out"
+            "{path}: cannot be written ({why}){kept}; make room on the disk or choose another --out",
+            self._path,
+            reason(error),
+            kept,
         )
 
 

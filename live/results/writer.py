@@ -50,11 +50,13 @@ class Results(Closing):
         self._closed = False
         for path in (self.h5_path, self.csv_path):
             if path.exists():
-                raise DataError(f"{path} exists already and is not overwritten; choose another --out")
+                raise DataError("{path} exists already and is not overwritten; choose another --out", path)
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise DataError(f"{folder}: cannot be made ({error.strerror}); choose another --out") from error
+            raise DataError(
+                "{folder}: cannot be made ({why}); choose another --out", folder, error.strerror
+            ) from error
         self._h5 = StrainWriter(self.h5_path, grid, info, flush_s)
         try:
             self._csv = CsvWriter(self.csv_path, extras=info.extras, gauges=info.gauges)

@@ -131,7 +131,9 @@ def main(part: str, kinds: str, phase: str) -> int:
     from analysis import COMPILE_PARTS, warm_up
 
     if part not in COMPILE_PARTS:
-        raise ConfigError(f"{part}: no part of the compilation; there are {', '.join(COMPILE_PARTS)}")
+        raise ConfigError(
+            "{part}: no part of the compilation; there are {known}", part, ", ".join(COMPILE_PARTS)
+        )
     warm_up(part, kinds.split(","))
     if part == COMPILE_PARTS[0]:  # so that both take the same time
         hdf5.compile_loops()

@@ -76,7 +76,9 @@ def from_shifts(fields: Sequence[StrainField], width: int, height: int, *, squar
     try:
         fit = lens_of_shifts(fields, width, height, square=square)
     except ValueError as error:
-        raise DataError(f"{error}; give more pictures of the still specimen, shifted in its plane") from None
+        raise DataError(
+            "{why}; give more pictures of the still specimen, shifted in its plane", error
+        ) from None
     places = np.concatenate([_places(field) for field in fields])
     method = f"{len(fields)} shifted pictures of the specimen" + (", camera square to it" if square else "")
     return LensCalibration(fit, (width, height), _box(places), method)
@@ -116,8 +118,11 @@ def from_boards(pictures: Iterable[NDArray[Any]], board: Board, *, k3: bool = Fa
             continue
     if len(found) < MIN_BOARDS:
         raise DataError(
-            f"{len(found)} of {count} pictures show the board; it takes {MIN_BOARDS}, at many places and tilted by 10"
-            " to 30 degrees in all directions; look at the numbers of its corners, focus and light"
+            "{found} of {count} pictures show the board; it takes {needed}, at many places and tilted by 10 to 30"
+            " degrees in all directions; look at its corners, focus, light",
+            len(found),
+            count,
+            MIN_BOARDS,
         )
     fit = lens_of_corners(found, size, k3)
     kind = "ChArUco board" if board.marker_mm else "checkerboard"
@@ -136,7 +141,7 @@ def lens_of_corners(found: Sequence[Corners], size: tuple[int, int], k3: bool = 
             flat, seen, size, np.eye(3), np.zeros(5), flags=flags
         )
     except cv2.error as error:
-        raise DataError(f"OpenCV finds no lens in these pictures ({error}); {_MORE}") from None
+        raise DataError("OpenCV finds no lens in these pictures ({why}); {hint}", error, _MORE) from None
     views = [
         cv2.projectPoints(points, turn, shift, matrix, terms)[1]
         for points, turn, shift in zip(flat, turns, shifts, strict=True)
@@ -148,7 +153,7 @@ def lens_of_corners(found: Sequence[Corners], size: tuple[int, int], k3: bool = 
     covariance[:free, :free] = variance * _inverse_normal(views, free)
     parameters = np.array([matrix[0, 0], matrix[0, 2], matrix[1, 2], *np.ravel(terms)[:5]])
     if not (np.isfinite(parameters).all() and math.sqrt(covariance[0, 0]) < MAX_FOCAL_ERROR * parameters[0]):
-        raise DataError(f"the pictures do not show the lens: its focal length stays unknown; {_MORE}")
+        raise DataError("the pictures do not show the lens: its focal length stays unknown; {hint}", _MORE)
     return LensFit(LensModel(parameters, covariance), float(rms) / math.sqrt(2), 1.0)
 
 

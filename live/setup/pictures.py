@@ -32,8 +32,13 @@ def read_mask(path: str | None, width: int, height: int) -> NDArray[np.bool_] | 
     mask = read_image(Path(path), gray="luma")
     if mask.shape != (height, width):
         raise DataError(
-            f"{path}: the mask has {mask.shape[1]} x {mask.shape[0]} px, the pictures {width} x {height};"
-            " make a mask of the size of the pictures"
+            "{path}: the mask has {width} x {height} px, the pictures {their_width} x {their_height}; make a mask of"
+            " the size of the pictures",
+            path,
+            mask.shape[1],
+            mask.shape[0],
+            width,
+            height,
         )
     found: NDArray[np.bool_] = mask > 0
     return found
@@ -68,8 +73,13 @@ def correction(config: Config, camera: CameraInfo, cut: tuple[slice, slice] | No
     if field.dark.shape != (camera.height, camera.width):
         height, width = field.dark.shape
         raise DataError(
-            f"{config.camera.dark or config.camera.flat} has {width} x {height} px, the pictures"
-            f" {camera.width} x {camera.height}; take it anew with this setting of the camera"
+            "{path} has {width} x {height} px, the pictures {their_width} x {their_height}; take it anew with this"
+            " setting of the camera",
+            config.camera.dark or config.camera.flat,
+            width,
+            height,
+            camera.width,
+            camera.height,
         )
     if cut is not None:
         field = FlatField(field.dark[cut], field.gain[cut], field.useless[cut])

@@ -64,8 +64,9 @@ def auto_gauges(grid: ZoiGrid, axis: str) -> dict[str, GaugeTable]:
     rows, columns = (np.flatnonzero(frame.active.any(axis=one)) for one in (1, 0))
     if len(rows) < 2:
         raise ConfigError(
-            f"gauges cannot be placed: {len(rows)} rows of ZOIs lie along the load;"
-            " take smaller ZOIs or steps, or a larger region, or leave out gauges = 'auto'"
+            "gauges cannot be placed: {n} rows of ZOIs lie along the load; take smaller ZOIs or steps, or a larger"
+            " region, or leave out gauges = 'auto'",
+            len(rows),
         )
     everywhere = frame.box(rows, columns)
     gauges: dict[str, GaugeTable] = {"extension": {"kind": "extension", "box": everywhere}}

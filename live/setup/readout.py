@@ -31,8 +31,9 @@ def from_lamp(frames: Iterable[Frame], lamp_Hz: float) -> Readout:
         return readout_of_bands(np.array(profiles).reshape(len(profiles), -1), lamp_Hz)
     except ValueError as error:
         raise DataError(
-            f"{error}: a global shutter has none, and an exposure of whole periods of the light shows none; take an"
-            " exposure below 5 ms, a lamp that flickers, and a frame rate that does not divide its frequency"
+            "{why}: a global shutter has none; take an exposure below 5 ms, a lamp that flickers, and a frame rate"
+            " that does not divide its frequency",
+            error,
         ) from None
 
 
@@ -48,14 +49,15 @@ def from_motion(t: Sequence[float], fields: Sequence[StrainField], height: int) 
     try:
         return readout_of_motion(t, (u, v), (du_dy, dv_dy), height)
     except ValueError as error:
-        raise DataError(f"the readout time is not measured: {error}") from None
+        raise DataError("the readout time is not measured: {why}", error) from None
 
 
 def rounded_ms(found: Readout) -> dict[str, float]:
     """The changes of a rig file; raises ConfigError where the time cannot be one of a shutter."""
     if not 0 < found.seconds < 10:
         raise ConfigError(
-            f"{found.seconds * 1e3:.3g} ms is no readout time; is the picture turned, or does the camera read upwards?"
+            "{ms:.3g} ms is no readout time; is the picture turned, or does the camera read upwards?",
+            found.seconds * 1e3,
         )
     return {
         "camera.readout_ms": float(f"{found.seconds * 1e3:.5g}"),

@@ -31,7 +31,7 @@ ANALYSIS = {
     "analysis.optics": "analysis.field analysis.evaluate",
     "analysis.quality": "analysis.field analysis.picture",
     "analysis.fit": "analysis.field analysis.compiled analysis.picture",
-    "analysis.self_test": "analysis.field analysis.compiled",
+    "analysis.self_test": "analysis.field analysis.compiled acquire acquire.text",
     "analysis.kernel": "analysis.field analysis.compiled analysis.picture analysis.fit analysis.follow"
     " analysis.self_test",
     "analysis": "analysis.field analysis.kernel analysis.self_test",
@@ -68,8 +68,9 @@ LAYERS = {
         )
         for i, layer in enumerate(LIVE)
     },
-    "live.cli": "acquire.errors acquire.text.printable live.commands.arguments live.commands.environment"
-    " live.commands.exit_codes live.commands.signals live.commands.streams",
+    "live.cli": "acquire.errors acquire.text acquire.text.message acquire.text.printable live.commands.arguments"
+    " live.commands.environment live.commands.exit_codes live.commands.signals live.commands.streams"
+    " live.words.language",
 }
 # One module opens the simulated devices. The demo compares with their truth; the examples have simulated pictures.
 EXCEPTIONS = {

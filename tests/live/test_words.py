@@ -81,7 +81,8 @@ def test_an_entry_with_other_fields_leaves_english(german: Path) -> None:
 KEYWORDS: dict[str, Any] = {
     "Message": None, "refusal": None, "Spoken": None, "PhasedicError": None, "ConfigError": None, "DataError": None,
     "DeviceError": None, "MachineUnfit": None, "Interrupted": None, "ControlRefused": None, "NotAllowed": None,
-    "NotACamera": None, "DeviceFault": None, "GenicamError": None,
+    "NotACamera": None, "DeviceFault": None, "GenicamError": None, "MachineError": None, "TooLittleMemory": None,
+    "bad_value": None,
 }  # fmt: skip
 FIELDS = re.compile(r"\{(\w+)[:}]")
 
@@ -90,12 +91,36 @@ def name_of(call: ast.Call) -> str:
     return getattr(call.func, "id", getattr(call.func, "attr", ""))
 
 
-def formatted(path: Path) -> set[int]:
-    """Lines of calls whose text is put together on the spot (commands of a terminal): it stays English."""
-    calls = [node for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Call)]
-    spoken = [call for call in calls if call.args and name_of(call) in KEYWORDS]
-    put_together = [call for call in spoken if isinstance(call.args[0], ast.JoinedStr)]
-    return {line for call in put_together for line in range(call.lineno, (call.end_lineno or 0) + 1)}
+def put_together(tree: ast.Module) -> list[int]:
+    """Lines where a text for people is put together on the spot, so that it has no entry; ``counted`` may."""
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call) and node.args]
+    spoken = [call for call in calls if name_of(call) in {*KEYWORDS, "ArgumentTypeError"} - {"Message"}]
+    return [
+        call.lineno for call in spoken if any(isinstance(a, ast.JoinedStr) for a in ast.walk(call.args[0]))
+    ]
+
+
+def test_no_error_is_put_together() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for package in ("acquire", "analysis", "hw_mocks", "live")
+        for path in sorted((ROOT / package).rglob("*.py"))
+        for line in put_together(ast.parse(path.read_text("utf-8")))
+    ]
+    assert not found, 'as ConfigError("{path}: no such file", path)'
+
+
+@pytest.mark.parametrize(
+    ("code", "count"),
+    [
+        ("DataError(f'{path}: gone')", 1),
+        ("raise argparse.ArgumentTypeError(f'{word}: give a number' if kind else str(error))", 1),
+        ("DataError('{path}: gone', path)", 0),
+        ("DataError('{path}: gone', f'{folder}/{name}')", 0),
+    ],
+)
+def test_errors_that_are_put_together_are_found(code: str, count: int) -> None:
+    assert len(put_together(ast.parse(code))) == count
 
 
 @cache
@@ -104,11 +129,9 @@ def templates() -> dict[str, str]:
     found: dict[str, str] = {}
     for package in ("acquire", "analysis", "hw_mocks", "live"):
         for path in sorted((ROOT / package).rglob("*.py")):
-            english_only = formatted(path)
             with path.open("rb") as file:
                 for line, text, *_ in extract("python", file, KEYWORDS):
-                    if line not in english_only:
-                        found.setdefault(str(text), f"{path.relative_to(ROOT)}:{line}")
+                    found.setdefault(str(text), f"{path.relative_to(ROOT)}:{line}")
     return {text: place for text, place in found.items() if re.search("[A-Za-z]{2}", FIELDS.sub("", text))}
 
 

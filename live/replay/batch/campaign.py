@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.text import Message
 from acquire.text.printable import counted
 from live.config.loading import load_config
 from live.pipeline.screen import Screen
@@ -84,7 +85,9 @@ def _put(path: Path, content: bytes) -> None:
         part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise DataError(f"{path}: cannot be written ({error.strerror}); make room and call again") from error
+        raise DataError(
+            "{path}: cannot be written ({why}); make room and call again", path, error.strerror
+        ) from error
 
 
 _POLL_S = 0.1
@@ -190,7 +193,7 @@ def _processes(wanted: CampaignRequest) -> WorkerProcesses:
 
 
 def _no_process(error: OSError) -> DataError:
-    return DataError(f"no process can be started on this machine ({error.strerror}); end other programs")
+    return DataError("no process can be started on this machine ({why}); end other programs", error.strerror)
 
 
 def _sweep(out: Path, rows: Mapping[str, BatchRow], tasks: Sequence[Task]) -> None:
@@ -205,7 +208,9 @@ def _make(out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise ConfigError(f"{out}: cannot be made ({error.strerror}); choose another --out") from None
+        raise ConfigError(
+            "{folder}: cannot be made ({why}); choose another --out", out, error.strerror
+        ) from None
 
 
 def _planned(wanted: CampaignRequest) -> tuple[dict[str, BatchRow], list[Task]]:
@@ -225,10 +230,12 @@ def _planned(wanted: CampaignRequest) -> tuple[dict[str, BatchRow], list[Task]]:
             tasks.append(task)
     taken = [str(task.folder) for task in tasks if task.folder.exists()]
     if taken:
-        more = f" and {len(taken) - 1} more" if len(taken) > 1 else ""
+        more = Message(" and {n} more", len(taken) - 1) if len(taken) > 1 else ""
         raise ConfigError(
-            f"{taken[0]}{more}: holds results of other settings, another recording or another version; nothing is"
-            " overwritten, choose another --out"
+            "{folder}{more}: holds results of other settings, another recording or another version; nothing is"
+            " overwritten, choose another --out",
+            taken[0],
+            more,
         )
     return rows, tasks
 

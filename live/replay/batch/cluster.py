@@ -91,7 +91,8 @@ class Cluster:
         self._gone_s = 0.0 if self._client.status == "running" else self._gone_s + seconds
         if self._gone_s > _GONE_S:
             raise DataError(
-                f"{self._address}: the scheduler has ended; complete tests are kept: start it, and call again"
+                "{address}: the scheduler has ended; complete tests are kept: start it, and call again",
+                self._address,
             )
         return not self._left and not self._waiting
 
@@ -132,7 +133,9 @@ class Cluster:
         except Exception as error:  # any error of a worker with another program
             why = printable(f"{type(error).__name__}: {error}")[:200]
             raise ConfigError(
-                f"{self._address}: a worker cannot run phasedic ({why}); install the same version there"
+                "{address}: a worker cannot run phasedic ({why}); install the same version there",
+                self._address,
+                why,
             ) from None
 
     def _compile(self, found: Mapping[str, Mapping[str, Any]]) -> None:
@@ -201,7 +204,9 @@ def check_scheduler(address: str) -> None:
     """
     found = _ADDRESS.fullmatch(address)
     if found is None:
-        raise ConfigError(f"--scheduler {address}: give tcp://HOST:PORT, as 'dask scheduler' prints it")
+        raise ConfigError(
+            "--scheduler {address}: give tcp://HOST:PORT, as 'dask scheduler' prints it", address
+        )
     if address.startswith("tls:"):
         return
     try:
@@ -213,7 +218,9 @@ def check_scheduler(address: str) -> None:
 def _no_answer(address: str, why: object) -> ConfigError:
     shown = printable(str(why))[:200]
     return ConfigError(
-        f"--scheduler {address}: nothing answers there ({shown}); start one with 'dask scheduler'"
+        "--scheduler {address}: nothing answers there ({why}); start one with 'dask scheduler'",
+        address,
+        shown,
     )
 
 
@@ -225,8 +232,9 @@ def _connected(address: str) -> Any:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # our own messages replace its warnings
     if address.startswith("tls:") and not Security().tls_ca_file:
         raise ConfigError(
-            f"--scheduler {address}: no certificate is known here; set DASK_DISTRIBUTED__COMM__TLS__CA_FILE,"
-            " ...CLIENT__CERT and ...CLIENT__KEY (docs/scale.md)"
+            "--scheduler {address}: no certificate is known here; set DASK_DISTRIBUTED__COMM__TLS__CA_FILE,"
+            " ...CLIENT__CERT and ...CLIENT__KEY (docs/scale.md)",
+            address,
         )
     for _ in range(_STARTS):
         try:
@@ -235,31 +243,41 @@ def _connected(address: str) -> Any:
             log.debug("Dask's own thread did not start")
         except (OSError, ValueError, TypeError) as error:
             raise _no_answer(address, error) from None
-    raise ConfigError(f"--scheduler {address}: Dask does not start here; this machine is too busy, try again")
+    raise ConfigError(
+        "--scheduler {address}: Dask does not start here; this machine is too busy, try again", address
+    )
 
 
 def check(address: str, found: Mapping[str, Mapping[str, Any]]) -> None:
     """Raises ConfigError where there are no workers, or where their results would differ from ours."""
     if not found:
-        raise ConfigError(f"{address}: has no workers; start some with 'dask worker {address} --nthreads 1'")
+        raise ConfigError(
+            "{address}: has no workers; start some with 'dask worker {address} --nthreads 1'", address
+        )
     ours = deciding_versions()
     for worker, answer in found.items():
         for package, version in ours.items():
             other = answer["versions"].get(package, "not known")
             if other != version:
                 raise ConfigError(
-                    f"worker {printable(worker)} has {package} {printable(str(other))}, here it is {version}; the"
-                    " results would not be the same: install the same there"
+                    "worker {name} has {package} {theirs}, here it is {ours}; the results would not be the same:"
+                    " install the same there",
+                    printable(worker),
+                    package,
+                    printable(str(other)),
+                    version,
                 )
         if answer["slots"] != 1:
             raise ConfigError(
-                f"worker {printable(worker)} does {answer['slots']} tasks at once; start it with --nthreads 1, and"
-                " --nworkers for more"
+                "worker {name} does {n} tasks at once; start it with --nthreads 1, and --nworkers for more",
+                printable(worker),
+                answer["slots"],
             )
         if not answer["has_token"]:
             raise ConfigError(
-                f"worker {printable(worker)} does not find --out: recordings and results must be on a disk that all"
-                " machines have under the same path"
+                "worker {name} does not find --out: recordings and results must be on a disk that all machines have"
+                " under the same path",
+                printable(worker),
             )
 
 

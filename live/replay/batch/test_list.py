@@ -18,6 +18,7 @@ from typing import Any
 from acquire.addresses import expanded, parse_address
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
+from acquire.text import Message
 from acquire.text.printable import printable
 
 LISTS = (".toml", ".csv")
@@ -83,7 +84,7 @@ def _sources(word: str) -> Iterator[str]:
     pattern = str(path.relative_to(path.anchor))
     paths = [path] if path.exists() else sorted(Path(path.anchor).glob(pattern))
     if not paths:
-        raise ConfigError(f"{word}: no session and no folder of pictures is there; check the path")
+        raise ConfigError("{source}: no session and no folder of pictures is there; check the path", word)
     for path in paths:
         yield str(_source(path).absolute())
 
@@ -92,7 +93,9 @@ def _source(path: Path) -> Path:
     if path.is_dir():
         return path / _SESSION if (path / _SESSION).exists() else path
     if path.suffix.lower() in _PICTURES:
-        raise ConfigError(f"{path}: is one picture; give the folder it lies in, or 'files:{path.parent}/*'")
+        raise ConfigError(
+            "{path}: is one picture; give the folder it lies in, or 'files:{folder}/*'", path, path.parent
+        )
     return path
 
 
@@ -108,9 +111,11 @@ def _named(rows: Sequence[Mapping[str, Any]]) -> list[BatchJob]:
     ]
     for name, n in Counter(names).items():
         if n > 1:
-            raise ConfigError(f"{n} tests are called {name}; give them names in a list (--help)")
+            raise ConfigError("{n} tests are called {name}; give them names in a list (--help)", n, name)
         if printable(name) != name or "/" in name or name.startswith(".") or name in ("summary.csv",):
-            raise ConfigError(f"{name!r}: a test cannot be called that; give it another name in a list")
+            raise ConfigError(
+                "{name}: a test cannot be called that; give it another name in a list", repr(name)
+            )
     return [BatchJob(name, **_without_name(row)) for row, name in zip(rows, names, strict=True)]
 
 
@@ -133,9 +138,9 @@ def _rows(path: Path) -> list[dict[str, Any]]:
         text = read_bytes(path).decode("utf-8-sig")
         rows = _toml(text) if path.suffix.lower() == ".toml" else _csv(text)
     except (UnicodeDecodeError, csv.Error, ValueError, RecursionError) as error:
-        raise DataError(f"{path}: the list cannot be read: {error}") from None
+        raise DataError("{path}: the list cannot be read: {why}", path, error) from None
     if not rows:
-        raise DataError(f"{path}: lists no test; wanted: [[test]] tables, or a CSV with a column source")
+        raise DataError("{path}: lists no test; wanted: [[test]] tables, or a CSV with a column source", path)
     return rows
 
 
@@ -189,9 +194,13 @@ def _value(key: str, cell: str) -> Any:
 def _from_list(path: Path, number: int, row: Mapping[str, Any]) -> dict[str, Any]:
     unknown = [key for key in row if key not in _OWN and "." not in key]
     if unknown or not isinstance(row.get("source"), str):
-        what = f"unknown: {', '.join(unknown)}" if unknown else "no source"
+        what = Message("unknown: {keys}", ", ".join(unknown)) if unknown else "no source"
         raise ConfigError(
-            f"{path}: test {number}: {what}; there are {', '.join(_OWN)} and keys such as specimen.width_mm"
+            "{path}: test {number}: {what}; there are {known} and keys such as specimen.width_mm",
+            path,
+            number,
+            what,
+            ", ".join(_OWN),
         )
     beside = {key: _beside(path, str(row[key])) for key in _OWN if key in row and key != "name"}
     beside["source"] = (

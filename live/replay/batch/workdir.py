@@ -52,7 +52,9 @@ def publish(staging: Path, folder: Path) -> None:
         staging.rename(folder)
     except OSError as error:
         raise DataError(
-            f"{folder}: the folder of the results cannot be renamed to this ({error.strerror}); nothing is overwritten"
+            "{folder}: the folder of the results cannot be renamed to this ({why}); nothing is overwritten",
+            folder,
+            error.strerror,
         ) from error
 
 

@@ -14,7 +14,7 @@ def check_free(*paths: Path) -> None:
     """Raise ConfigError where one of ``paths`` exists."""
     for path in paths:
         if path.exists():
-            raise ConfigError(f"{path} exists already and is not overwritten; choose another --out")
+            raise ConfigError("{path} exists already and is not overwritten; choose another --out", path)
 
 
 @contextlib.contextmanager
@@ -53,7 +53,9 @@ def _atomic(path: Path) -> Iterator[Path]:
     except OSError as error:
         _remove(part)
         raise DataError(
-            f"{path}: cannot be written ({error.strerror or error}); make room or choose another --out"
+            "{path}: cannot be written ({why}); make room or choose another --out",
+            path,
+            error.strerror or error,
         ) from error
     except BaseException:
         _remove(part)

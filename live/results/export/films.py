@@ -56,7 +56,7 @@ def write_mp4(job: ExportJob, path: Path) -> None:
         No such encoder in this OpenCV.
     """
     if path.suffix not in _CODECS:
-        raise ConfigError(f"{path}: a film is .mp4 or .webm; choose another --out")
+        raise ConfigError("{path}: a film is .mp4 or .webm; choose another --out", path)
     code, remark = _CODECS[path.suffix]
     cv2 = load_cv2()
     with new_file(path) as part:
@@ -69,14 +69,16 @@ def write_mp4(job: ExportJob, path: Path) -> None:
                     writer = cv2.VideoWriter(str(part), cv2.CAP_FFMPEG, four, job.options.fps, size)
                     if not writer.isOpened():
                         raise DataError(
-                            f"{path}: this OpenCV has no encoder for {code}; give --to gif or --to png"
+                            "{path}: this OpenCV has no encoder for {code}; give --to gif or --to png",
+                            path,
+                            code,
                         )
                 writer.write(image)
         finally:
             if writer is not None:
                 writer.release()
         if not part.exists():
-            raise DataError(f"{path}: the encoder wrote nothing; is the disk full?")
+            raise DataError("{path}: the encoder wrote nothing; is the disk full?", path)
     job.screen.print(remark)
 
 

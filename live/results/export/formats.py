@@ -93,9 +93,9 @@ def export(run: RunFolder, request: ExportRequest, screen: Screen) -> Path:
     usual = (run.axial,) if kind.one_map else USUAL
     fields = chosen_fields(run.strain, request.fields, usual)
     if kind.one_map and len(fields) != 1:
-        raise ConfigError(f"--to {request.format} takes one map at a time; give one with --fields")
+        raise ConfigError("--to {format} takes one map at a time; give one with --fields", request.format)
     if not fields:
-        raise ConfigError(f"{run.strain.path}: holds none of the usual maps; name some with --fields")
+        raise ConfigError("{path}: holds none of the usual maps; name some with --fields", run.strain.path)
     rows = chosen_rows(run.strain, request.start_s, request.end_s)
     if {*fields} <= {*run.strain.whole_names}:
         rows = rows[-1:]  # they are the same at each instant

@@ -139,7 +139,9 @@ def chosen_fields(strain: Strain, requested: str | None, usual: Sequence[str] = 
     known = (*strain.names, *strain.whole_names)
     for name in names:
         if name not in known:
-            raise ConfigError(f"--fields {name}: there is no such map; there are {', '.join(known)}")
+            raise ConfigError(
+                "--fields {name}: there is no such map; there are {known}", name, ", ".join(known)
+            )
     return names
 
 
@@ -159,7 +161,11 @@ def chosen_rows(strain: Strain, start_s: float | None, end_s: float | None) -> t
     if rows:
         return rows
     if not len(t):
-        raise DataError(f"{strain.path}: holds no measurement, there is nothing to export")
+        raise DataError("{path}: holds no measurement, there is nothing to export", strain.path)
     raise ConfigError(
-        f"--from, --until: no measurement between {low:g} and {high:g} s; the test has {t[0]:.6g} to {t[-1]:.6g} s"
+        "--from, --until: no measurement between {low:g} and {high:g} s; the test has {first:.6g} to {last:.6g} s",
+        low,
+        high,
+        t[0],
+        t[-1],
     )

@@ -172,7 +172,7 @@ def write_mat(job: ExportJob, path: Path) -> None:
                 savemat(file, stack, do_compression=True)  # type: ignore[arg-type]
         except MatWriteError as error:
             raise DataError(
-                f"{path}: too large for this format ({error}); give --from and --until, or --to npz"
+                "{path}: too large for this format ({why}); give --from and --until, or --to npz", path, error
             ) from error
 
 

@@ -37,7 +37,10 @@ def write_tiff(job: ExportJob, path: Path) -> None:
     n = len(job.rows)
     if n * (4 * height * width + 256) > _MAX_BYTES:
         raise ConfigError(
-            f"--to tiff: {n} maps of {width} x {height} are more than 4 GB; give --from and --until"
+            "--to tiff: {n} maps of {width} x {height} are more than 4 GB; give --from and --until",
+            n,
+            width,
+            height,
         )
     per_unit = 1 / job.display.step(job.strain.grid)  # pixels of the map, which are ZOIs
     with new_file(path) as part, part.open("xb") as file:

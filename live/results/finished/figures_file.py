@@ -106,7 +106,7 @@ def stored_lag(folder: Path) -> Figure | None:
         return Figure(value, low, high, str(found["reason"] or ""))
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DataError(
-            f"{path}: cannot be read ({error}); make the results again with phasedic replay"
+            "{path}: cannot be read ({why}); make the results again with phasedic replay", path, error
         ) from None
 
 

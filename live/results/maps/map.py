@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
+from acquire.text import Message
 from analysis.evaluate import deconvolved, effect
 from analysis.field import ZoiGrid
 from live.results.maps.painting import Image, Painter
@@ -65,16 +66,20 @@ class MapRequest:
     def check(self, grid: ZoiGrid) -> None:
         """Raise ConfigError where a number is impossible, or out of range for ``grid``."""
         extent = max(grid.shape) * grid.step
+        whole = Message("0 to {extent} px, the extent of the grid", extent)
+        steps, times = Message("0 to {most} steps", MAX_STEPS), Message("0 to {most} times", MAX_SHARPENED)
         limit, low_pass, odd = self.limit, self.low_pass_px, self.median in range(1, MAX_MEDIAN + 1, 2)
         for what, value, well, allowed in (
             ("limit", limit, limit is None or 0 < limit < math.inf, "a number above 0"),
-            ("median", self.median, odd, f"an odd number from 1 to {MAX_MEDIAN}"),
-            ("low-pass", low_pass, 0 <= low_pass <= extent, f"0 to {extent} px, the extent of the grid"),
-            ("deconvolution", self.deconvolution, 0 <= self.deconvolution <= MAX_STEPS, f"0 to {MAX_STEPS} steps"),
-            ("sharpening", self.sharpened, 0 <= self.sharpened <= MAX_SHARPENED, f"0 to {MAX_SHARPENED} times"),
+            ("median", self.median, odd, Message("an odd number from 1 to {most}", MAX_MEDIAN)),
+            ("low-pass", low_pass, 0 <= low_pass <= extent, whole),
+            ("deconvolution", self.deconvolution, 0 <= self.deconvolution <= MAX_STEPS, steps),
+            ("sharpening", self.sharpened, 0 <= self.sharpened <= MAX_SHARPENED, times),
         ):  # fmt: skip
             if not well:
-                raise ConfigError(f"a {what} of {value} is not possible; allowed: {allowed}")
+                raise ConfigError(
+                    "a {what} of {value} is not possible; allowed: {allowed}", what, value, allowed
+                )
         if self.sharpened and not self.deconvolution:
             raise ConfigError("only a deconvolved map can be sharpened; add --deconvolve STEPS")
 
@@ -165,16 +170,16 @@ def save(image: Image, path: Path) -> None:
         It cannot be written.
     """
     if path.suffix.lower() not in FORMATS:
-        raise ConfigError(f"{path}: choose a name that ends in {', '.join(FORMATS)}")
+        raise ConfigError("{path}: choose a name that ends in {endings}", path, ", ".join(FORMATS))
     _, data = load_cv2().imencode(path.suffix.lower(), image)
     try:
         with path.open("xb") as file:
             file.write(bytes(data))
     except FileExistsError:
-        raise ConfigError(f"{path} exists and is not overwritten; choose another name") from None
+        raise ConfigError("{path} exists and is not overwritten; choose another name", path) from None
     except OSError as error:
         raise DataError(
-            f"{path}: cannot be written: {error.strerror}; look at the folder and the disk"
+            "{path}: cannot be written: {strerror}; look at the folder and the disk", path, error.strerror
         ) from None
 
 
@@ -202,9 +207,12 @@ def _treated(strain: Strain, request: MapRequest) -> NDArray[np.float64]:
 def _check_blur(measure: Mapping[str, Any], field: str) -> None:
     """Raise ConfigError where the blur of the map is not known."""
     if field.startswith(("sigma", "residual")):
-        raise ConfigError(f"{field} has no blur to remove; deconvolve a displacement or a strain")
+        raise ConfigError("{field} has no blur to remove; deconvolve a displacement or a strain", field)
     for key, value in (("order", 1), ("window", "gaussian"), ("estimator", "spectral")):
         if measure.get(key, value) != value:
             raise ConfigError(
-                f"only maps measured with {key} = {value} can be deconvolved, not with {measure[key]}"
+                "only maps measured with {key} = {value} can be deconvolved, not with {other}",
+                key,
+                value,
+                measure[key],
             )

@@ -46,12 +46,13 @@ def tests_of(runs: Sequence[RunFolder]) -> list[ComparedTest]:
         raise ConfigError("--compare needs at least two runs")
     for run in runs:
         if not run.strain.n:
-            raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to compare")
+            raise DataError("{path}: holds no measurement, there is nothing to compare", run.strain.path)
     found = [ComparedTest(run.title, str(run.path), EvaluatedCurve.of(run)) for run in runs]
     if len({test.curve.is_stress for test in found}) > 1:
         without = ", ".join(test.path for test in found if not test.curve.is_stress)
         raise ConfigError(
-            f"{without}: no section is known, the other runs have stresses; replay it with --section W,T to compare"
+            "{runs}: no section is known, the other runs have stresses; replay it with --section W,T to compare",
+            without,
         )
     return found
 

@@ -94,7 +94,7 @@ def make_report(run: RunFolder, wanted: ReportRequest, screen: Screen) -> Report
         Its files cannot be read, or hold no measurement, or not this map.
     """
     if not run.strain.n:
-        raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to report")
+        raise DataError("{path}: holds no measurement, there is nothing to report", run.strain.path)
     content = _content(run, wanted, screen)
     for side in _SIDES:
         text = storable(page(f"{run.title}: phasedic report", _parts(content, wanted, side)))

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from acquire.errors import ConfigError, DataError
+from acquire.text import Message
 from live.pipeline.screen import Screen
 from live.results.export.atomic_file import new_file, new_folder
 from live.results.report.report import Report
@@ -25,8 +26,9 @@ _NAMES = (
     "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
 )
 _INSTALL = "`apt install chromium` on Debian"
-NO_BROWSER = (
-    f"no browser was found (chromium, Chrome or Edge); print the page from yours, or install one: {_INSTALL}"
+NO_BROWSER = Message(
+    "no browser was found (chromium, Chrome or Edge); print the page from yours, or install one: {command}",
+    _INSTALL,
 )
 NO_PNG = f"no browser was found, so the figures are SVG and CSV without PNG ({_INSTALL} installs one)"
 _TIMEOUT_S = 120
@@ -76,10 +78,12 @@ def _run(page: Path, target: Path, arguments: list[str]) -> None:
                 check=False,
             )
         except subprocess.TimeoutExpired:
-            raise DataError(f"{browser} did not finish {target.name} within {_TIMEOUT_S} s") from None
+            raise DataError(
+                "{browser} did not finish {file} within {limit} s", browser, target.name, _TIMEOUT_S
+            ) from None
     if not target.exists() or not target.stat().st_size:
         words = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
-        raise DataError(f"{browser} failed on {page.name} ({' '.join(words)})")
+        raise DataError("{browser} failed on {page} ({why})", browser, page.name, " ".join(words))
 
 
 def save_page(report: Report, path: Path) -> None:
@@ -94,7 +98,9 @@ def save_pdf(page: Path, path: Path) -> None:
         try:
             to_pdf(page, part)
         except DataError as error:
-            raise DataError(f"{path}: {error}; open {page} in a browser and print it") from error
+            raise DataError(
+                "{path}: {why}; open {page} in a browser and print it", path, error, page
+            ) from error
 
 
 def save_figures(figures: Sequence[Plot], folder: Path, screen: Screen) -> None:

@@ -111,7 +111,7 @@ class _Places:
             slope += ResponseSums.of(over.x[row], y, s_y, segment, s_x, s_x**2 * (over.name == MEAN))
             poisson += ResponseSums.of(y, z, s_z, segment, s_y, both * s_y * s_z)
         if not used:
-            raise DataError(f"the load rises at {len(over.rows)} of {self._strain.n} instants")
+            raise DataError("the load rises at {n} of {of} instants", len(over.rows), self._strain.n)
         lines, beside, name = slope.lines(), poisson.lines(), slope_name(over.name)
         fates = np.where(np.isfinite(found[0].at) & bool(leaves), 1, np.where(found[0].seen, 0, 2))
         maps: dict[str, NDArray[Any]] = {

@@ -82,7 +82,7 @@ def check_channel(name: str, config: Config, *, forces: bool) -> None:
     """
     if name == STRESS and not (forces and config.specimen.area_m2):
         what = "a section (--section W,T)" if forces else "forces (--load FILE.csv)"
-        raise ConfigError(f"--response stress needs {what}; --response mean needs neither")
+        raise ConfigError("--response stress needs {what}; --response mean needs neither", what)
     if name not in ("", *CHANNELS, *config.gauges):
         known = ", ".join((*CHANNELS, *config.gauges))
-        raise ConfigError(f"--response {name}: there is no such gauge; give one of {known}")
+        raise ConfigError("--response {name}: there is no such gauge; give one of {known}", name, known)

@@ -106,7 +106,7 @@ def fill_group(path: Path, maps: Mapping[str, NDArray[Any]], about: Mapping[str,
                 kept = group.attrs[name]
                 group.attrs.modify(name, np.asarray(value, kept.dtype))
     except (OSError, RuntimeError, KeyError) as error:
-        raise DataError(f"{path}: the response cannot be written ({reason(error)})") from error
+        raise DataError("{path}: the response cannot be written ({why})", path, reason(error)) from error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,7 +161,10 @@ def read_response(entry: Any, shape: tuple[int, int]) -> StoredResponse | None:
     )
     if as_text(strain) not in ("exx", "eyy"):
         raise DataError(
-            f"{entry.file.filename}: {GROUP}/@strain is {printable(as_text(strain))!r}; make it again"
+            "{path}: {group}/@strain is {value}; make it again",
+            entry.file.filename,
+            GROUP,
+            repr(printable(as_text(strain))),
         )
     channel = printable(as_text(channel))
     maps = open_datasets(group, dict.fromkeys(map_names(channel), Declared("f4", shape)))

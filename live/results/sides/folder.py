@@ -42,13 +42,18 @@ def shift_s(front: RunFolder, back: RunFolder) -> float:
         if run.session is None and front.strain.start_utc == back.strain.start_utc:
             return 0.0
         if run.session is None:
-            raise DataError(f"{run.path}: no recording, whose clock is needed; give the folders of two runs")
+            raise DataError(
+                "{path}: no recording, whose clock is needed; give the folders of two runs", run.path
+            )
     by_machine = back.start_monotonic - front.start_monotonic
     begun = (datetime.fromisoformat(run.strain.start_utc) for run in (back, front))
     by_day = (next(begun) - next(begun)).total_seconds()
     if abs(by_machine - by_day) > CLOCKS_AGREE_S:
         raise DataError(
-            f"{front.path} and {back.path}: their clocks are {abs(by_machine - by_day):.0f} s apart; record both on one"
-            " machine, without a restart in between"
+            "{front} and {back}: their clocks are {apart:.0f} s apart; record both on one machine, without a restart"
+            " in between",
+            front.path,
+            back.path,
+            abs(by_machine - by_day),
         )
     return by_machine

@@ -132,7 +132,9 @@ class SidesOfTest:
         found = cls.of(*sides, tensile_options(front.specimen))
         if not np.isfinite(found.courses[AXIAL].mean).any():
             raise DataError(
-                f"{front.path} and {back.path} have no instant in common; they are not of one test"
+                "{front} and {back} have no instant in common; they are not of one test",
+                front.path,
+                back.path,
             )
         return found
 

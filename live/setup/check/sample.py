@@ -146,8 +146,10 @@ def stack_of(frames: Sequence[Frame], camera: CameraInfo, lost: int, address: st
     needed = MIN_FRAMES if camera.live else 1
     if len(frames) < needed:
         raise DataError(
-            f"{printable(address)}: gave {len(frames)} whole frames, a check needs {needed};"
-            " look at the camera, or give more pictures"
+            "{address}: gave {n} whole frames, a check needs {needed}; look at the camera, or give more pictures",
+            printable(address),
+            len(frames),
+            needed,
         )
     return FrameStack(np.stack([f.image for f in frames]), np.array([f.t for f in frames]), lost, camera)
 

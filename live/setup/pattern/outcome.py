@@ -177,15 +177,15 @@ def save_new(drawn: Any, path: Path) -> None:
         It cannot be written.
     """
     if path.suffix.lower() not in (".png", ".svg", ".pdf"):
-        raise ConfigError(f"{path}: choose a name that ends in .png, .svg or .pdf")
+        raise ConfigError("{path}: choose a name that ends in .png, .svg or .pdf", path)
     try:
         with path.open("xb") as file:
             drawn.savefig(file, dpi=110, format=path.suffix.lower()[1:])
     except FileExistsError:
-        raise ConfigError(f"{path} exists and is not overwritten; choose another name") from None
+        raise ConfigError("{path} exists and is not overwritten; choose another name", path) from None
     except OSError as error:
         raise DataError(
-            f"{path}: cannot be written: {error.strerror}; look at the folder and the disk"
+            "{path}: cannot be written: {strerror}; look at the folder and the disk", path, error.strerror
         ) from None
 
 

@@ -54,11 +54,13 @@ def characterise_pattern(arguments: argparse.Namespace, folder: Path) -> int:
     """
     picture, bits = _picture(Path(arguments.pattern), arguments.roi)
     if arguments.noise is not None and not arguments.noise >= 0:
-        raise ConfigError(f"--noise {arguments.noise}: give a standard deviation in grey levels, 0 or more")
+        raise ConfigError(
+            "--noise {given}: give a standard deviation in grey levels, 0 or more", arguments.noise
+        )
     if arguments.burst is not None and arguments.burst < 1:
-        raise ConfigError(f"--burst {arguments.burst}: give 1 or more frames")
+        raise ConfigError("--burst {given}: give 1 or more frames", arguments.burst)
     if not arguments.target > 0:
-        raise ConfigError(f"--target {arguments.target}: give a strain noise in um/m above 0")
+        raise ConfigError("--target {given}: give a strain noise in um/m above 0", arguments.target)
     progress, begin = ProgressBar("pattern", sys.stderr), time.monotonic()
     context = ExperimentContext(folder, arguments.quick, None, progress)
     outcome = pattern(context, picture, bits, arguments.noise, arguments.burst, arguments.target * 1e-6)
@@ -85,16 +87,24 @@ def _picture(path: Path, roi: str | None) -> tuple[NDArray[Any], int]:
         try:
             x, y, width, height = (int(part) for part in roi.split(","))
         except ValueError:
-            raise ConfigError(f"--roi {roi}: give four whole numbers x,y,width,height") from None
+            raise ConfigError("--roi {roi}: give four whole numbers x,y,width,height", roi) from None
         rows, columns = picture.shape
         if min(x, y) < 0 or x + width > columns or y + height > rows or min(width, height) < 1:
-            raise ConfigError(f"--roi {roi} leaves the picture of {picture.shape[1]} x {picture.shape[0]} px")
+            raise ConfigError(
+                "--roi {roi} leaves the picture of {width} x {height} px",
+                roi,
+                picture.shape[1],
+                picture.shape[0],
+            )
         picture = picture[y : y + height, x : x + width]
     top, left = (max(0, (side - LARGEST) // 2) for side in picture.shape)
     picture = picture[top : top + LARGEST, left : left + LARGEST]
     if min(picture.shape) < 64:
         raise DataError(
-            f"{path}: {picture.shape[1]} x {picture.shape[0]} px are too few; 64 x 64 are needed at least"
+            "{path}: {width} x {height} px are too few; 64 x 64 are needed at least",
+            path,
+            picture.shape[1],
+            picture.shape[0],
         )
     return picture, bits
 

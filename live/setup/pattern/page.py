@@ -105,4 +105,6 @@ def write_page(outcomes: list[ExperimentOutcome], target: Path, folder: Path, ty
         if verdicts := [v for outcome in outcomes for v in outcome.verdicts]:
             (folder / "verdicts.csv").write_text(_table(verdicts).csv(), encoding="utf-8")
     except OSError as error:
-        raise DataError(f"{target} cannot be written: {error.strerror}; give another --page") from error
+        raise DataError(
+            "{path} cannot be written: {why}; give another --page", target, error.strerror
+        ) from error

@@ -165,13 +165,17 @@ def selected_rows(run: RunFolder, request: ShowRequest) -> tuple[int, ...]:
     """
     t = run.strain.time_s
     if not len(t):
-        raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to show")
+        raise DataError("{path}: holds no measurement, there is nothing to show", run.strain.path)
     low = -math.inf if request.start_s is None else request.start_s
     high = math.inf if request.end_s is None else request.end_s
     rows = np.flatnonzero((t >= low) & (t <= high))
     if not len(rows):
         raise ConfigError(
-            f"--from, --to: no measurement between {low:g} and {high:g} s; they reach from {t[0]:.6g} to {t[-1]:.6g} s"
+            "--from, --to: no measurement between {low:g} and {high:g} s; they reach from {first:.6g} to {last:.6g} s",
+            low,
+            high,
+            t[0],
+            t[-1],
         )
     every = request.every or math.ceil(len(rows) * _bytes_each(run) / MAX_BYTES)
     return tuple(int(row) for row in rows[::-1][::every][::-1])

@@ -214,8 +214,11 @@ def _open_server(port: int) -> _Server:
         return _Server((HOST, port), _Handler)
     except OSError as error:
         raise DeviceError(
-            f"the page: no port from {port} to {port + TRIES - 1} is free on {HOST} ({error});"
-            " end the programs that use them"
+            "the page: no port from {port} to {last} is free on {host} ({why}); end the programs that use them",
+            port,
+            port + TRIES - 1,
+            HOST,
+            error,
         ) from None
 
 
