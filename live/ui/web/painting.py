@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
+from analysis.field import ZoiGrid
 from live.results.maps.colours import ramp
 
 MAX_SIDE_PX = 960
@@ -55,6 +56,30 @@ def as_jpeg(picture: Bytes) -> bytes:
 def as_png(picture: NDArray[Any]) -> bytes:
     """A picture as the bytes of a file, without loss."""
     _, content = load_cv2().imencode(".png", picture)
+    return bytes(content)
+
+
+def cells_png(
+    size: tuple[int, int], zoom: float, grid: ZoiGrid, cells: Bytes, moved: tuple[float, float]
+) -> bytes:
+    """RGBA ``cells`` (R, C, 4) of ``grid``, moved by (x, y) px, as a PNG of (width, height) px to lay over a picture.
+
+    Where there is a colour it is full: the page has the opacity. ``zoom``: px of the PNG for one of the camera.
+    """
+    step = grid.step * zoom
+    at = [
+        (start + (m if math.isfinite(m) else 0.0) + 0.5) * zoom - 0.5
+        for start, m in zip((grid.x[0], grid.y[0]), moved, strict=True)
+    ]
+    full = np.concatenate([cells[..., 2::-1], np.where(cells[..., 3:] > 0, 255, 0).astype(np.uint8)], axis=-1)
+    cv2 = load_cv2()
+    place = np.array([[step, 0, at[0]], [0, step, at[1]]], np.float64)
+    layer = cv2.warpAffine(full, place, size, flags=cv2.INTER_NEAREST, borderValue=(0, 0, 0, 0))
+    _, content = cv2.imencode(
+        ".png",
+        layer,
+        [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE],
+    )
     return bytes(content)
 
 

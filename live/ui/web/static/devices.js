@@ -24,7 +24,6 @@ $("loadform").addEventListener("submit", (event) => { event.preventDefault(); ch
 onChoice($("format"), (value) => change({ do: "option", key: "format", value }));
 $("rate").addEventListener("change", (event) => { change({ do: "option", key: "fps", value: event.target.value }); event.target.blur(); });
 $("identify").addEventListener("click", () => change({ do: "identify", port: $("loadaddress").value.split("?")[0] }));
-$("tab-devices").addEventListener("click", () => { if (!shown.cameras?.length) change({ do: "devices" }); });
 
 export function showDevices(value) {
   const { devices, load } = value;
@@ -45,12 +44,14 @@ export function showDevices(value) {
 
 function showLoad(load) {
   const none = load.address === "none:", [force, noise] = withSigma(load.force_N, load.noise_N, { factor: 1, digits: 1 });
-  put($("setupforce"), none ? t("none") : load.force_N == null ? "–" : `${force} N`);
-  put($("forcenoise"), none || load.noise_N == null ? "–" : `${noise || fixed(load.noise_N, 1)} N`);
+  put($("setupforce"), none ? t("none") : load.force_N == null ? "–" : force);
+  put($("forcenoise"), none || load.noise_N == null ? "" : `± ${noise || fixed(load.noise_N, 1)} N`);
+  put($("forcerate"), load.rate == null ? "" : `${fixed(load.rate)} 1/s`);
   put($("loadtrouble"), t(load.trouble));
-  put($("loadname"), none ? t("no load cell: no force, no stress, no modulus") : load.rate == null ? t(load.name) : `${t(load.name)}, ${load.rate.toPrecision(3)} 1/s`);
+  put($("loadname"), none ? t("no load cell: no force, no stress, no modulus") : load.rate == null ? t(load.name) : `${t(load.name)}, ${fixed(load.rate)} 1/s`);
   put($("zero"), load.zero_N ? `${t("zero")} ${fixed(load.zero_N, 1)} N` : "");
-  $("setupforce").classList.toggle("bad", Boolean(load.trouble));
+  $("setupforcetile").classList.toggle("stale", Boolean(load.trouble));
+  $("setupforce").nextElementSibling.hidden = none;
 }
 
 function keep(input, value) {

@@ -86,6 +86,7 @@ export function zoomable(content, place) {
     scale = next;
     show();
   };
+  svg.addEventListener("fit", reset);
   frame.addEventListener("wheel", (event) => {
     event.preventDefault();
     zoom(event.deltaY < 0 ? 1.25 : 0.8, event.clientX, event.clientY);
