@@ -18,6 +18,7 @@ from live.commands.environment import check_environment, limit_resources
 from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.signals import ended_by_sigterm
 from live.commands.streams import nonblocking_streams
+from live.words.language import said_here
 
 _WRONG_PATH = {errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}
 
@@ -120,7 +121,7 @@ def _system_error(error: OSError) -> PhasedicError:
 
 
 def _refused(error: PhasedicError) -> int:
-    print(f"phasedic: {printable(brief(error))}", file=sys.stderr)
+    print(f"phasedic: {said_here(printable(brief(error)))}", file=sys.stderr)
     return error.exit_code
 
 

@@ -149,8 +149,8 @@ class LoadLog:
         if gap <= self._max_gap_s:
             return Message("the readings beside it have no value (overload, tare, lines lost)")
         return Message(
-            "the readings of the load cell whose time is known are {gap:.2g} s apart, load.max_gap_s is "
-            "{max_gap_s:g} s; let it send more often, one line at a time, or set load.max_gap_s",
+            "readings of the load cell with a time are {gap:.2g} s apart, load.max_gap_s is {max_gap_s:g} "
+            "s; let it send more often, or set load.max_gap_s",
             gap,
             self._max_gap_s,
         )

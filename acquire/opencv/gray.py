@@ -15,8 +15,8 @@ GRAYS = ("luma", "r", "g", "b")
 _PLANE = {"b": 0, "g": 1, "r": 2}  # OpenCV's order
 
 WEBCAM_WARNING = Message(
-    "grey is the luma of a compressed colour stream: about 220 of 256 levels, clipped at both ends, with "
-    "noise that averaging does not remove; a camera with a raw grey format measures better"
+    "grey is the luma of a compressed colour stream: clipped, with noise that averaging does not "
+    "remove; a raw grey format measures better"
 )
 
 

@@ -6,14 +6,18 @@ put the template of another language in place of the English one and fill in the
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any, Self
 
+from acquire.text.quantity import Quantity
+
 FIELD = re.compile(r"\{\{|\}\}|\{(\w+)(?::([^{}]*))?\}")
 """A named field of a template, with its format, or a doubled brace, which is one of the text."""
 SAY, WITH = "say", "with"  # keys of a message as JSON
+QUANTITY = Quantity("strain", 0.0).to_json().keys()
 
 
 def filled(template: str, values: Mapping[str, Any], shown: Callable[[Any, str], str]) -> str:
@@ -39,7 +43,7 @@ class Message(str):
     template : str
     *given
         The values of the fields, in the order in which they first stand in the template: numbers, names, or
-        messages; what else is given counts as its text.
+        quantities, or messages; what else is given counts as its text.
     **named
         Others by their names.
 
@@ -94,7 +98,7 @@ def _made(template: str, values: Mapping[str, Any]) -> Message:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, Message):
+    if isinstance(value, Message | Quantity):
         return value.to_json()
     if hasattr(value, "item"):
         value = value.item()
@@ -102,13 +106,16 @@ def _plain(value: Any) -> Any:
 
 
 def from_json(value: Any) -> Any:
-    """The message of such an object; any other value as it is. Fit for ``object_hook`` of ``json.loads``."""
+    """The message or quantity of such an object, else the value as it is; fit for ``object_hook`` of ``json.loads``."""
     if isinstance(value, dict) and value.keys() == {SAY, WITH}:
         return Message(value[SAY], **{key: from_json(one) for key, one in value[WITH].items()})
+    if isinstance(value, dict) and "kind" in value and value.keys() == QUANTITY:
+        known: dict[str, Any] = {key: math.nan if one is None else one for key, one in value.items()}
+        return Quantity(**known)
     return value
 
 
-def joined(between: str, parts: Iterable[str]) -> Message:
+def joined(between: str, parts: Iterable[str | Quantity]) -> Message:
     """The parts that are not empty, one after the other, each still to be translated."""
     kept = [part for part in parts if part]
     names = [f"part{k}" for k in range(len(kept))]

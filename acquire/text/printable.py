@@ -64,6 +64,8 @@ def _escaped(found: re.Match[str]) -> str:
 
 def share_text(share: float) -> str:
     """What marks a value whose area lost a block: "of 83 % of the area"; empty where it stands for all of it."""
-    return (
-        "" if share == 1 else f"of {min(math.floor(100 * share + 1e-4), 99)} % of the area"
+    if share == 1:
+        return ""
+    return Message(
+        "of {share} % of the area", min(math.floor(100 * share + 1e-4), 99)
     )  # float32 may be below

@@ -26,8 +26,8 @@ LUMA_WARNING = Message(
     "255; a raw grey format measures better"
 )
 BAYER_WARNING = Message(
-    "raw mosaic of a colour sensor: neighbouring pixels see different colours, which adds a pattern that "
-    "does not move; use plane=g (half the size), a monochrome camera, or white light on a grey pattern"
+    "raw mosaic of a colour sensor: its colours add a pattern that stands still; use plane=g (half "
+    "the size), a monochrome camera, or white light"
 )
 JPEG_WARNING = Message(
     "compressed pictures: artefacts of 0.6 to 1.7 GL rms that no averaging removes, and displacements "

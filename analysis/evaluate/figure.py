@@ -26,6 +26,8 @@ class Figure:
         Why it cannot be had; of a value, a remark, mostly none.
     qualifier : str
         What kind of a number it is: ``AT_LEAST`` of a bound, "film" of a compressed film; mostly none.
+    applies : bool
+        The standard of the evaluation has such a figure.
     """
 
     value: float
@@ -33,6 +35,7 @@ class Figure:
     high: float
     why: str = ""
     qualifier: str = ""
+    applies: bool = True
 
     @classmethod
     def about(cls, value: float, sigma: float, dof: float = math.inf, why: str = "") -> Figure:
@@ -41,9 +44,9 @@ class Figure:
         return cls(value, value - half, value + half, why)
 
     @classmethod
-    def none(cls, why: str) -> Figure:
+    def none(cls, why: str, *, applies: bool = True) -> Figure:
         """No value, and why."""
-        return cls(math.nan, math.nan, math.nan, why)
+        return cls(math.nan, math.nan, math.nan, why, applies=applies)
 
     @property
     def known(self) -> bool:

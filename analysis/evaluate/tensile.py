@@ -242,7 +242,7 @@ def _poisson(loading: Loading, line: FittedLine, standard: Standard) -> Figure:
 
 
 def _without_flow(figures: TensileFigures) -> TensileFigures:
-    none = Figure.none(Message("not a figure of {standard}", figures.standard))
+    none = Figure.none(Message("not a figure of {standard}", figures.standard), applies=False)
     return replace(
         figures, Rp01=none, Rp02=none, Rp1=none, ReH=none, ReL=none, Ag=none, A=none, r=none, n=none
     )

@@ -62,10 +62,10 @@ def put_together(front: Path, back: Path, out: Path, screen: Screen) -> None:
 
 
 def _strains(sides: SidesOfTest) -> Iterator[str]:
-    """The last instant that both sides have, µm/m."""
+    """The last instant that both sides have."""
     from live.ui.terminal.status_line import strain_text
 
-    yield "at the end, µm/m:      mean of both        front minus mean"
+    yield "at the end:            mean of both        front minus mean"
     for name, one in sides.courses.items():
         known = np.flatnonzero(np.isfinite(one.mean))
         if len(known):

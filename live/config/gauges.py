@@ -69,8 +69,8 @@ def _check_zois(gauge: Gauge, grid: ZoiGrid) -> None:
     if all(mask.any() for mask in gauge.zois(grid)):
         return
     raise ConfigError(
-        "gauges.{name}: no ZOI is there; the centres of ZOIs reach from {x:g}, {y:g} to {x2:g}, {y2:g} px, "
-        "and a mask may leave some out; move or widen the gauge, or take it out of the configuration",
+        "gauges.{name}: no ZOI is there; their centres reach from {x:g}, {y:g} to {x2:g}, {y2:g} px, "
+        "less the mask; move or widen the gauge",
         gauge.name,
         grid.x[0],
         grid.y[0],

@@ -100,8 +100,8 @@ def options() -> dict[str, tuple[str, dataclasses.Field[Any]]]:
     return found
 
 
-def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
-    """Read ``path`` and apply ``overrides`` ("measure.zoi" -> 32).
+def load_config(path: Path | None, overrides: Mapping[str, Any], text: str | None = None) -> Config:
+    """Read ``path`` and apply ``overrides`` ("measure.zoi" -> 32); ``text`` is what the file is to hold.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
         Missing or malformed file, unknown key, wrong type, impossible value.
     """
     return _overlaid(
-        {} if path is None else _read_toml(path), overrides, str(path or Message("command line"))
+        {} if path is None else _read_toml(path, text), overrides, str(path or Message("command line"))
     )
 
 
@@ -169,18 +169,18 @@ def _overlaid(tree: Mapping[str, Any], overrides: Mapping[str, Any], where: str)
     return _build(merged, where)
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
-    tree = _plain_toml(path)
+def _read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
+    tree = _plain_toml(path, text)
     if isinstance(tree.get("lens"), str):
         tree["lens"] = lens_in(Path(tree["lens"]))
     return tree
 
 
-def _plain_toml(path: Path) -> dict[str, Any]:
-    if not path.exists():
+def _plain_toml(path: Path, text: str | None = None) -> dict[str, Any]:
+    if text is None and not path.exists():
         raise ConfigError("{path}: there is no such configuration file", path)
     try:
-        return tomllib.loads(read_bytes(path, MAX_BYTES).decode("utf-8-sig"))
+        return tomllib.loads(read_bytes(path, MAX_BYTES).decode("utf-8-sig") if text is None else text)
     except (DataError, UnicodeDecodeError) as error:
         raise ConfigError("{path}: cannot be read ({error}); give a text file in TOML", path, error) from None
     except RecursionError:

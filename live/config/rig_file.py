@@ -111,14 +111,14 @@ def _toml_value(value: Any) -> Any:
 
 
 def _write_checked(path: Path, text: str) -> Config:
-    """Check ``text`` in a temporary file, then replace ``path`` by it."""
+    """Check ``text``, write it into a temporary file, then replace ``path`` by that."""
     part = path.with_name(f".{path.name}.{uuid4().hex[:8]}.part")
     try:
         with part.open("x", encoding="utf-8") as file:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
-        config = _checked(part, path)
+        config = load_config(path, {}, text)
         if path.exists():
             shutil.copymode(path, part)
             shutil.copy2(path, path.with_name(f"{path.name}.bak"))
@@ -130,10 +130,3 @@ def _write_checked(path: Path, text: str) -> Config:
     finally:
         part.unlink(missing_ok=True)
     return config
-
-
-def _checked(part: Path, path: Path) -> Config:
-    try:
-        return load_config(part, {})
-    except ConfigError as error:
-        raise ConfigError(error.text.replace(str(part), str(path))) from None

@@ -9,6 +9,7 @@ import numpy as np
 
 from acquire.events import Event, EventKind, EventSink, Level
 from acquire.text import Message
+from acquire.text.quantity import Quantity
 from analysis.field import Blur
 from analysis.field.picture_error import LIMIT, PictureError
 from analysis.optics import alike, keystones
@@ -105,10 +106,10 @@ class StrainGuard:
             self._warned = True
             text = Message(
                 "turned by {degrees:.1f} degrees, strained by {strained:.1%}: small strains are off by about "
-                "{turned:.0f} µm/m; measure with --strain engineering",
+                "{off}; measure with --strain engineering",
                 math.degrees(turned),
                 strained,
-                (turned**2 + strained**2) / 2 * 1e6,
+                Quantity("strain", (turned**2 + strained**2) / 2),
             )
             data = {"rotation": turned, "strain": strained}
             self._on_event(Event(step.t, EventKind.MEASUREMENT, "strain", text, "warning", data))
@@ -157,10 +158,10 @@ class DilatationGuard:
             else Message(" by {size:.2f} mm", abs(false) * self._stand_off_mm)
         )
         return Message(
-            "the strains along and across do not fit nu = {nu:g}: {false:+.0f} µm/m in both is as from "
-            "motion{far} {way} the camera, and no strain; E is off by it too (docs/optics.md)",
+            "the strains along and across do not fit nu = {nu:g}: {false} in both is as from "
+            "motion{far} {way} the camera, and no strain; E is off too (docs/optics.md)",
             nu,
-            false * 1e6,
+            Quantity("strain", false),
             far,
             way,
         )
@@ -195,9 +196,9 @@ class TiltGuard:
             if false:
                 self._seeks_dilatation = False
                 text = Message(
-                    "exx and eyy are alike, {false:+.0f} µm/m: as from motion by {size:.1e} of the stand-off or from "
+                    "exx and eyy are alike, {false}: as from motion by {size:.1e} of the stand-off or from "
                     "temperature, not from a load along one axis (docs/optics.md)",
-                    false * 1e6,
+                    Quantity("strain", false),
                     abs(false),
                 )
                 self._emit(step, text, false)
@@ -217,9 +218,9 @@ class TiltGuard:
             if self._focal_px is not None:
                 angle = Message(" by {size:.2g} degrees", abs(math.degrees(found.tilt(self._focal_px))))
             text = Message(
-                "strain rises by {rise:+.0f} µm/m {way}, in x and y alike: as from a tilt{angle}, or from a shift "
+                "strain rises by {rise} {way}, in x and y alike: as from a tilt{angle}, or from a shift "
                 "behind a lens that is not corrected (docs/optics.md)",
-                found.rise * 1e6,
+                Quantity("strain", found.rise),
                 way,
                 angle,
             )
@@ -279,20 +280,22 @@ def picture_words(field: StrainField) -> str:
     shown = CAUSES[error.cause]
     if not error.factor > 1:
         return Message(
-            "the picture shows {shown}: strain of a ZOI is uncertain by {sigma:.0f} µm/m", shown, sigma
+            "the picture shows {shown}: strain of a ZOI is uncertain by {sigma}",
+            shown,
+            Quantity("strain", sigma),
         )
     usual = sigma / error.factor
     return Message(
-        "the picture shows {shown}: strain of a ZOI is uncertain by {sigma:.0f} µm/m in place of {usual:.0f}",
+        "the picture shows {shown}: strain of a ZOI is uncertain by {sigma} in place of {usual}",
         shown,
-        sigma,
-        usual,
+        Quantity("strain", sigma),
+        Quantity("strain", usual),
     )
 
 
 def _usual_sigma(field: StrainField) -> float:
-    """Uncertainty of the strain of a ZOI, um/m: median of both directions."""
-    return float(np.nanmedian(np.hypot(field.sigma_exx, field.sigma_eyy))) / math.sqrt(2) * 1e6
+    """Uncertainty of the strain of a ZOI: median of both directions."""
+    return float(np.nanmedian(np.hypot(field.sigma_exx, field.sigma_eyy))) / math.sqrt(2)
 
 
 class BlurGuard:
@@ -332,10 +335,10 @@ def _blur_words(blur: Blur, field: StrainField) -> str:
     sigma = _usual_sigma(field)
     return Message(
         "the picture is {text} since the reference: look at focus, distance and exposure; strain of a ZOI is "
-        "uncertain by {sigma:.0f} µm/m in place of {sigma2:.0f}",
+        "uncertain by {sigma} in place of {usual}",
         blur.text,
-        sigma,
-        sigma / error.factor,
+        Quantity("strain", sigma),
+        Quantity("strain", sigma / error.factor),
     )
 
 

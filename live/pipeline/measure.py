@@ -166,8 +166,8 @@ class PlateCorrection:
     def _choose(self, whole: StrainField, burst: Burst) -> Model:
         chosen = choose_model(self._fit, whole, self._focal_px)
         text = Message(
-            "plates {listed}: {model} is corrected; in the mean strain that leaves {noise:.1f} µm/m by noise of "
-            "one burst and {unseen:.1f} µm/m by a tilt of {degrees:.1g} degrees",
+            "plates {listed}: {model} is corrected; that leaves {noise:.1f} µm/m of noise in the mean "
+            "strain, and {unseen:.1f} µm/m by a tilt of {degrees:.1g} degrees",
             ", ".join(self._fit.layout.plates),
             chosen.model,
             chosen.noise * 1e6,

@@ -226,6 +226,7 @@ class RunState:
         return Snapshot(
             t=now,
             state="ENDED" if ended else health.state or "REPLAY",
+            paused=health.paused and not ended,
             elapsed_s=t - health.began_t,
             figures=figures,
             peak_N=health.peak_N,

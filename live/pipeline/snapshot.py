@@ -53,6 +53,8 @@ class Snapshot:
         The counts of frames by name.
     time_step : TimeStep or None
         The last one measured.
+    paused : bool
+        The operator has paused measuring.
     """
 
     t: float
@@ -71,6 +73,7 @@ class Snapshot:
     faults: tuple[str, ...] = ()
     frames: Mapping[str, int] = field(default_factory=dict)
     time_step: TimeStep | None = None
+    paused: bool = False
 
     def figure(self, name: str) -> TimedFigure:
         """The figure of this name, of state "none" where there is no such source."""
@@ -82,6 +85,11 @@ class Snapshot:
             return _NO_FIGURE
         name = _OF_CHANNEL.get(channel, channel.removeprefix("sigma_"))
         return self.figure(name if name in self.figures or channel in _OF_CHANNEL else BURST)
+
+    @property
+    def doing(self) -> str:
+        """What is done with the frames, and whether measuring is paused."""
+        return Message("{state}, PAUSED", self.state) if self.paused else self.state
 
     @property
     def troubles(self) -> tuple[str, ...]:

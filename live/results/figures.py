@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from acquire.load_cell import LoadLog
+from acquire.text.quantity import Printed, Quantity, unit_of, with_sigma
 from analysis.evaluate import (
     AT_LEAST,
     CONFIDENCE,
@@ -41,17 +42,12 @@ _REMARKED = ("E", "nu", *_FLOW)
 _PLAIN, _PERCENT, _MPA, _GPA, _KN = ("", 1.0), ("%", 0.01), ("MPa", 1e6), ("GPa", 1e9), ("kN", 1e3)
 _STRENGTH_SUFFIXES = dict(zip(_STRENGTHS, ("p0.1", "p0.2", "p1", "eH", "eL", "m"), strict=True))
 LAG_MATTERS_S = 0.005  # and beyond its own uncertainty: to correct a smaller one changes no figure
-_SMALL_KN = 2.0  # below it forces are shown in N
+_KINDS = {"GPa": "stress", "MPa": "stress", "kN": "force", "%": "share", "": ""}
 
 
 def value_text(value: float, sigma: float, unit: str) -> str:
     """``value ± sigma unit``, rounded to two digits of the uncertainty."""
-    if not math.isfinite(value):
-        return "not known"
-    if not math.isfinite(sigma) or sigma <= 0:
-        return f"{value:.4g} {unit}".rstrip()
-    digits = max(0, min(6, 1 - math.floor(math.log10(sigma))))
-    return f"{value:.{digits}f} ± {sigma:.{digits}f} {unit}".rstrip()
+    return str(Printed(*with_sigma(value, sigma, 2), unit)) if math.isfinite(value) else "not known"
 
 
 def figure_text(figure: Figure, unit_is: float = 1.0, unit: str = "") -> str:
@@ -98,10 +94,17 @@ class TensileRow:
 
     @property
     def number(self) -> str:
-        """Value, interval and unit for a person; forces below 2 kN in N."""
-        if self.unit == "kN" and abs(self.figure.value) < _SMALL_KN:
-            return figure_text(self.figure, 1e-3, "N")
-        return figure_text(self.figure, 1.0, self.unit)
+        """Value, interval and unit for a person."""
+        if not self.figure.known:
+            return "not known"
+        return f"{AT_LEAST} {self.quantity}" if self.figure.is_bound else str(self.quantity)
+
+    @property
+    def quantity(self) -> Quantity:
+        """The number and the larger half of its interval, in SI units."""
+        kind = _KINDS[self.unit]
+        one = unit_of(kind, 0.0, self.unit).one
+        return Quantity(kind, self.figure.value * one, self.half * one, 2)
 
     @property
     def text(self) -> str:
@@ -350,6 +353,6 @@ def _unknown_lines(rows: Mapping[str, TensileRow]) -> list[str]:
     reasons: dict[str, list[str]] = {}
     for key in ("E", *_STRENGTHS, *_EXTENSIONS, "nu", *_FLOW):
         figure = rows[key].figure
-        if not figure.known and not figure.why.startswith("not a figure of"):
+        if not figure.known and figure.applies:
             reasons.setdefault(figure.why, []).append(rows[key].name)
     return [f"not known: {', '.join(words)} ({why})" for why, words in reasons.items()]

@@ -9,6 +9,7 @@ import numpy as np
 
 from acquire.load_cell import LoadLog
 from acquire.text.printable import brief, share_text
+from acquire.text.quantity import Quantity
 from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
@@ -84,14 +85,17 @@ def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     last, strains = history.time_steps[-1], history.column("largest")[valid]
     largest = strains[np.argmax(np.abs(strains))]
     part = share_text(last.least_share)
-    means = f"exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
+    means = "  ".join(
+        f"{name} {Quantity('strain', getattr(last, name), getattr(last, f'sigma_{name}'))}"
+        for name in ("exx", "eyy", "exy")
+    )
     means = f"none, {last.apart}" if last.apart else means
     means = means if last.n_valid else f"no value, 0 of {last.n_zoi} ZOIs valid"
     lines = [
         *doubt_lines(test),
         valid_line(history),
         f"last strain of the region: {means}{f' {part}' if part else ''};"
-        f" largest of any ZOI {largest * 1e6:+.0f} µm/m",
+        f" largest of any ZOI {Quantity('strain', largest)}",
         *film_line(specimen),
         noise_line(history),
     ]

@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.text import Message
+from acquire.text.quantity import Quantity
 from live.config.channels import OF_LOAD, is_joint
 from live.config.loading import Config
 from live.config.sections import AlarmConfig
@@ -34,6 +35,7 @@ EVERY_S = 0.2
 _STRAINS = ("axial", "exx", "eyy", "exy", "largest")
 _TWO_CAMERAS = Message("a camera on each side: give --back")
 _UNITS = {"_N": "N", "_MPa": "MPa", "_s": "s", "_min": "min", "_GL": "GL", "": ""}
+_KINDS = {"_N": ("force", 1.0), "_MPa": ("stress", 1e6)}
 _LABELS = {
     "silent_s": Message("no frame for"),
     "load_silent_s": Message("no force for"),
@@ -148,19 +150,18 @@ def check_alarms(config: Config, *, both_sides: bool = False) -> None:
 
 
 def in_words(channel: str, value: float, limit: float) -> str:
-    """A channel at its value beyond its limit, for a person: ``axial 4450 um/m, limit 4000``."""
+    """A channel at its value beyond its limit, for a person: ``axial 4 450 µm/m, limit 4 000 µm/m``."""
     plain = channel
     for prefix in ("sigma_", "mean_", "bending_"):
         plain = plain.removeprefix(prefix)
-    if plain in _STRAINS or plain.startswith("gauge_"):
-        return Message(
-            "{channel} {value:.0f} µm/m, limit {limit:.0f}",
-            channel.replace("_", " "),
-            value * 1e6,
-            limit * 1e6,
-        )
     suffix = next((one for one in _UNITS if plain.endswith(one)), "")
     label = _LABELS.get(channel, channel.removesuffix(suffix).replace("_", " "))
+    kind, one = _KINDS.get(suffix, ("", 1.0))
+    if plain in _STRAINS or plain.startswith("gauge_"):
+        kind, one, label = "strain", 1.0, channel.replace("_", " ")
+    if kind:
+        value_of, limit_of = Quantity(kind, value * one), Quantity(kind, limit * one)
+        return Message("{channel} {value}, limit {limit}", label, value_of, limit_of)
     return Message("{label} {value:.6g} {UNITS}", label, value, _UNITS[suffix]).rstrip() + Message(
         ", limit {limit:.6g}", limit
     )

@@ -174,12 +174,10 @@ class CameraRun(Subscriber):
     def state(self) -> str:
         """What is done with the frames: "REC", "ARMED" ..."""
         if self.recording:
-            state = "REC"
-        elif self._recording is not None:
-            state = Message("NOT RECORDING") if self._has_recorded else "ARMED"
-        else:
-            state = Message("not recorded")
-        return Message("{state}, PAUSED", state) if self.paused else state
+            return "REC"
+        if self._recording is not None:
+            return Message("NOT RECORDING") if self._has_recorded else "ARMED"
+        return Message("not recorded")
 
     def command(self, kind: EventKind, note: str = "") -> str:
         """Carry out a command of the operator, but for a tare; raises ControlRefused where that is not possible."""

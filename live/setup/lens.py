@@ -33,8 +33,8 @@ def lens_for(config: Config, width: int, height: int, grid: ZoiGrid) -> LensMode
     lens = _lens(given)
     if given.picture is not None and given.picture != (width, height):
         raise ConfigError(
-            "lens: it was calibrated with pictures of {picture} x {picture2} px, these have {width} x {height}; "
-            "calibrate with the same format and --crop, or measure with --no-lens",
+            "lens: calibrated with pictures of {picture} x {picture2} px, these have {width} x {height}; "
+            "calibrate with the same format, or take --no-lens",
             given.picture[0],
             given.picture[1],
             width,
@@ -45,13 +45,8 @@ def lens_for(config: Config, width: int, height: int, grid: ZoiGrid) -> LensMode
     if given.box is not None and not _inside(given.box, x, y):
         left, top, across, down = given.box
         raise ConfigError(
-            "lens: ZOIs from {least:.0f},{least2:.0f} to {most:.0f},{most2:.0f} px leave the part that was calibrated, "
-            "{left:.0f},{top:.0f} to {left2:.0f},{top2:.0f}; calibrate over the whole region, take a smaller "
-            "--roi, or measure with --no-lens",
-            x.min(),
-            y.min(),
-            x.max(),
-            y.max(),
+            "lens: ZOIs leave the calibrated part, {left:.0f},{top:.0f} to {left2:.0f},{top2:.0f} px; "
+            "calibrate the whole region, or take a smaller --roi or --no-lens",
             left,
             top,
             left + across,

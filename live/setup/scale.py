@@ -343,8 +343,8 @@ def _tilt(change: float, uneven: float, extent: float, stand_off_mm: float | Non
         degrees = math.degrees(math.asin(min(change / extent * stand_off_mm, 1.0)))
     yield (
         Message(
-            "the board is tilted, about {degrees:.0f} degrees: the scale changes by {change:.1%} over it and by "
-            "{uneven:.1%} between its directions; set the camera square to the specimen",
+            "the board is tilted by {degrees:.0f} degrees: the scale changes by {change:.1%} over it, by "
+            "{uneven:.1%} between directions; set the camera square to it",
             degrees,
             change,
             uneven,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import logging
+import os
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -15,11 +16,13 @@ from typing import Any
 
 from acquire.text import Message
 from acquire.text.message import filled
+from acquire.text.quantity import Quantity
 
 log = logging.getLogger(__name__)
 
 LANGUAGES = ("de", "fr")
 """Beside English."""
+_OF_PROCESS = ("LC_ALL", "LC_MESSAGES", "LANG")
 FOLDER = Path(__file__).parent
 
 
@@ -68,6 +71,17 @@ def _unquoted(word: str) -> str:
     return value
 
 
+def of_terminal() -> str:
+    """The language of the terminal, from the variables of POSIX; English where there are no entries of it."""
+    given = next((value for name in _OF_PROCESS if (value := os.environ.get(name))), "")[:2]
+    return given if given in LANGUAGES else "en"
+
+
+def said_here(text: str) -> str:
+    """A text in the language of the terminal."""
+    return said(text, of_terminal())
+
+
 def said(text: str, language: str) -> str:
     """A text in a language: its template translated, and its values filled in, texts among them likewise."""
     words = entries(language)
@@ -79,6 +93,8 @@ def said(text: str, language: str) -> str:
     def shown(value: Any, spec: str) -> str:
         if isinstance(value, str):
             return format(said(value, language), spec)
+        if isinstance(value, Quantity):
+            return str(value.printed(language))
         number = format(value, spec)
         return number.replace(".", ",") if isinstance(value, float) else number
 

@@ -10,6 +10,7 @@ import numpy as np
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
+from acquire.text.quantity import IN_ASCII
 from analysis.field.grid import Roi, ZoiGrid
 from analysis.field.strain_field import StrainField
 from live.pipeline.measurement import Measurement
@@ -78,3 +79,8 @@ def make_loads(until: float, force: Callable[[float], float], rate: float = 100.
     for k in range(round(until * rate) + 1):
         log.append(LoadSample(START + k / rate, force(k / rate)))
     return log
+
+
+def in_ascii(text: str) -> str:
+    """The text as a terminal without other letters shows it."""
+    return text.translate(IN_ASCII)

@@ -99,7 +99,7 @@ def test_the_status_line_shows_gauges() -> None:
         ({"kind": "zoi"}, "gauges.g: a gauge of kind 'zoi' needs 'at'"),
         ({"start": [3, 4], "end": [3, 4]}, "are one point"),
         ({"kind": "area"}, "needs 'box'"),
-        ({"kind": "zoi", "at": [900, 3]}, "no ZOI is there; the centres of ZOIs reach from 15.5, 15.5 to"),
+        ({"kind": "zoi", "at": [900, 3]}, "no ZOI is there; their centres reach from 15.5, 15.5 to"),
     ],
 )
 def test_gauges_that_cannot_be_are_refused(gauge: dict, message: str) -> None:

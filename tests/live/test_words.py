@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import pytest
 from babel.messages.extract import extract
 
 from acquire.text import Message
-from acquire.text.message import about, fields
+from acquire.text.message import FIELD, about, fields
 from analysis.evaluate import GAUGE_KINDS
 from live.results.maps.field_maps import FIELD_MAPS
 from live.words import language
@@ -152,3 +153,73 @@ def test_every_field_has_a_value() -> None:
                     given = len(node.args) - 1 + len(node.keywords)
                     want = len(fields(text)) if given or name == "Message" else 0
                     assert given == want, f"{path}:{node.lineno}: {text}"
+
+
+HOLD_MESSAGES = ("why", "words", "remark", "reason", "refused", "apart", "state", "doing", "trouble", "text")
+TAKE_APART = (
+    "partition",
+    "rpartition",
+    "split",
+    "startswith",
+    "endswith",
+    "removeprefix",
+    "removesuffix",
+    "replace",
+)
+
+
+def test_no_text_for_people_is_taken_apart() -> None:
+    found = [
+        f"{path.relative_to(ROOT)}:{line}: {code}"
+        for path in sorted((ROOT / "live").rglob("*.py"))
+        for line, code in taken_apart(ast.parse(path.read_text("utf-8")))
+    ]
+    assert not found, "give what is asked for a field of its own"
+
+
+@pytest.mark.parametrize(
+    ("code", "count"),
+    [
+        ("row.why.startswith('not')", 1),
+        ("mark.words.partition(' = ')[0]", 1),
+        ("'PAUSED' in s.state", 1),
+        ("s.state in ('a', 'b')", 0),
+        ("re.match('x', figure.why)", 1),
+        ("try: f()\nexcept OSError as error: str(error).replace('a', 'b')", 1),
+        ("try: f()\nexcept OSError as error: '--lag' in error.text", 1),
+        ("given.startswith('a')", 0),
+    ],
+)
+def test_texts_that_are_taken_apart_are_found(code: str, count: int) -> None:
+    assert len(list(taken_apart(ast.parse(code)))) == count
+
+
+def taken_apart(tree: ast.Module) -> Iterator[tuple[int, str]]:
+    """Lines and code where a message, or the text of an error, is searched or cut."""
+    errors = {node.name for node in ast.walk(tree) if isinstance(node, ast.ExceptHandler)}
+
+    def holds(node: ast.AST) -> bool:
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "str" and node.args:
+            return isinstance(node.args[0], ast.Name) and node.args[0].id in errors
+        return isinstance(node, ast.Attribute) and node.attr in HOLD_MESSAGES
+
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            of = node.func.value
+            cut = node.func.attr in TAKE_APART and holds(of)
+            if cut or (ast.unparse(of) == "re" and any(map(holds, node.args))):
+                yield node.lineno, ast.unparse(node)
+        elif (
+            isinstance(node, ast.Compare)
+            and isinstance(node.ops[0], ast.In | ast.NotIn)
+            and holds(node.comparators[0])
+        ):
+            yield node.lineno, ast.unparse(node)
+
+
+@pytest.mark.parametrize("language", ["", *LANGUAGES])
+def test_a_message_is_short(language: str) -> None:
+    """What happened, to what, what to do next; a field counts as it is mostly filled in."""
+    texts = entries(language).values() if language else templates()
+    found = [text for text in texts if len(FIELD.sub("123", text)) > (200 if language else 160)]
+    assert not found, "say it in 160 characters; the manual stands in docs"

@@ -12,6 +12,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text.quantity import unit_of
+
 _COLD, _HOT, _BEND = (59, 76, 192), (180, 4, 38), 88.0
 _NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
 
@@ -28,8 +30,9 @@ MICROSTRAIN, PERCENT = Unit("µm/m", 1e6), Unit("%", 100.0)
 
 
 def unit_for(largest: float) -> Unit:
-    """The unit for strains up to ``largest``: percent from 2 % on, else µm/m."""
-    return PERCENT if largest >= 0.02 else MICROSTRAIN
+    """The unit for strains up to ``largest``."""
+    unit = unit_of("strain", largest)
+    return Unit(unit.name, 1 / unit.one)
 
 
 @lru_cache(maxsize=1)

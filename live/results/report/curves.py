@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from acquire.text.quantity import unit_of
 from analysis.evaluate import true_curve
 from live.results.maps.colours import Unit, unit_for
 from live.results.report.evaluation import EvaluatedCurve
@@ -23,9 +24,10 @@ def load_unit(curve: EvaluatedCurve) -> Unit:
 
 
 def force_unit(force: Array) -> Unit:
-    """N, or kN from 2 kN on."""
+    """N or kN, from the largest."""
     largest = float(np.nanmax(np.abs(force))) if np.isfinite(force).any() else 0.0
-    return Unit("kN", 1e-3) if largest >= 2000 else Unit("N", 1.0)
+    unit = unit_of("force", largest)
+    return Unit(unit.name, 1 / unit.one)
 
 
 def strain_unit(*strains: Array) -> Unit:
@@ -46,8 +48,8 @@ def stress_strain(curve: EvaluatedCurve) -> Plot:
         curves.append(_straight(curve, "0.2 % offset", 0.002, e, load))
         strain = 0.002 + (figures.Rp02.value - curve.intercept) / figures.E.value
         name = "Rp0.2" if curve.is_stress else "Fp0.2"
-        words = f"{name} = {figures.Rp02.value * load.factor:.4g} {load.name}"
-        marks.append(Mark(strain * e.factor, figures.Rp02.value * load.factor, words))
+        proof = figures.Rp02.value * load.factor
+        marks.append(Mark(strain * e.factor, proof, name, f"{proof:.4g} {load.name}"))
     if figures.Rm.known:
         marks.append(_highest(curve, e, load))
     what = "stress" if curve.is_stress else "force"
@@ -74,7 +76,7 @@ def _highest(curve: EvaluatedCurve, e: Unit, load: Unit) -> Mark:
     """The point of the highest stress or force."""
     top, name = curve.figures.Rm.value * load.factor, "Rm" if curve.is_stress else "Fm"
     strain = curve.axial[int(np.nanargmax(np.where(np.isfinite(curve.axial), curve.load, np.nan)))]
-    return Mark(strain * e.factor, top, f"{name} = {top:.4g} {load.name}")
+    return Mark(strain * e.factor, top, name, f"{top:.4g} {load.name}")
 
 
 def _straight(curve: EvaluatedCurve, label: str, offset: float, e: Unit, load: Unit) -> PlotLine:

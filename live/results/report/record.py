@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text.quantity import Quantity
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
-from live.results.figures import figure_text, value_text
+from live.results.figures import figure_text
 from live.results.finished.finished_test import FinishedTest
 from live.results.folder import versions
 from live.results.maps.colours import unit_for
@@ -44,7 +45,11 @@ def gauges(run: RunFolder) -> Html:
     for name, gauge in run.gauges.items():
         e = unit_for(_largest(gauge.value))
         known = np.isfinite(gauge.value)
-        last = value_text(gauge.value[-1] * e.factor, gauge.sigma[-1] * e.factor, e.name)
+        last = (
+            str(Quantity("strain", gauge.value[-1], gauge.sigma[-1], unit=e.name))
+            if known[-1]
+            else "not known"
+        )
         words = "; ".join(f"{key} {_plain(value)}" for key, value in gauge.described.items())
         largest = f"{_largest(gauge.value) * e.factor:.4g} {e.name}" if known.any() else "not known"
         rows.append((name, words or "not recorded", largest, last, int(np.count_nonzero(~known))))

@@ -64,11 +64,12 @@ class PlotLine:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mark:
-    """A point with words, such as a proof stress."""
+    """A point with its name and value, such as a proof stress."""
 
     x: float
     y: float
-    words: str
+    name: str
+    value: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -212,7 +213,7 @@ def _thinned(y: Array) -> NDArray[np.intp]:
 def _mark(mark: Mark, axes: _Axes) -> str:
     x, y = axes.across(mark.x), axes.down(mark.y)
     left = x > WIDTH - 150
-    words = _word(x + (-8 if left else 8), y + 18, mark.words, "end" if left else "start")
+    words = _word(x + (-8 if left else 8), y + 18, f"{mark.name} = {mark.value}", "end" if left else "start")
     return f'<circle class="f3" cx="{x:.1f}" cy="{y:.1f}" r="4"/>{words}'
 
 

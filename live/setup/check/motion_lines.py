@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 from acquire.text import Message
+from acquire.text.quantity import Quantity
 from analysis.quality.steadiness import Steadiness, mains_of, strain_drifts
 from live.setup.check.check_line import CheckLine, not_measured
 from live.setup.check.check_list import CheckFigures
@@ -35,9 +36,9 @@ def motion_lines(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
     yield CheckLine(
         "drift",
         Message(
-            "{drift_px:.4f} px and {drift:+.0f} µm/m in {seconds:.3g} s",
+            "{drift_px:.4f} px and {drift} in {seconds:.3g} s",
             s.drift_px,
-            strain.drift * 1e6,
+            Quantity("strain", strain.drift),
             s.u.seconds,
         ),
         s.drift_px <= max_px and not pulled,
@@ -62,20 +63,20 @@ def _common(s: PictureStillness) -> Iterator[CheckLine]:
     steady = "clamp grips and tripod, warm up the camera, or hang plates (docs/optics.md)"
     if s.dilatation:
         words = Message(
-            "exx and eyy drift alike, {dilatation:+.0f} µm/m: it changes by {size:.1e} of the stand-off",
-            s.dilatation * 1e6,
+            "exx and eyy drift alike, {dilatation}: it changes by {size:.1e} of the stand-off",
+            Quantity("strain", s.dilatation),
             abs(s.dilatation),
         )
         warm = "warm up the camera, clamp grips and tripod, or hang plates (docs/optics.md)"
         yield CheckLine("distance", words, abs(s.dilatation) < MAX_DILATATION, warm)
     across, down = s.keystone
     if across:
-        words = Message(
-            "strain drifts by {across:+.0f} µm/m from left to right, in x and y alike", across * 1e6
-        )
+        drift = Quantity("strain", across)
+        words = Message("strain drifts by {across} from left to right, in x and y alike", drift)
         yield CheckLine("tilt", words, abs(across) < MAX_DILATATION, steady)
     if down:
-        words = Message("strain drifts by {down:+.0f} µm/m from top to bottom, in x and y alike", down * 1e6)
+        drift = Quantity("strain", down)
+        words = Message("strain drifts by {down} from top to bottom, in x and y alike", drift)
         yield CheckLine("tilt", words, abs(down) < MAX_DILATATION, steady)
 
 

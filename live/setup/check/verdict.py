@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from acquire.text import Message
+from acquire.text.quantity import Quantity
 from analysis.quality.pattern import SPECKLE_RADIUS_PX
 from analysis.quality.steadiness import aliased, mains_of
 from live.setup.check.check_line import CheckLine, not_measured
@@ -281,14 +282,14 @@ def _floor(f: CheckFigures, target: float | None) -> CheckLine:
         words = Message("a larger region, smaller ZOIs, or a pattern")
         return CheckLine(what, Message("not measured: too few ZOIs of {zoi} px", f.zoi), False, words)
     known = typical if noise is None else noise.known
-    found = Message("{known:.0f} µm/m predicted", known * 1e6)
+    found = Message("{known} predicted", Quantity("strain", known))
     if f.stack.few:
         found += Message(", noise {noise_source}", _noise_source(f))
     elif noise is not None:
         found = Message(
-            "{known:.0f} µm/m measured, {predicted:.0f} predicted",
-            noise.known * 1e6,
-            noise.predicted * 1e6,
+            "{known} measured, {predicted} predicted",
+            Quantity("strain", noise.known),
+            Quantity("strain", noise.predicted),
         )
     value = Message("{found} (one ZOI of {zoi} px, burst of {burst})", found, f.zoi, f.burst)
     if noise is not None and noise.measured > MAX_OVER_PREDICTED * noise.predicted:

@@ -236,7 +236,8 @@ def events_of(message: Parcel) -> list[Event]:
 def figures_message(snapshot: Snapshot) -> Parcel:
     """The large figures of ``snapshot``."""
     meta = {
-        name: getattr(snapshot, name) for name in (*_NUMBERS, "valid", "zois", "state", "axial_name", *_TEXTS)
+        name: getattr(snapshot, name)
+        for name in (*_NUMBERS, "valid", "zois", "state", "paused", "axial_name", *_TEXTS)
     }
     figures = {
         name: [
@@ -258,7 +259,11 @@ def figures_of(message: Parcel) -> Snapshot:
         shown |= {name: tuple(str(text) for text in meta[name]) for name in _TEXTS}
         figures = {str(name): _figure(*values) for name, values in meta["figures"].items()}
         return Snapshot(
-            **shown, state=str(meta["state"]), axial_name=str(meta["axial_name"]), figures=figures
+            **shown,
+            state=str(meta["state"]),
+            paused=bool(meta["paused"]),
+            axial_name=str(meta["axial_name"]),
+            figures=figures,
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise WireError(f"figures to the view are damaged: {error}") from error

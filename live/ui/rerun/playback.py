@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Level
 from acquire.frame import Frame, frozen
+from acquire.text.quantity import Quantity
 from analysis.evaluate import evaluate_test
 from live.config.gauges import outlines
 from live.config.loading import from_dict
@@ -275,7 +276,7 @@ def _status(run: RunFolder) -> str:
     figures = evaluate_test(run.curve, tensile_options(run.specimen))
     lines = figure_lines(figures, run.specimen, run.gauge_length_mm)
     lines += [
-        f"gauge **{name}** {gauge.value[-1] * 1e6:+.0f} ± {gauge.sigma[-1] * 1e6:.0f} µm/m at the end"
+        f"gauge **{name}** {Quantity('strain', gauge.value[-1], gauge.sigma[-1])} at the end"
         for name, gauge in run.gauges.items()
     ]
     lines += response_lines(run.strain)

@@ -13,16 +13,19 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TextIO
 
+from acquire.text import Message
+from acquire.text.message import joined
 from acquire.text.printable import duration, printable, share_text
+from acquire.text.quantity import IN_ASCII
 from live.pipeline.screen import Screen
 from live.ui.terminal.status_line import GAP, force_text, gauge_texts, status_line
+from live.words.language import said_here
 
 if TYPE_CHECKING:
     from live.pipeline.measurement import TimeStep
     from live.pipeline.snapshot import Snapshot
 
 _TERMINAL_EVERY_S, _FILE_EVERY_S = 0.25, 5.0
-_IN_ASCII = str.maketrans({"µ": "u", "±": "+-", "–": "-"})
 _UNKNOWN_WIDTH, _FILE_WIDTH = 119, 1000
 
 
@@ -48,7 +51,7 @@ class TerminalScreen(Screen):
     def print(self, text: str = "") -> None:
         """Print a line that stays."""
         if not self._quiet:
-            self._write(" " * self._width + "\r" * (self._width > 0) + printable(text) + "\n")
+            self._write(" " * self._width + "\r" * (self._width > 0) + said_here(printable(text)) + "\n")
             self._width = 0
             if self._prompt is not None:
                 self._renew(self._prompt)
@@ -76,11 +79,11 @@ class TerminalScreen(Screen):
         if self._terminal:
             self._renew(text)
         else:
-            self._write(printable(text) + "\n")
+            self._write(said_here(printable(text)) + "\n")
 
     def _renew(self, text: str) -> None:
         """Renew the last line, cut to the width of the terminal: a line that wraps cannot be renewed."""
-        text = printable(text)[: self._columns()]
+        text = said_here(printable(text))[: self._columns()]
         self._write(text.ljust(self._width) + "\r")
         self._width = len(text)
 
@@ -103,26 +106,24 @@ class TerminalScreen(Screen):
 
     def progress(self, i: TimeStep, done: int, expected: int | None, elapsed_s: float) -> None:
         """Renew the status line of a replay: ``done`` of ``expected`` bursts, ZOI/s, remaining time."""
-        of = left = rate = ""
+        bursts, left, rate = Message("{done} bursts", done), "", ""
         if expected is not None and done <= expected:
-            of, left = f" of {expected}", f"  {duration(elapsed_s / done * (expected - done))} left"
+            bursts = Message("{done} of {expected} bursts", done, expected)
+            left = Message("{time} left", duration(elapsed_s / done * (expected - done)))
         if elapsed_s > 0:
-            rate = f"  {done * i.n_zoi / elapsed_s:.0f} ZOI/s"
-        strains = f"{GAP.join(gauge_texts(i))} µm/m  {share_text(i.area_share)}".rstrip()
-        self.status(f"{done}{of} bursts{_force(i)}  {strains}  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}")
+            rate = Message("{rate:.0f} ZOI/s", done * i.n_zoi / elapsed_s)
+        valid = Message("{valid}/{zois} ZOIs", i.n_valid, i.n_zoi)
+        strains = (*gauge_texts(i), share_text(i.area_share))
+        self.status(joined(GAP, (bursts, force_text(i.force), *strains, valid, rate, left)))
 
     def _write(self, text: str) -> None:
         encoding = getattr(self._stream, "encoding", None) or "utf-8"
         try:
             text.encode(encoding)
         except UnicodeEncodeError:
-            text = text.translate(_IN_ASCII).encode(encoding, "backslashreplace").decode(encoding)
+            text = text.translate(IN_ASCII).encode(encoding, "backslashreplace").decode(encoding)
         try:
             self._stream.write(text)
             self._stream.flush()
         except (OSError, ValueError):
             self._quiet = True
-
-
-def _force(i: TimeStep) -> str:
-    return "" if math.isnan(i.force) else f"  {force_text(i.force)}"

@@ -73,7 +73,7 @@ def brief_lines(run_state: RunState, test: FinishedTest) -> list[str]:
 def _at_end(history: History, axis: str) -> list[str]:
     """The strain of the last burst; where it has none, also of the last that has one."""
     n, known = len(history.time_steps), np.flatnonzero(np.isfinite(history.along(axis)[0]))
-    texts = [f"{strain_text(*history.time_steps[int(k)].axial(axis))} µm/m" for k in known[-1:]]
+    texts = [strain_text(*history.time_steps[int(k)].axial(axis)) for k in known[-1:]]
     if n - 1 in known[-1:]:
         return [f"strain along {axis} at the end: {texts[0]}"]
     last = history.time_steps[-1]

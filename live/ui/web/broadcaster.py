@@ -8,14 +8,15 @@ import threading
 from typing import Any
 
 from acquire.text import Message
+from acquire.text.quantity import Quantity
 
 MAX_PAGES = 8
 """Pages that may be open at one time."""
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON can hold it; NaN and infinity become None, messages keep template and values."""
-    if isinstance(value, Message):
+    """A value as JSON can hold it; NaN and infinity become None, messages and quantities stay data."""
+    if isinstance(value, Message | Quantity):
         return plain(value.to_json())
     if isinstance(value, float):
         return value if math.isfinite(value) else None

@@ -21,7 +21,7 @@ from live.results.report.curves import load_unit, strain_unit, stress_strain
 from live.results.report.evaluation import EvaluatedCurve, intercept_of
 from live.results.summary import why_nothing
 from live.run.outcome import Outcome
-from live.ui.web.cameras_panel import figures_of, side_figures
+from live.ui.web.cameras_panel import figures_of
 from live.ui.web.page_consumer import PageConsumer
 
 MAX_TROUBLES = 20
@@ -68,17 +68,19 @@ def cameras_result(
     found = figures_of(states, specimen)
     troubles = [about(side, text) for side, one in results.items() for text in one["troubles"]]
     first = next(iter(found), "")
+    stresses = specimen.area_m2 is not None
     figures: list[dict[str, Any]] = [
-        {**one, "interval": "", "head": one["side"] == first} for one in side_figures(found, specimen)
+        {**_figure(row), "side": where, "head": where == first}
+        for where, one in found.items()
+        for row in headline(one, stresses=stresses)
+        if row.figure.known
     ]
     figures += [_interval_of_e(one) for one in list(found.values())[:1] if one.E.known]
     return {
         **next(iter(results.values())),
         "folder": str(folder),
         "figures": figures,
-        "belief": belief(headline(found[first], stresses=specimen.area_m2 is not None), troubles)
-        if found
-        else None,
+        "belief": belief(headline(found[first], stresses=stresses), troubles) if found else None,
         "troubles": troubles,
     }
 
@@ -127,16 +129,12 @@ def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str
             {
                 "name": Message("strain of E and nu"),
                 "text": figures.elastic_strain,
-                "interval": "",
                 "words": True,
             }
         )
     if figures.E.known:
         found.append(_interval_of_e(figures))
-    return found + [
-        {"name": Message("of the test"), "text": note, "interval": "", "words": True}
-        for note in figures.notes
-    ]
+    return found + [{"name": Message("of the test"), "text": note, "words": True} for note in figures.notes]
 
 
 def _interval_of_e(figures: TensileFigures) -> dict[str, Any]:
@@ -144,27 +142,19 @@ def _interval_of_e(figures: TensileFigures) -> dict[str, Any]:
         figures.budget if len(figures.budget) > 1 else ("scatter", Message("no limits of error are stated"))
     )
     text = "; ".join(parts)
-    return {"name": Message("interval of E"), "text": text, "interval": "", "words": True}
+    return {"name": Message("interval of E"), "text": text, "words": True}
 
 
 def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> list[TensileRow]:
     """All figures of the standard."""
     rows = tensile_table(figures, stresses=specimen.area_m2 is not None).values()
-    return [row for row in rows if row.figure.known or not row.figure.why.startswith("not a figure of")]
+    return [row for row in rows if row.figure.known or row.figure.applies]
 
 
 def _figure(row: TensileRow) -> dict[str, Any]:
     if not row.figure.known:
         return {"name": row.name, "text": None, "why": row.figure.why}
-    value, between, interval = row.number.partition(" ± ")
-    number, _, unit = (interval or value).partition(" ")
-    text = Message("{value} {unit}", value, unit).strip() if between else value
-    return {
-        "name": row.name,
-        "text": text,
-        "interval": f"± {number}" if between else "",
-        "remark": row.remark,
-    }
+    return {"name": row.name, "text": row.quantity, "bound": row.figure.is_bound, "remark": row.remark}
 
 
 def _lines(
@@ -184,5 +174,5 @@ def _lines(
         points = zip(line.x / e.factor, line.y / unit.factor, strict=True)
         yield {"points": [(float(x), float(y)) for x, y in points]}
     for mark in plot.marks:
-        name, value = mark.words.partition(" = ")[0], mark.y / unit.factor
-        yield {"points": [(mark.x / e.factor, value)], "words": {"name": name, "value": value}}
+        value = mark.y / unit.factor
+        yield {"points": [(mark.x / e.factor, value)], "words": {"name": mark.name, "value": value}}

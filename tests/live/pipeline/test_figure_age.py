@@ -29,7 +29,7 @@ from live.ui.rerun.drawing.large_figures import _cells
 from live.ui.terminal.status_line import status_line
 from live.ui.web.broadcaster import Broadcaster, plain
 from live.ui.web.page_consumer import PageConsumer
-from tests.live.made_up import make_frame, make_measurement
+from tests.live.made_up import in_ascii, make_frame, make_measurement
 
 NOW = 34.0
 SPECIMEN = SpecimenConfig(axis="y", area_mm2=40.0)
@@ -153,15 +153,15 @@ def test_a_slow_cell_and_a_slow_camera_are_not_old_between_two_readings() -> Non
 FORCE = {
     # state: terminal, word on the page, value and last there, display, state of the line, alarm "above" and its text
     "live": ("1200.0 N  30.0 MPa", "live", 1200.0, 1200.0, "1200.0", 1200.0, False, ""),
-    "old": ("force – (1200.0 N, 24 s ago)", "old", None, 1200.0, "-", None, True, "no value of force for 24 s"),
-    "unknown": ("force – (1200.0 N, 24 s ago)", "unknown", None, 1200.0, "-", None, True,
+    "old": ("force - (1200.0 N, 24 s ago)", "old", None, 1200.0, "-", None, True, "no value of force for 24 s"),
+    "unknown": ("force - (1200.0 N, 24 s ago)", "unknown", None, 1200.0, "-", None, True,
                 "no value of force: the lines of the load cell are no readings, for 24 s"),
-    "stale": ("force – (1200.0 N, 24 s ago)", "unknown", None, 1200.0, "-", None, True,
+    "stale": ("force - (1200.0 N, 24 s ago)", "unknown", None, 1200.0, "-", None, True,
               "no value of force: the time of its readings is not known, for 24 s"),
     "overload": ("force OVERLOAD", "overload", None, None, "OVERLOAD", None, True, "force: OVERLOAD"),
     "underload": ("force UNDERLOAD", "underload", None, None, "UNDERLOAD", None, True, "force: UNDERLOAD"),
-    "not yet": ("force – (not yet)", "not yet", None, None, "-", None, False, ""),
-    "ended": ("force – (ended)", "ended", None, 1200.0, "-", None, False, ""),
+    "not yet": ("force - (not yet)", "not yet", None, None, "-", None, False, ""),
+    "ended": ("force - (ended)", "ended", None, 1200.0, "-", None, False, ""),
     "none": ("", "none", None, None, "-", None, False, ""),
 }  # fmt: skip
 
@@ -171,7 +171,7 @@ def test_the_force_on_every_screen_and_line(kind: str) -> None:
     terminal, word, value, last, display, sent, on, why = FORCE[kind]
     state = run_state(kind)
     now = state.snapshot(NOW)
-    shown = status_line(now, 300)
+    shown = in_ascii(status_line(now, 300))
     assert terminal in shown and ("force" in shown) is terminal.startswith("force"), shown
     assert ("MPa" in shown) is (kind == "live")
     page = page_of(state)
@@ -206,7 +206,10 @@ def test_a_force_that_comes_back_beyond_the_limit_ends_the_run_then() -> None:
     assert watched.state.alarms.texts == ("no value of force for 24 s",)
     watched.state.loads.append(LoadSample(NOW, 5000.0))
     watched.watch.idle()
-    assert watched.ended == ["ALARM force 5000 N, limit 3000"] and watched.watch.end() == "2 came"
+    assert (
+        list(map(in_ascii, watched.ended)) == ["ALARM force 5000.0 N, limit 3000.0 N"]
+        and watched.watch.end() == "2 came"
+    )
 
 
 def test_a_force_that_comes_back_within_the_limit_ends_the_alarm() -> None:
@@ -242,12 +245,12 @@ def test_nothing_is_judged_once_the_test_has_ended() -> None:
 # -- the table: strains ---------------------------------------------------------------------------
 
 STRAIN = {
-    "live": ("eyy +1,000 ± ", 1e-3, False, ""),
-    "old": ("strain – (eyy +1,000 µm/m, 24 s ago)", None, True, "no value of {} for 24 s"),
+    "live": ("eyy 1000.0 +- ", 1e-3, False, ""),
+    "old": ("strain - (eyy 1000 um/m, 24 s ago)", None, True, "no value of {} for 24 s"),
     "unknown": ("eyy ", None, True, "no value of {}: 34 LOST"),
     "not yet": ("", None, False, ""),
-    "paused": ("strain – (paused)", None, False, ""),
-    "ended": ("strain – (ended)", None, False, ""),
+    "paused": ("strain - (paused)", None, False, ""),
+    "ended": ("strain - (ended)", None, False, ""),
 }
 
 
@@ -255,7 +258,7 @@ STRAIN = {
 def test_the_strain_on_every_screen_line_and_alarm(kind: str) -> None:
     terminal, value, on, why = STRAIN[kind]
     state = run_state(strain=kind)
-    assert terminal in status_line(state.snapshot(NOW), 400)
+    assert terminal in in_ascii(status_line(state.snapshot(NOW), 400))
     page = page_of(state, paused=kind == "paused")
     assert page["figures"]["axial"]["state"] == kind and page["figures"]["axial"]["value"] == pytest.approx(
         value

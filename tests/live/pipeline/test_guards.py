@@ -20,7 +20,7 @@ from live.pipeline.guards import (
     _usual_sigma,
     picture_words,
 )
-from tests.live.made_up import make_measurement
+from tests.live.made_up import in_ascii, make_measurement
 from tests.live.pipeline.test_reference import GRID, seen
 
 
@@ -29,9 +29,9 @@ def field(sigma_xx: float = 30e-6, sigma_yy: float = 40e-6, **values: float) -> 
 
 
 def test_the_cost_of_a_picture_is_of_both_directions() -> None:
-    assert _usual_sigma(field()) == pytest.approx(50 / math.sqrt(2))
+    assert _usual_sigma(field()) == pytest.approx(50e-6 / math.sqrt(2))
     costly = replace(field(), picture=PictureError(2.0, (1.0, 4.0), "bands"))
-    assert picture_words(costly).endswith("uncertain by 35 µm/m in place of 9")
+    assert picture_words(costly).endswith("uncertain by 35 µm/m in place of 9 µm/m")
     cheap = replace(field(), picture=PictureError(1.0, (1.0, 1.0), "filter"))
     assert picture_words(cheap).endswith("strain of a ZOI is uncertain by 35 µm/m")
     assert (
@@ -148,7 +148,8 @@ def test_strains_that_are_alike_are_told_beyond_their_noise(
     assert [event.data["strain"] for event in events] == ([pytest.approx(exx)] if told else [])
     assert (
         not told
-        or f"exx and eyy are alike, {exx * 1e6:+.0f} µm/m: as from motion by {abs(exx):.1e}" in events[0].text
+        or f"exx and eyy are alike, {exx * 1e6:.0f} um/m: as from motion by {abs(exx):.1e}"
+        in in_ascii(events[0].text)
     )
     silent: list[Event] = []
     TiltGuard(None, silent.append, dilatation=False).check(field(), step_of(exx, eyy, sigma))

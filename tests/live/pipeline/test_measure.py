@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import tracemalloc
 from dataclasses import fields, replace
 
@@ -28,7 +29,7 @@ from live.pipeline.measurement import HOLD_S, ForceMatching, Measurement, TimeSt
 from live.pipeline.reference import averaged, frame_noise, motion_between, prepare
 from live.run.measurer import SmearGuard
 from tests.live.fakes import frame
-from tests.live.made_up import START, make_loads, make_measurement
+from tests.live.made_up import START, in_ascii, make_loads, make_measurement
 
 SHAPE = (160, 192)
 GRID = ZoiGrid.cover(Roi(24, 24, 144, 112), size=32, step=16)
@@ -245,8 +246,8 @@ def test_what_the_picture_has_become_is_told_once_with_its_cost_and_when_it_ends
     assert [(event.level, event.t) for event in told] == [("warning", 2.0), ("info", 4.0), ("warning", 5.0)]
     assert told[0].data["cause"] == "noise" and told[0].data["factor"] == pytest.approx(13**0.5, rel=0.1)
     costs = [float(np.nanmedian(m.field.sigma_exx)) * 1e6 for m in found[:2]]
-    words = told[0].text.split()
-    assert [int(words[words.index("by") + 1]), int(words[-1])] == pytest.approx([costs[1], costs[0]], rel=0.1)
+    shown = re.findall(r"(\d+) um/m", in_ascii(told[0].text))
+    assert list(map(int, shown)) == pytest.approx([costs[1], costs[0]], rel=0.1)
     assert all(m.field.ok.all() for m in found)
 
 

@@ -54,4 +54,4 @@ def test_blue_is_compression_and_red_is_tension() -> None:
 def test_round_numbers() -> None:
     assert [nice_above(v) for v in (1.0, 1.01, 1.3, 8.1, 0.021)] == [1.0, 1.2, 1.5, 10.0, 0.025]
     assert ticks(-1.0, 1.0) == [-1.0, -0.5, 0.0, 0.5, 1.0]
-    assert [unit_for(v).name for v in (0.0199, 0.02)] == ["µm/m", "%"]
+    assert [unit_for(v).name for v in (0.0099, 0.01)] == ["µm/m", "%"]

@@ -37,7 +37,7 @@ from live.results.report.comparison import _summary as summary_of_rows
 from live.results.summary import latency_lines, noise_line, summary_lines
 from tests.analysis.curves import Truth, composite, noisy, ramberg_osgood
 from tests.live.made_run import finished
-from tests.live.made_up import START, make_measurement
+from tests.live.made_up import START, in_ascii, make_measurement
 
 AREA_M2 = 20e-6
 FLAT = SpecimenConfig(width_mm=10.0, thickness_mm=2.0)
@@ -151,7 +151,7 @@ def test_the_budget_names_the_shutter() -> None:
 
 def test_a_figure_is_told_with_the_larger_half_of_its_interval() -> None:
     figure = Figure(2000.0, 1900.0, 2020.0)
-    assert figure_text(figure) == "2000 ± 100"
+    assert figure_text(figure) == "2\u202f000 ± 100"
     assert figure_text(figure, 1e3, "kN") == "2.00 ± 0.10 kN"
 
 
@@ -316,4 +316,4 @@ def test_the_lag_that_is_advised_is_the_one_found(
     loads.append(LoadSample(START, 5.0))
     monkeypatch.setattr("live.results.figures.find_lag", lambda *_: Figure(lag, lag - 0.001, lag + 0.001))
     (line,) = lag_line(history, loads, FLAT)
-    assert line == f"lag of the load behind the frames: {1e3 * lag:.1f} ± 1.0 ms (95%; {how})"
+    assert in_ascii(line) == f"lag of the load behind the frames: {1e3 * lag:.1f} +- 1.0 ms (95%; {how})"

@@ -80,8 +80,8 @@ def test_numbers_read_well(value: float, text: str) -> None:
     assert number(value) == text.replace(" ", "\u202f")
 
 
-def test_percent_from_two_percent_on() -> None:
-    assert unit_for(0.0199) == MICROSTRAIN
+def test_percent_from_one_percent_on() -> None:
+    assert unit_for(0.0099) == MICROSTRAIN
     assert unit_for(0.02) == PERCENT
 
 

@@ -116,7 +116,7 @@ def test_colours_over_the_values_there_are() -> None:
     scale = maps.paint(make_field(grid, 1e-3), ("eyy",))["eyy"].scale
     assert scale is not None and 0 < scale.low <= 1000 <= scale.high < 1100
     fixed = FieldMaps("y", 0.01, about_zero=False).paint(make_field(grid, 1e-3), ("eyy",))["eyy"].scale
-    assert fixed is not None and (fixed.low, fixed.high) == (-10_000, 10_000)
+    assert fixed is not None and (fixed.low, fixed.high) == (-1.0, 1.0) and fixed.unit == "%"
 
 
 def test_statuses_have_one_colour_each_and_a_legend() -> None:

@@ -37,7 +37,7 @@ class Words(Screen):
         self.shown: list[tuple[str, str]] = []
 
     def snapshot(self, snapshot: Any, words: str = "") -> None:
-        self.shown.append((snapshot.state, words))
+        self.shown.append((snapshot.doing, words))
 
 
 class Recording(Subscriber):
@@ -84,9 +84,10 @@ def test_the_state_is_what_is_done_with_the_frames() -> None:
     bench = run(recording)
     assert bench.one.state == "REC" and bench.run.recording
     bench.run.command(EventKind.PAUSE)
-    assert bench.one.state == "REC, PAUSED" and bench.run.paused
+    assert bench.one.state == "REC" and bench.run.paused
+    assert bench.state.snapshot(0.0).paused
     recording.failed = "the disk is full"  # type: ignore[assignment]
-    assert bench.one.state == "NOT RECORDING, PAUSED"
+    assert bench.one.state == "NOT RECORDING"
     armed = run(Recording(on=False))
     assert armed.one.state == "ARMED"
     assert armed.run.command(EventKind.RECORD, "start") == "start" and armed.one.state == "REC"
@@ -180,7 +181,7 @@ def test_what_it_waits_for_is_shown_while_nothing_comes(monkeypatch: pytest.Monk
     def shown(words: str, silent_s: float, measured: int, *, paused: bool = False) -> list[tuple[str, str]]:
         bench = run(measured=measured)
         bench.state.health.frame_t = 100.0 - silent_s
-        bench.one._incoming.paused = paused
+        bench.one._incoming.paused = bench.state.health.paused = paused
         bench.stream.publish(Waiting(words))
         return list(bench.screen.shown)
 

@@ -98,7 +98,7 @@ def test_a_lens_holds_where_it_was_calibrated(box: list[float], holds: bool) -> 
         ):
             lens_for(given, 120, 200, grid)
     else:
-        with pytest.raises(ConfigError, match="leave the part that was calibrated"):
+        with pytest.raises(ConfigError, match="leave the calibrated part"):
             lens_for(given, 200, 120, grid)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text.quantity import unit_of
 from live.results.maps.colours import nice_above, number, ticks, unit_for
 from live.ui.rerun.drawing.layout import CURVE_WIDTH
 from live.ui.rerun.drawing.shapes import DIM, GREY, ORANGE, polylines, text_labels
@@ -47,7 +48,7 @@ class Axis:
 
 
 def strain_axis(values: NDArray[np.float64]) -> Axis:
-    """An axis for strains; microstrain, or percent from 2 % on."""
+    """An axis for strains, in µm/m or %."""
     low, high = _range(values, 2e-4)
     unit = unit_for(float(np.abs(values).max(initial=0.0)))
     return _axis(low, high, unit.factor, unit.name)
@@ -59,10 +60,9 @@ def stress_axis(values: NDArray[np.float64]) -> Axis:
 
 
 def force_axis(values: NDArray[np.float64]) -> Axis:
-    """An axis for forces in N, shown in kN from 10 kN on."""
-    low, high = _range(values, 1.0)
-    large = float(np.abs(values).max(initial=0.0)) >= 1e4
-    return _axis(low, high, 1e-3 if large else 1.0, "kN" if large else "N")
+    """An axis for forces in N, shown in N or kN."""
+    unit = unit_of("force", float(np.abs(values).max(initial=0.0)))
+    return _axis(*_range(values, 1.0), 1 / unit.one, unit.name)
 
 
 def _axis(low: float, high: float, factor: float, unit: str) -> Axis:

@@ -46,9 +46,9 @@ def paint(snapshot: Snapshot) -> NDArray[np.uint8]:
 def _cells(s: Snapshot) -> tuple[tuple[str, str, Colour], ...]:
     axial, force, stress = s.figure(AXIAL), s.figure(FORCE), s.figure(STRESS)
     sigma = "" if math.isnan(axial.sigma) else f"+- {axial.sigma * 1e6:.0f} "
-    large, state = abs(force.last) >= 1e4, s.state.partition(",")[0]
+    large = abs(force.last) >= 1e4
     return (
-        ("STATE", "PAUSED" if "PAUSED" in s.state else state, _STATES.get(state, GREEN)),
+        ("STATE", "PAUSED" if s.paused else s.state, _STATES.get(s.state, GREEN)),
         _cell(f"STRAIN {sigma}um/m", axial, 1e6, "+,.0f"),
         _cell("FORCE kN", force, 1e-3, ".3f") if large else _cell("FORCE N", force, 1.0, ".1f"),
         _cell("STRESS MPa", stress, 1e-6, ".1f"),

@@ -4,7 +4,7 @@ import { finishCurve, updateCurves } from "./curves.js";
 import { drawGauges } from "./draw.js";
 import { icon, key, putIcon } from "./icons.js";
 import { setRatio, showLegend } from "./legend.js";
-import { strainText, time } from "./numbers.js";
+import { quantity, strainText, time } from "./numbers.js";
 import { t } from "./words.js";
 
 let result = null, chosen = { side: 0, time: "peak" };
@@ -46,24 +46,25 @@ function showBelief({ belief, words, troubles }) {
 
 const nameOf = (one) => `${typeof one.name === "string" && !one.name.includes(" ") ? one.name : t(one.name)}${one.side ? `, ${t(one.side)}` : ""}`;
 
-// Value and unit of a text: "70.2 GPa".
-function parts(text) {
-  const words = t(text), at = words.lastIndexOf(" ");
-  return at < 0 ? [words, ""] : [words.slice(0, at), words.slice(at + 1)];
+// Value, uncertainty and unit of a figure: a quantity, or a text as it is.
+function parts(one) {
+  if (typeof one.text === "string" || one.text?.say != null) return { value: t(one.text), sigma: "", unit: "" };
+  const found = quantity(one.text);
+  return one.bound ? { ...found, value: `${t("at least")} ${found.value}` } : found;
 }
 
 function tile(one) {
-  const isKnown = one.text != null, [value, unit] = isKnown ? parts(one.text) : ["–", ""], says = isKnown ? one.remark : one.why;
+  const isKnown = one.text != null, { value, sigma, unit } = isKnown ? parts(one) : { value: "–", sigma: "", unit: "" }, says = isKnown ? one.remark : one.why;
   const reason = says ? [el("p", { class: `says ${isKnown ? "look" : ""}` }, icon(isKnown ? "warn" : "info"), el("span", { text: t(says), title: t(says) }))] : [];
-  const sigma = one.interval ? [el("span", { text: "95 %" }), el("span", { class: "num" }, "± ", el("b", { text: one.interval.replace("± ", "") }))] : [];
+  const interval = sigma ? [el("span", { text: "95 %" }), el("span", { class: "num" }, "± ", el("b", { text: sigma }))] : [];
   return el("section", { class: `tile ${isKnown ? (says ? "look" : "") : "stale"}`.trim() }, el("h3", { text: nameOf(one) }), el("span", { class: "age" }),
-    el("p", { class: "value" }, el("span", { class: "figure num", text: value }), el("span", { text: unit })), el("p", { class: "sigma" }, ...sigma), ...reason);
+    el("p", { class: "value" }, el("span", { class: "figure num", text: value }), el("span", { text: unit })), el("p", { class: "sigma" }, ...interval), ...reason);
 }
 
 function row(one) {
   if (one.words) return el("li", { class: "row words" }, el("span", { text: nameOf(one) }), el("span", { class: "small", text: t(one.text) }));
-  const remark = one.remark ? [el("span", { class: "small", text: t(one.remark) })] : [];
-  return el("li", { class: "row" }, el("span", { text: nameOf(one) }), el("b", { class: "num" }, t(one.text), " ", el("small", { text: one.interval })), ...remark);
+  const remark = one.remark ? [el("span", { class: "small", text: t(one.remark) })] : [], { value, sigma, unit } = parts(one);
+  return el("li", { class: "row" }, el("span", { text: nameOf(one) }), el("b", { class: "num" }, `${value} ${unit} `, el("small", { text: sigma && `± ${sigma}` })), ...remark);
 }
 
 const unknown = (one) => el("li", { class: "row words" }, el("span", { text: nameOf(one) }), el("span", { class: "small", text: t(one.why) }));

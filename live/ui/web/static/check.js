@@ -28,7 +28,7 @@ const FIGURES = { picture: "strain noise", force: "load cell", disk: "disk" };
 function verdictOf(part, value) {
   const lines = value.lines.filter((line) => partOf(line) === part), bad = lines.find((line) => !line.good);
   const line = bad ?? lines.find((one) => nameOf(one) === FIGURES[part]) ?? lines[0];
-  const figure = { picture: value.sigma == null ? "" : strainText(value.sigma).replace("+", ""), force: value.load?.rate ? `${fixed(value.load.rate)} 1/s` : "", disk: "" }[part];
+  const figure = { picture: value.sigma == null ? "" : strainText(value.sigma), force: value.load?.rate ? `${fixed(value.load.rate)} 1/s` : "", disk: "" }[part];
   return { part, line, figure };
 }
 

@@ -2,7 +2,7 @@
 import { $, el, post, put } from "./base.js";
 import { drawGauges, moved, position, showCross, zoomable } from "./draw.js";
 import { factorOf, setRatio, showLegend, unitOf } from "./legend.js";
-import { fixed, short, strainText, strainUnit } from "./numbers.js";
+import { fixed, strainText, strainUnit } from "./numbers.js";
 import { t } from "./words.js";
 
 const READ_MS = 150, OPACITY = 74;
@@ -71,7 +71,7 @@ for (const kind of ["unit", "language"]) addEventListener(kind, () => { if (pict
 function showChoice() {
   for (const [id, now] of [["component", picture.of], ["range", choosing ? "fixed" : picture.range]]) if ($(id) !== document.activeElement) $(id).value = now;
   showLimit();
-  if ($("limit") !== document.activeElement && picture.high != null && picture.range === "fixed" && picture.strain) $("limit").value = short(picture.high * factorOf(picture)).replace("−", "-");
+  if ($("limit") !== document.activeElement && picture.high != null && picture.range === "fixed" && picture.strain) $("limit").value = String(Number((picture.high * factorOf(picture)).toPrecision(4)));
   put($("limitunit"), strainUnit().name);
   showLegend($("maplegend"), picture);
 }

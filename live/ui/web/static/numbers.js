@@ -1,12 +1,62 @@
-// Numbers for a person. Each quantity has one unit through a test: the operator chooses that of strains.
-const DASH = "–", UNITS = { "µm/m": { factor: 1e6, digits: 0 }, "%": { factor: 100, digits: 4 } };
+// Numbers for a person, by the rules of acquire/text/quantity.py; one table of cases holds both. The operator chooses
+// the unit of the strains of a test; what has none is told in the one for its size.
+const DASH = "–", GAP = "\u202f", MINUS = "−", LIVE_DIGITS = 5, MOST_DECIMALS = 6, COMMA = ["de", "fr"];
+// Name, size in SI, magnitude from which on it is taken, decimals of a value without an uncertainty.
+const UNITS = {
+  "": [["", 1, 0, 3]],
+  share: [["%", 1e-2, 0, 2]],
+  strain: [["µm/m", 1e-6, 0, 0], ["%", 1e-2, 1e-2, 4]],
+  force: [["N", 1, 0, 1], ["kN", 1e3, 1e4, 3]],
+  stress: [["MPa", 1e6, 0, 1], ["GPa", 1e9, 1e10, 2]],
+  time: [["s", 1, 0, 1], ["min", 60, 120, 1]],
+};
 
-export const fixed = (value, digits = 0) => (value == null ? DASH : value.toFixed(digits).replace("-", "−"));
-export const signed = (value, digits = 0) => (value == null ? DASH : (value < 0 ? "−" : "+") + Math.abs(value).toFixed(digits));
+function unitOf(kind, size, name) {
+  const all = UNITS[kind], named = all.filter((one) => one[0] === name), fit = all.filter((one) => Math.abs(size) >= one[2]);
+  const [unit, one, , decimals] = [named, fit, all.slice(0, 1)].find((some) => some.length).at(-1);
+  return { name: unit, factor: 1 / one, digits: decimals };
+}
+
+// To so many decimals, negative ones of tens; three digits a group, the decimal mark of the language.
+export function fixed(value, decimals = 0) {
+  if (!Number.isFinite(value)) return DASH;
+  const size = Math.abs(value), step = 10 ** -decimals;
+  const [whole, part] = (decimals < 0 ? Math.round(size / step) * step : size).toFixed(Math.max(decimals, 0)).split(".");
+  const mark = COMMA.includes(document.documentElement.lang) ? "," : ".";
+  const text = whole.replace(/\B(?=(\d{3})+$)/g, GAP) + (part ? mark + part : "");
+  return value < 0 && /[1-9]/.test(text) ? MINUS + text : text;
+}
+
+const placesOf = (size, digits) => digits - 1 - Number(size.toExponential(digits - 1).split("e")[1]);
+
+// The decimals of a number with four digits, without zeros at its end.
+const shortest = (value) => Math.max(placesOf(value, 4) - /0*$/.exec(value.toExponential(3).split("e")[0])[0].length, 0);
+
+// Value and uncertainty as texts, to the place of the first digit of the uncertainty of a live figure, of the second
+// of a result; ``decimals`` are those of a value without.
+export function withSigma(value, sigma, { factor, digits: decimals }, digits = 1) {
+  if (!Number.isFinite(value)) return [DASH, ""];
+  const known = Number.isFinite(sigma) && sigma > 0, shown = value * factor, half = sigma * factor;
+  if (known || digits > 1) decimals = Math.min(known ? placesOf(half, digits) : shortest(shown), MOST_DECIMALS);
+  if (digits === 1) decimals = Math.min(decimals, Math.max(0, LIVE_DIGITS - Math.abs(shown).toFixed(0).length));
+  const last = 10 ** -decimals, small = half < last / 2;
+  return [fixed(shown, decimals), known ? (small ? "< " : "") + fixed(small ? last : half, decimals) : ""];
+}
+
+// The parts of a quantity as the program sends it.
+export function quantity({ kind, value, sigma, digits = 1, unit = "" }) {
+  const one = unitOf(kind, value, unit), [text, half] = withSigma(value, sigma, one, digits);
+  return { value: text, sigma: half, unit: one.name };
+}
+
+export function quantityText(given) {
+  const { value, sigma, unit } = quantity(given);
+  return `${value}${sigma && ` ± ${sigma}`} ${unit}`.trim();
+}
 
 export function strainUnit() {
   const name = localStorage.getItem("strain");
-  return name in UNITS ? { name, ...UNITS[name] } : { name: "µm/m", ...UNITS["µm/m"] };
+  return unitOf("strain", 0, name);
 }
 
 export function chooseStrainUnit(name) {
@@ -14,18 +64,9 @@ export function chooseStrainUnit(name) {
   dispatchEvent(new Event("unit"));
 }
 
-// Value and uncertainty as texts: the uncertainty with two digits, the value to the same place.
-export function withSigma(value, sigma, { factor, digits }) {
-  if (value == null) return [DASH, ""];
-  if (!(sigma > 0)) return [signed(value * factor, digits), ""];
-  const two = Number((sigma * factor).toPrecision(2)), place = Math.floor(Math.log10(two)) - 1;
-  const step = 10 ** place, decimals = Math.max(-place, 0);
-  return [signed(Math.round((value * factor) / step) * step, decimals), (Math.round(two / step) * step).toFixed(decimals)];
-}
-
 export function strainText(value, sigma) {
-  const unit = strainUnit(), [text, two] = withSigma(value, sigma, unit);
-  return value == null ? DASH : `${text}${two && ` ± ${two}`} ${unit.name}`;
+  const unit = strainUnit(), [text, half] = withSigma(value, sigma, unit);
+  return Number.isFinite(value) ? `${text}${half && ` ± ${half}`} ${unit.name}` : DASH;
 }
 
 export function time(seconds) {
@@ -36,13 +77,13 @@ export function time(seconds) {
 
 // As short as four digits allow, without an exponent for what a person reads.
 export function short(value) {
-  if (value == null) return DASH;
+  if (!Number.isFinite(value)) return DASH;
   const size = Math.abs(value);
-  if (size !== 0 && (size < 1e-3 || size >= 1e6)) return value.toExponential(1).replace(/-/g, "−");
-  return String(Number(value.toPrecision(4))).replace("-", "−");
+  if (size !== 0 && (size < 1e-3 || size >= 1e6)) return value.toExponential(1).replace(/-/g, MINUS);
+  return fixed(value, (String(Number(value.toPrecision(4))).split(".")[1] ?? "").length);
 }
 
-export const percent = (value) => (value == null ? DASH : value > 0 && value < 1e-4 ? "<0.01 %" : `${(value * 100).toFixed(2)} %`);
+export const percent = (value) => (Number.isFinite(value) ? (value > 0 && value < 1e-4 ? `< ${fixed(0.01, 2)} %` : `${fixed(value * 100, 2)} %`) : DASH);
 
 // Blue, vermilion, green, purple, ochre, grey, told apart with any colour vision: --c1 to --c6 of phasedic.css, light.
 const COLOURS = ["#0060ad", "#bd4a00", "#007a62", "#9a3a80", "#7a5c00", "#56606b"];

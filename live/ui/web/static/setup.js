@@ -98,10 +98,10 @@ function showLive(value) {
   $("sharp").setAttribute("width", `${100 * Math.min(of, 1)}%`);
   put($("saturated"), percent(value.saturated));
   put($("brightest"), value.light == null ? "" : `${t("brightest at")} ${fixed(100 * value.light)} %`);
-  const text = value.sigma == null ? "–" : strainText(value.sigma).replace("+", ""), unit = strainUnit().name;
+  const text = value.sigma == null ? "–" : strainText(value.sigma), unit = strainUnit().name;
   put($("sigma"), text.replace(` ${unit}`, ""));
   put($("sigmaunit"), value.sigma == null ? "" : unit);
-  put($("sigmato"), value.target == null ? "" : `${t("target")} ${strainText(value.target).replace("+", "")}`);
+  put($("sigmato"), value.target == null ? "" : `${t("target")} ${strainText(value.target)}`);
 }
 
 function showPicture(value) {

@@ -2,6 +2,8 @@
 // from live/words: English text or template -> its own. A message has a template (say) and values (with); the page fills
 // them in, as acquire/text/message.py does it in English. Names of files, devices and settings stay as they are.
 const FIELD = /\{\{|\}\}|\{(\w+)(?::([^{}]*))?\}/g;
+import { quantityText } from "./numbers.js";
+
 const tables = { en: {} };
 let chosen = "en", entries = {};
 
@@ -11,6 +13,7 @@ globalThis.untranslated = missing;
 
 export function t(text) {
   if (text?.say != null) return filled(own(text.say), text.with);
+  if (text?.kind != null) return quantityText(text);
   return text ? own(String(text)) : "";
 }
 

@@ -26,9 +26,9 @@ AREA_M2 = 20e-6
 
 
 def test_the_force_over_time_is_that_of_the_load_cell(run_dir: Path, tmp_path: Path) -> None:
-    """Of the samples of the recording, else of the results; in kN from 2 kN on."""
+    """Of the samples of the recording, else of the results; in N up to 10 kN."""
     with open_run(run_dir) as run:
-        samples, unit = curves.force(run), "force, kN"
+        samples, unit = curves.force(run), "force, N"
         run.__dict__["load_curve"] = (np.empty(0), np.empty(0))
         stored = curves.force(run)
         run.strain.values["force_N"][:] = np.nan
@@ -36,7 +36,7 @@ def test_the_force_over_time_is_that_of_the_load_cell(run_dir: Path, tmp_path: P
     for plot in (samples, stored):
         assert plot is not None and plot.y_label == unit and plot.x_label == "time, s"
         np.testing.assert_allclose(plot.curves[0].x, 0.1 * np.arange(N), atol=1e-9)
-        np.testing.assert_allclose(plot.curves[0].y, [1e-3 * force_of(e) for e in PULLED], rtol=1e-6)
+        np.testing.assert_allclose(plot.curves[0].y, [force_of(e) for e in PULLED], rtol=1e-6)
         assert plot.x_range == (0.0, pytest.approx(0.1 * (N - 1)))
 
 
@@ -78,8 +78,8 @@ def test_strains_for_a_part_of_their_area_are_told() -> None:
 
 
 def test_units_of_strain_and_load() -> None:
-    assert strain_unit(np.array([0.001, np.nan]), np.array([-0.02])).name == "%"
-    assert strain_unit(np.array([0.0199, -0.0199])) == strain_unit(np.array([np.nan])) == MICROSTRAIN
+    assert strain_unit(np.array([0.001, np.nan]), np.array([-0.01])).name == "%"
+    assert strain_unit(np.array([0.0099, -0.0099])) == strain_unit(np.array([np.nan])) == MICROSTRAIN
     curve: Any = SimpleNamespace(is_stress=True, load=np.array([1e3]))
     assert (load_unit(curve).name, load_unit(curve).factor) == ("MPa", 1e-6)
     curve.is_stress = False
@@ -91,7 +91,9 @@ def test_the_highest_stress_and_the_lines_of_e(run_dir: Path) -> None:
         curve = EvaluatedCurve.of(run)
     plot, top = stress_strain(curve), force_of(PULLED[-1]) / AREA_M2
     highest = plot.marks[-1]
-    assert highest.words == "Rm = 210.5 MPa" and highest.y == pytest.approx(1e-6 * top, rel=1e-6)
+    assert (highest.name, highest.value) == ("Rm", "210.5 MPa") and highest.y == pytest.approx(
+        1e-6 * top, rel=1e-6
+    )
     assert highest.x == pytest.approx(1e6 * curve.axial[-1])
     elastic = plot.curves[1]
     assert elastic.label == "E" and elastic.dashed and elastic.y.tolist() == pytest.approx([0, 1.05e-6 * top])
@@ -99,7 +101,7 @@ def test_the_highest_stress_and_the_lines_of_e(run_dir: Path) -> None:
     assert elastic.x[0] == pytest.approx(0.0, abs=30.0)
     assert (plot.x_label, plot.y_label) == ("axial strain, µm/m", "stress, MPa")
     forces = stress_strain(replace(curve, is_stress=False))
-    assert forces.curves[1].label == "EA" and forces.marks[-1].words.startswith("Fm = ")
+    assert forces.curves[1].label == "EA" and forces.marks[-1].name == "Fm"
     assert forces.y_label == "force, kN"
 
 

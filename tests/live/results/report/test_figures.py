@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acquire.text.quantity import GAP
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
@@ -53,7 +54,7 @@ def test_the_construction_of_the_yield_point(run_dir: Path) -> None:
     factor = measured.x[-1] / PULLED[-1]
     assert offset.label == "0.2 % offset"
     np.testing.assert_allclose((offset.x - elastic.x) / factor, 0.002, rtol=1e-4)
-    (yielded,) = (mark for mark in plot.marks if mark.words.startswith("Rp0.2"))
+    (yielded,) = (mark for mark in plot.marks if mark.name == "Rp0.2")
     assert np.interp(yielded.y, offset.y, offset.x) == pytest.approx(yielded.x)
     assert yielded.x / factor == pytest.approx(YIELD + 0.002, abs=1e-4)
     np.testing.assert_allclose(share, 100 * valid)
@@ -104,10 +105,10 @@ def test_the_report_shows_every_gauge_with_its_band(gauged: Path) -> None:
         assert curve.sigma is not None
         np.testing.assert_allclose(curve.sigma / curve.y, gauge.sigma / gauge.value)
     assert "kind line; start 64, 20; end 64, 76" in report.html
-    shown = re.search(r"([0-9.]+) ± ([0-9.]+) µm/m", report.html)
+    shown = re.search(r"([0-9.]+) ± ([0-9.]+) µm/m", report.html.replace(GAP, ""))
     assert shown is not None
     assert [float(word) for word in shown.groups()] == pytest.approx(
-        [1e6 * axial.value[-1], 1e6 * axial.sigma[-1]], rel=0.05
+        [1e6 * axial.value[-1], 1e6 * axial.sigma[-1]], rel=0.1
     )
     assert report.html.count('class="band') >= 5  # two gauges, three means
 
@@ -147,10 +148,10 @@ def test_exported_gauges_are_in_the_units_and_axes_asked_for(gauged: Path) -> No
     )
 
 
-def test_forces_are_in_kilonewton_from_two_thousand_on() -> None:
-    assert force_unit(np.array([0.0, -1999.0])).name == "N"
-    assert force_unit(np.array([np.nan, -2000.0])) == force_unit(np.array([5000.0]))
-    assert (force_unit(np.array([2000.0])).name, force_unit(np.array([2000.0])).factor) == ("kN", 1e-3)
+def test_forces_are_in_kilonewton_from_ten_thousand_on() -> None:
+    assert force_unit(np.array([0.0, -9999.0])).name == "N"
+    assert force_unit(np.array([np.nan, -10000.0])) == force_unit(np.array([50000.0]))
+    assert (force_unit(np.array([10000.0])).name, force_unit(np.array([10000.0])).factor) == ("kN", 1e-3)
     assert force_unit(np.array([np.nan])).name == "N"
 
 

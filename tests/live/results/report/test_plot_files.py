@@ -28,7 +28,7 @@ def test_a_line_is_drawn_from_left_to_right_and_upwards() -> None:
     line = PlotLine(
         "a", np.array([0.0, 5.0, 10.0]), np.array([0.0, 10.0, 20.0]), np.array([1.0, 2.0, 1.0]), 2
     )
-    svg = draw(Plot("f", "t", "x", "y", (line,), (Mark(5.0, 10.0, "here"), Mark(9.5, 20.0, "there")),
+    svg = draw(Plot("f", "t", "x", "y", (line,), (Mark(5.0, 10.0, "a", "1 N"), Mark(9.5, 20.0, "b", "2 N")),
                     (0.0, 10.0), (0.0, 20.0)))  # fmt: skip
     path = re.search(r'class="curve c2" d="(M74[^"]+)"', svg)
     assert path is not None and numbers(path[1]) == [74, 264, 320, 145, 566, 26]
@@ -40,8 +40,8 @@ def test_a_line_is_drawn_from_left_to_right_and_upwards() -> None:
     )
     circles = re.findall(r'<circle class="f3" cx="([\d.]+)" cy="([\d.]+)"', svg)
     assert circles == [("320.0", "145.0"), ("541.4", "26.0")]
-    assert '<text class="word" x="328.0" y="163.0" text-anchor="start">here<' in svg
-    assert '<text class="word" x="533.4" y="44.0" text-anchor="end">there<' in svg
+    assert '<text class="word" x="328.0" y="163.0" text-anchor="start">a = 1 N<' in svg
+    assert '<text class="word" x="533.4" y="44.0" text-anchor="end">b = 2 N<' in svg
     assert '<text class="word" x="172.4" y="280.0" text-anchor="middle">2<' in svg
     assert '<text class="word" x="68.0" y="149.0" text-anchor="end">10<' in svg
 

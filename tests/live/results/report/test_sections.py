@@ -48,7 +48,7 @@ def test_gauges_have_their_largest_and_last_strain_and_how_often_they_were_lost(
         values["gauge_axial"][[2, 3, 5]] = -3e-3, math.nan, math.nan
         values["gauge_shear"][:], values["sigma_gauge_shear"][:] = math.nan, math.nan
         found = plain(gauges(run))
-    assert "|axial|kind line; start 64, 20; end 64, 76|3000 µm/m|100.0 ± 2.0 µm/m|2|" in found
+    assert "|axial|kind line; start 64, 20; end 64, 76|3000 µm/m|100 ± 2 µm/m|2|" in found
     assert "value exy|not known|not known|12|" in found
 
 

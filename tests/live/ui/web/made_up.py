@@ -51,11 +51,11 @@ def figure(value: float | None, sigma: float | None = None, **more: Any) -> dict
 
 def run_state(**more: Any) -> dict[str, Any]:
     """A test that measures."""
-    axial = {"name": "area", "value": 19.988e-2, "sigma": 5e-6, "assumed": ""}
+    axial = {"name": "area", "value": 19.988e-2, "sigma": 2e-5, "assumed": ""}
     return {
         "side": "", "state": "measuring", "elapsed_s": 88.0, "recording": True, "peak_N": 8044.7, "troubles": [],
         "figures": {
-            "force": figure(8035.3, 0.9), "stress": figure(267.84e6, 3e4), "axial": figure(19.988e-2, 5e-6),
+            "force": figure(8035.3, 0.9), "stress": figure(267.84e6, 3e4), "axial": figure(19.988e-2, 2e-5),
         },
         "axial": axial, "gauges": [{"name": "width", "value": -7.703e-2, "sigma": 2e-6, "reason": "", "part": ""}],
         "strain_rate": 3.1e-3, "elongation_mm": 6.33, "points": [1, len(POINTS)], "picture": MAP, "events": [],
@@ -72,7 +72,7 @@ def setup_state(**more: Any) -> dict[str, Any]:
         "rows": [{"zoi": 32, "order": 1, "vsg": 80.0, "l10": 90.0, "noise": [150e-6, 75e-6]}],
     }
     load = {
-        "address": "sim:", "name": "cell", "force_N": -0.3, "noise_N": 1.0, "rate": 80.0, "zero_N": 0.0, "trouble": "",
+        "address": "sim:", "name": "cell", "force_N": -12.3, "noise_N": 0.5, "rate": 80.0, "zero_N": 0.0, "trouble": "",
     }  # fmt: skip
     return {
         "side": "", "remarks": [], "trouble": "", "doubt": "", "busy": "", "camera": None, "address": "sim:",
@@ -91,10 +91,11 @@ def setup_state(**more: Any) -> dict[str, Any]:
 
 def result(**more: Any) -> dict[str, Any]:
     """What comes after a test."""
+    strength, strain = {"kind": "stress", "digits": 2}, {"kind": "strain", "digits": 2, "unit": "%"}
     figures = [
-        {"name": "E", "text": "69.905 GPa", "interval": "± 0.057", "head": True},
-        {"name": "Rm", "text": "268.16 MPa", "interval": "± 0.10", "head": True},
-        {"name": "Agt", "text": "18.90 %", "interval": "± 0.47"},
+        {"name": "E", "text": strength | {"value": 69.905e9, "sigma": 0.057e9}, "head": True},
+        {"name": "Rm", "text": strength | {"value": 268.16e6, "sigma": 0.10e6}, "head": True},
+        {"name": "Agt", "text": strain | {"value": 18.9e-2, "sigma": 0.47e-2}},
     ]
     gauges = [{"name": "width", "value": -7.703e-2, "sigma": 2e-6, "reason": "", "part": ""}]
     marks = [

@@ -111,7 +111,7 @@ def test_a_tilt_is_shown_until_the_scale_is_taken_again(
     show(preview, seen(CHECKER, PX_PER_MM, degrees=12.0))
     CHANGES["board"](session, {"columns": 9, "rows": 6, "square": 5})
     (remark,) = session.state()["remarks"]
-    assert "the board is tilted, about 11 degrees" in remark
+    assert "the board is tilted by 11 degrees" in remark
     CHANGES["scale"](session, {"points": [[10, 10], [110, 10]], "mm": 5})
     assert session.state()["remarks"] == []
 

@@ -8,7 +8,9 @@ import pytest
 
 from acquire.text import Message
 from acquire.text.message import about
+from acquire.text.quantity import Quantity
 from live.words.language import said
+from tests.acquire.test_quantity import CASES, quantity_of
 from tests.live.ui.web.conftest import Start
 
 pytestmark = pytest.mark.slow
@@ -19,6 +21,10 @@ FILL = """async ([language, message]) => { const { setLanguage, t } = await impo
     await setLanguage(language); return t(message); }"""
 NUMBERS = """async cases => { const { number } = await import("/static/words.js");
     return cases.map(([value, format]) => number(value, format)); }"""
+
+QUANTITIES = """async ([language, cases]) => { const { setLanguage } = await import("/static/words.js");
+    const { quantityText } = await import("/static/numbers.js");
+    await setLanguage(language); return cases.map(quantityText); }"""
 
 
 def test_numbers_are_those_of_python(start: Start) -> None:
@@ -32,13 +38,30 @@ def test_numbers_are_those_of_python(start: Start) -> None:
 
 
 @pytest.mark.parametrize("language", ["en", "de", "fr"])
+def test_quantities_are_those_of_the_table(start: Start, language: str) -> None:
+    page = start()
+    cases = [case for case in CASES if language in case]
+    sent = [quantity_of(case).to_json() for case in cases]
+    assert page.page.evaluate(QUANTITIES, [language, sent]) == [case[language] for case in cases]
+
+
+@pytest.mark.parametrize("language", ["en", "de", "fr"])
 def test_a_message_is_the_same_on_the_page_and_in_a_terminal(start: Start, language: str) -> None:
     page = start()
     text = about(
         "/dev/video0",
         Message("no picture for {waited:.1f} s; still waiting (trigger, cable, light control?)", 2.13),
     )
-    messages: list[Any] = [text, Message("{{a}} {b}", "<b>{c}</b>"), "waiting", "a name that nobody knows"]
+    drift = Message(
+        "strain drifts by {drift} from left to right, in x and y alike", Quantity("strain", -0.0012)
+    )
+    messages: list[Any] = [
+        text,
+        drift,
+        Message("{{a}} {b}", "<b>{c}</b>"),
+        "waiting",
+        "a name that nobody knows",
+    ]
     for one in messages:
         sent = one.to_json() if isinstance(one, Message) else one
         assert page.page.evaluate(FILL, [language, sent]) == said(one, language)
