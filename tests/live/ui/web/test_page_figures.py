@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import re
+import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from live.config.loading import load_config
+from live.ui.web.page_controller import PageController
+from live.ui.web.setup.config_draft import ConfigDraft
 from tests.live.ui.web.browser import ROOT, Page
 from tests.live.ui.web.made_up import (
     MAP,
@@ -280,3 +285,47 @@ def test_two_cameras_after_a_test(browser: Any) -> None:
         page.page.click("#peakside button:nth-child(2)")
         assert marks(page, "peaklegend")[0] == pytest.approx(10.0)
         assert "side=back" in page.page.get_attribute("#peakmap", "src")
+
+
+def test_without_a_camera_the_list_of_devices_is_there(browser: Any, tmp_path: Path) -> None:
+    draft = ConfigDraft(load_config(None, {}), tmp_path / "rig.toml", {})
+    with PageController(draft, port=0) as controller:
+        thread = threading.Thread(target=controller.set_up, daemon=True)
+        thread.start()
+        page = Page(browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US").new_page())
+        page.goto(controller.address)
+        page.until(lambda: page.page.is_visible("#cameras"), "the step of the camera is open")
+        listed = page.page.locator("#cameras option[value='sim:hole']")
+        page.until(lambda: listed.count() == 1, "what there is")
+        assert page.page.is_visible("#nocamera") and "no camera is chosen" in page.text("trouble")
+        page.page.click("#step-specimen > summary")
+        page.page.fill('[data-set="specimen.width_mm"]', "20,5")
+        page.page.press('[data-set="specimen.width_mm"]', "Tab")
+        page.until(lambda: draft.config.specimen.width_mm == 20.5, "the rest can be set up")
+        assert not page.errors
+        controller.quit()
+        thread.join()
+        page.page.context.close()
+
+
+def test_what_fails_stays_to_be_seen(browser: Any) -> None:
+    """A check that says NO-GO, and a camera with a fault: their steps, and a verdict with what to do."""
+    line = {
+        "what": "load cell",
+        "value": "silent",
+        "good": False,
+        "advice": "look at its cable",
+        "measured": True,
+    }
+    with opened(browser) as page:
+        for step in ("gauges", "check", "camera"):
+            show_setup(page, go=False, lines=[line], trouble="no picture for 3 s")
+            page.page.click(f"#step-{step} > summary")
+            steps = page.page.locator(".step > summary:visible")
+            assert steps.count() == 4 and page.text("verdict") == "NO-GO"
+        assert page.text("reason") == "load cell: silent" and "doubtful" in page.page.get_attribute(
+            "#start", "class"
+        )
+        page.page.click("#step-check > summary")
+        assert page.page.inner_text("#verdicts .verdict.bad p") == "load cell: silent. look at its cable"
+        assert page.page.inner_text("#step-camera .chip") == "look"
