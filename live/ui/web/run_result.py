@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from acquire.text import Message
-from acquire.text.message import about
+from acquire.text.message import about, joined
 from analysis.evaluate import TensileFigures
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import sentence
@@ -141,7 +141,7 @@ def _interval_of_e(figures: TensileFigures) -> dict[str, Any]:
     parts = (
         figures.budget if len(figures.budget) > 1 else ("scatter", Message("no limits of error are stated"))
     )
-    text = "; ".join(parts)
+    text = joined("; ", parts)
     return {"name": Message("interval of E"), "text": text, "words": True}
 
 
