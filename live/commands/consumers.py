@@ -164,7 +164,7 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
         outlines=outlines(about.config.gauges, about.grid.size),
         light=v.light,
         picture_hz=1.0 if v.light else 5.0,
-        scale="automatic" if v.scale == "automatic" else "symmetric",
+        scale="symmetric" if v.scale == "symmetric" else "automatic",
     )
     rrd = about.folder / "view.rrd" if v.rrd else None
 

@@ -60,7 +60,7 @@ class ViewSetup:
     light : bool
         For slow connections: smaller pictures, fewer maps.
     scale : "symmetric" | "automatic"
-        Colour range of the maps: symmetric about zero, or that of the values.
+        Colour range of the maps: symmetric about zero; or that of the values, about zero where they have both signs.
     whole : sequence of str
         Further maps: those of the whole test, of a finished one.
     """
@@ -80,7 +80,7 @@ class ViewSetup:
     outlines: Mapping[str, tuple[tuple[tuple[float, float], ...], ...]] = field(default_factory=dict)
     gauges: Sequence[str] = ()
     light: bool = False
-    scale: Literal["symmetric", "automatic"] = "symmetric"
+    scale: Literal["symmetric", "automatic"] = "automatic"
     whole: Sequence[str] = ()
 
 

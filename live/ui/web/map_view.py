@@ -20,6 +20,7 @@ from live.ui.web.painting import as_jpeg, shrunk
 RANGES = ("automatic", "symmetric", "fixed")
 BARS = 24
 """Of the histogram, over the range of the colours."""
+_RAMP = 11  # colours of the bar, between which the page shades
 OUTSIDE = Message("no ZOI is here")
 
 
@@ -62,7 +63,7 @@ class MapView:
     def _take(self, choice: MapChoice) -> None:
         self.choice = choice
         limit = choice.limit if choice.span == "fixed" else None
-        self._maps = FieldMaps(self._axis, limit, about_zero=choice.span == "symmetric")
+        self._maps = FieldMaps(self._axis, limit, is_symmetric=choice.span == "symmetric")
 
     def choose(self, name: object, span: object, limit: object) -> str:
         """Show another map, or another range; the reason of a refusal, or empty."""
@@ -110,7 +111,7 @@ class MapView:
 
 
 def _scale_of(painted: Painted) -> dict[str, Any]:
-    """The colours of a map: ends, unit and histogram, strains without unit; or the legend of statuses."""
+    """The colours of a map: from low to high, ends, unit and histogram, strains without unit; or the legend."""
     scale, values = painted.scale, painted.values
     if scale is None or values is None:
         legend = [{"text": one.text, "count": one.count, "colour": f"rgb{one.rgb}"} for one in painted.legend]
@@ -120,7 +121,9 @@ def _scale_of(painted: Painted) -> dict[str, Any]:
     low, high = scale.low / factor, scale.high / factor
     counts, _ = np.histogram(values[np.isfinite(values)], BARS, (low, high))
     unit = "" if strain else scale.unit
-    return {"low": low, "high": high, "strain": strain, "unit": unit, "histogram": counts.tolist()}
+    ramp = [f"#{bytes(row).hex()}" for row in scale.ramp(_RAMP)]
+    colours = {"ramp": ramp, "diverging": scale.is_diverging}
+    return {"low": low, "high": high, "strain": strain, "unit": unit, "histogram": counts.tolist()} | colours
 
 
 def plate_shapes(config: Config) -> dict[str, Any]:

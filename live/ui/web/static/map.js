@@ -17,7 +17,6 @@ export function beginMap(stage) {
   if (!$("component").children.length) {
     for (const name of stage.components) $("component").append(el("option", { value: name, t: name }));
   }
-  $("ramp").style.background = `linear-gradient(to left, ${stage.ramp.join(", ")})`;
   load("1");
 }
 
@@ -58,6 +57,8 @@ addEventListener("unit", () => { if (picture) showLegend(); });
 function showLegend() {
   for (const [id, now] of [["component", picture.of], ["range", choosing ? "fixed" : picture.range]]) if ($(id) !== document.activeElement) $(id).value = now;
   $("limit").hidden = $("range").value !== "fixed";
+  const zero = picture.diverging ? "linear-gradient(#12171d, #12171d) center / 2px 100% no-repeat, " : "";
+  $("ramp").style.background = `${zero}linear-gradient(to right, ${(picture.ramp ?? ["transparent", "transparent"]).join(", ")})`;
   const scaled = picture.high != null, unit = picture.strain ? strainUnit().name : (picture.unit ?? "");
   if ($("limit") !== document.activeElement && scaled && picture.range === "fixed" && picture.strain) $("limit").value = short(picture.high * factor()).replace("−", "-");
   $("ramp").closest(".legend").classList.toggle("status", Boolean(picture.legend));
