@@ -14,6 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 _SEQUENTIAL = "431480 39349c 1a51b0 046fa5 0187a1 029f9f 06b696 4acc7b 93d866 c9e35b faed5a"
+LINES = ("#0060ad", "#bd4a00", "#007a62", "#9a3a80", "#7a5c00", "#56606b")
+"""Of curves and gauges on a light ground or over a picture, by their index; told apart with any colour vision."""
+LINES_ON_DARK = ("#6db3f2", "#f59453", "#3cc6a8", "#e28cc2", "#d6b64a", "#a4aeb8")
 _COLD, _HOT, _BEND = (59, 76, 192), (180, 4, 38), 88.0
 _NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
 

@@ -57,6 +57,8 @@ class ViewSetup:
         Lines of the gauges, drawn on the picture.
     gauges : sequence of str
         Names of those whose strain is plotted over time.
+    colours : mapping of name to int
+        The index of the colour of each gauge; without, by its place.
     light : bool
         For slow connections: smaller pictures, fewer maps.
     scale : "symmetric" | "automatic"
@@ -79,6 +81,7 @@ class ViewSetup:
     with_load: bool = True
     outlines: Mapping[str, tuple[tuple[tuple[float, float], ...], ...]] = field(default_factory=dict)
     gauges: Sequence[str] = ()
+    colours: Mapping[str, int] = field(default_factory=dict)
     light: bool = False
     scale: Literal["symmetric", "automatic"] = "automatic"
     whole: Sequence[str] = ()

@@ -16,7 +16,7 @@ from acquire.events import Event, EventKind
 from analysis.field import Status
 from live.pipeline.queues import Thinned
 from live.pipeline.snapshot import Snapshot
-from live.results.maps.colours import number
+from live.results.maps.colours import LINES, LINES_ON_DARK, number
 from live.results.maps.field_maps import FieldMaps, Painted
 from live.results.maps.scale import AutoRange, ColourScale, range_kind
 from live.ui.rerun.drawing.curve import MAX_POINTS, CurveDrawing
@@ -53,9 +53,9 @@ from live.ui.rerun.messages import MAPS, STRAINS, PictureMessage, Row, ViewSetup
 if TYPE_CHECKING:
     from analysis.field import StrainField, ZoiGrid
 
-COLOURS = {"exx": (255, 107, 107), "eyy": (81, 207, 102), "exy": (116, 163, 255)}
-GAUGES = ((255, 0, 255), (64, 224, 255), (255, 212, 59), (81, 207, 102), (255, 107, 107), (116, 163, 255))
-RED, GAUGE, GAUGE_NAME = (255, 90, 60), (255, 0, 255), (255, 200, 255)
+ON_PICTURE, ON_DARK = ([tuple(bytes.fromhex(c[1:])) for c in one] for one in (LINES, LINES_ON_DARK))
+COLOURS = dict(zip(STRAINS, ON_DARK, strict=False))
+RED, WHITE = (255, 90, 60), (255, 255, 255)
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 _RAMP = (8, 256)
 _MAX_STRAINS, _MAX_FORCES = 5000, 10_000
@@ -98,7 +98,8 @@ class ViewScene:
             style = rr.Measurements.from_fields(names=name, colors=COLOURS[name], widths=2.0)
             self._log(f"strain/{name}", style, static=True)
         for k, name in enumerate(self._setup.gauges):
-            style = rr.Measurements.from_fields(names=name, colors=GAUGES[k % len(GAUGES)], widths=2.0)
+            colour = ON_DARK[self._setup.colours.get(name, k) % len(ON_DARK)]
+            style = rr.Measurements.from_fields(names=name, colors=colour, widths=2.0)
             self._log(gauge_path(name), style, static=True)
         self._log("load/force", rr.SeriesLines(colors=YELLOW, names="load", widths=2.0), static=True)
         self._outlines(self._setup.grid)
@@ -176,10 +177,14 @@ class ViewScene:
         lines = [[np.array(line) + 0.5 for line in lines] for lines in self._setup.outlines.values()]
         strips = [strip for gauge in lines for strip in gauge]
         if strips:
-            width = rr.Radius.ui_points(2.0)
-            gauges = rr.LineStrips2D(strips, colors=GAUGE, radii=width, draw_order=50)
+            rim = rr.LineStrips2D(strips, colors=WHITE, radii=rr.Radius.ui_points(3.0), draw_order=49)
+            self._log("specimen/gauges/rim", rim, static=True)
+            places = enumerate(self._setup.outlines)
+            colours = [ON_PICTURE[self._setup.colours.get(n, k) % len(ON_PICTURE)] for k, n in places]
+            each = [c for c, gauge in zip(colours, lines, strict=True) for _ in gauge]
+            gauges = rr.LineStrips2D(strips, colors=each, radii=rr.Radius.ui_points(2.0), draw_order=50)
             self._log("specimen/gauges", gauges, static=True)
-            names = text_labels([gauge[0][0] for gauge in lines], list(self._setup.outlines), GAUGE_NAME)
+            names = text_labels([gauge[0][0] for gauge in lines], list(self._setup.outlines), WHITE)
             self._log("specimen/gauges/names", names, static=True)
         boxes = sample_boxes(grid)
         self._log(

@@ -121,7 +121,7 @@ def test_the_head_of_the_report(run: RunFolder) -> None:
     curve = EvaluatedCurve.of(run)
     extent = report._extent(run, replace(curve, axial=np.array([0.0, -0.03, 0.01, math.nan])))
     assert extent["ZOIs with a value, last"] == "33 of 34"
-    assert extent[f"largest {curve.figures.strain}"] == "-3 %"
+    assert extent[f"largest {curve.figures.strain}"] == "−3 %"
     head = plain(report._head(run, curve, FinishedTest.of_folder(run)))
     assert f"Test of 2030-01-02T03:04:05+00:00: {N} measurements in 9.5 s." in head
     assert "not closed" not in head

@@ -81,12 +81,20 @@ def field(**more: Any) -> StrainField:
 
 def test_maps_lie_on_their_zois_and_gauges_on_the_picture() -> None:
     """The picture of the viewer begins at 0 and ours at -0.5; a cell is a step wide."""
-    scene, sink, _ = made(gauges=["axial"], outlines={"axial": (((10.0, 20.0), (30.0, 40.0)),)})
+    scene, sink, _ = made(
+        gauges=["axial"], outlines={"axial": (((10.0, 20.0), (30.0, 40.0)),)}, colours={"axial": 7}
+    )
     scene.begin()
     for name in ("exx", "status"):
         assert sink.last(f"specimen/map/{name}", "translation") == [[15.5 + 0.5 - 8, 15.5 + 0.5 - 8, 0]]
         assert sink.last(f"specimen/map/{name}", "scale") == [[16, 16, 1]]
     assert sink.last("specimen/gauges", "strips") == [[[10.5, 20.5], [30.5, 40.5]]]
+    assert sink.last("specimen/gauges/rim", "strips") == [[[10.5, 20.5], [30.5, 40.5]]]
+    # The colours of the light page over the picture, those of the dark one in plots: the second of six.
+    assert sink.last("specimen/gauges", "colors") == [0xBD4A00FF] and sink.last("gauges/axial", "colors") == [
+        0xF59453FF
+    ]
+    assert sink.last("specimen/gauges/rim", "colors") == [0xFFFFFFFF]
     assert sink.last("specimen/gauges/names", "positions") == [[10.5, 20.5]]
     assert sink.last("specimen/gauges/names", "labels") == ["axial"]
     assert sink.last("gauges/axial", "names") == ["axial"]
