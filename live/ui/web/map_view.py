@@ -9,7 +9,7 @@ import numpy as np
 
 from acquire.text import Message
 from analysis.field import VALUES, Status
-from live.config.gauges import complete_gauges
+from live.config.gauges import complete_gauges, gauge_colours
 from live.config.loading import Config
 from live.pipeline.measurement import Measurement
 from live.results.maps.colours import MICROSTRAIN, PERCENT
@@ -138,12 +138,14 @@ def plate_shapes(config: Config) -> dict[str, Any]:
 
 
 def gauge_shapes(config: Config) -> dict[str, Any]:
-    """The gauges of a configuration as the page draws them: kind, handles and lines, px."""
+    """The gauges of a configuration as the page draws them: kind, index of the colour, handles and lines, px."""
+    colours = gauge_colours(config.gauges)
     found = complete_gauges(config.gauges, config.specimen.first_axis)
     zoi = config.measure.zoi
     return {
         one.name: {
             "kind": one.kind,
+            "colour": colours[one.name],
             "handles": one.handles(),
             "outline": [[(round(x, 1), round(y, 1)) for x, y in line] for line in one.outline(zoi)],
         }

@@ -1,6 +1,7 @@
 // The map over the picture of a running test: its colours with a histogram, its range, the value under the pointer.
 import { $, el, fill, post, put } from "./base.js";
 import { drawGauges, make, moved, position, showCross, zoomable } from "./draw.js";
+import { numberField } from "./fields.js";
 import { fixed, short, strainText, strainUnit } from "./numbers.js";
 import { t } from "./words.js";
 
@@ -22,15 +23,16 @@ export function beginMap(stage) {
 
 let choosing = false; // "fixed" is chosen and waits for its limit: the range of the program does not take its place
 
-for (const id of ["component", "range", "limit"]) {
-  $(id).addEventListener("change", () => {
-    $("limit").hidden = $("range").value !== "fixed";
-    const limit = Number($("limit").value) / strainUnit().factor;
-    choosing = $("range").value === "fixed" && !(limit > 0);
-    if (choosing) { $("limit").focus(); return; }
-    post("/map", { of: $("component").value, range: $("range").value, limit });
-  });
+const limit = numberField($("limit"), { unit: () => strainUnit().name, onvalue: choose });
+for (const id of ["component", "range"]) $(id).addEventListener("change", () => choose(limit.read()));
+
+function choose(value) {
+  showLimit();
+  choosing = $("range").value === "fixed" && !(value > 0);
+  if (choosing) { $("limit").focus(); return null; }
+  return post("/map", { of: $("component").value, range: $("range").value, limit: value / strainUnit().factor });
 }
+const showLimit = () => { $("limit").parentElement.hidden = $("range").value !== "fixed"; };
 
 const factor = () => (picture?.strain ? strainUnit().factor : 1);
 
@@ -56,11 +58,11 @@ addEventListener("unit", () => { if (picture) showLegend(); });
 
 function showLegend() {
   for (const [id, now] of [["component", picture.of], ["range", choosing ? "fixed" : picture.range]]) if ($(id) !== document.activeElement) $(id).value = now;
-  $("limit").hidden = $("range").value !== "fixed";
+  showLimit();
   const zero = picture.diverging ? "linear-gradient(#12171d, #12171d) center / 2px 100% no-repeat, " : "";
   $("ramp").style.background = `${zero}linear-gradient(to right, ${(picture.ramp ?? ["transparent", "transparent"]).join(", ")})`;
   const scaled = picture.high != null, unit = picture.strain ? strainUnit().name : (picture.unit ?? "");
-  if ($("limit") !== document.activeElement && scaled && picture.range === "fixed" && picture.strain) $("limit").value = short(picture.high * factor()).replace("−", "-");
+  if (scaled && picture.range === "fixed" && picture.strain) limit.show(Number((picture.high * factor()).toPrecision(6)));
   $("ramp").closest(".legend").classList.toggle("status", Boolean(picture.legend));
   fill($("statuses"), picture.legend ?? [], (one) => {
     const key = el("i", { class: "key" });

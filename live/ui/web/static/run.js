@@ -41,6 +41,7 @@ function show(value) {
   put($("elapsed"), time(value.elapsed_s));
   showRecording(value.recording, ended);
   $("pause").dataset.line = paused ? "resume" : "pause";
+  if (paused) delete $("pause").dataset.ask; else $("pause").dataset.ask = "Pause measuring?";
   $("pause").firstElementChild.dataset.t = paused ? "Resume" : "Pause";
   put($("pause").firstElementChild, t($("pause").firstElementChild.dataset.t));
   showFigure("force", value.figures.force, (one) => fixed(one, 1));

@@ -3,6 +3,7 @@ import { $, change, el, fill, put } from "./base.js";
 import { beginDrawing, forgetDrawing, showDrawing } from "./drawing.js";
 import { showCheck, showStart } from "./check.js";
 import { showDevices } from "./devices.js";
+import { numberField, onEscape } from "./fields.js";
 import { colourOf, fixed, percent, short, strainText } from "./numbers.js";
 import { all, beginViews, received } from "./views.js";
 import { t } from "./words.js";
@@ -56,7 +57,7 @@ export function showSetup(state, isSecond) {
   put($("file"), `${value.file} · ${t(value.unsaved.length ? "not saved" : "saved")}`);
   showPicture(value);
   showDrawing(value);
-  listGauges(Object.keys(value.gauges));
+  listGauges(value.gauges);
   showSliders(c?.sliders ?? []);
   showFields(value);
   for (const box of document.querySelectorAll("[data-overlay]")) if (box !== document.activeElement) box.checked = value.overlays[box.dataset.overlay];
@@ -78,14 +79,15 @@ function showPicture(value) {
   }
 }
 
-function listGauges(names) {
+function listGauges(gauges) {
   const list = $("gauges");
   if (list.contains(document.activeElement) && document.activeElement !== list) return;
-  fill(list, names, (name, k) => {
+  fill(list, Object.entries(gauges).map(([name, { colour }]) => [name, colour]), ([name], k) => {
     const input = el("input", { value: name, maxLength: 32, "aria-label": t("Name") });
     const remove = el("button", { type: "button", text: "×", "aria-label": `${t("Remove")} ${name}` });
     const key = el("i", { class: "key" });
-    key.style.background = colourOf(k);
+    key.style.background = colourOf(gauges[name].colour ?? k);
+    onEscape(input, () => { input.value = name; input.blur(); });
     input.addEventListener("change", async () => {
       const { refused } = await change({ do: "gauge", name: input.value, was: name });
       if (refused) input.value = name;
@@ -126,16 +128,26 @@ function sliderValue(input) {
 }
 const number = (value) => (value >= 100 ? value.toFixed(0) : value.toPrecision(3));
 
+const numbers = new Map();
 for (const input of document.querySelectorAll("[data-set]")) {
-  const ranged = input.type === "range", numeric = ranged || input.type === "number";
-  if (ranged) input.addEventListener("input", () => put(input.nextElementSibling, input.value));
-  input.addEventListener("change", () => change({ do: "set", key: input.dataset.set, value: numeric && input.value !== "" ? Number(input.value) : input.value }));
+  const isRange = input.type === "range", send = (value) => change({ do: "set", key: input.dataset.set, value });
+  if (input.dataset.number) {
+    numbers.set(input, numberField(input, { unit: input.dataset.number, onvalue: (value) => send(value ?? "") }));
+    continue;
+  }
+  if (!isRange && input.type === "text") onEscape(input, () => { input.value = input.dataset.kept ?? ""; input.blur(); });
+  if (isRange) input.addEventListener("input", () => put(input.nextElementSibling, input.value));
+  input.addEventListener("change", () => send(isRange ? Number(input.value) : input.value));
 }
 
 function showFields(value) {
+  const area = value.specimen.area_mm2;
+  put($("section"), area ? `${t("Section")} ${fixed(area, 2)} mm²` : t("no section: forces, no stresses"));
   for (const input of document.querySelectorAll("[data-set]")) {
-    if (input === document.activeElement) continue;
     const [section, key] = input.dataset.set.split("."), now = value[section][key] ?? "";
+    numbers.get(input)?.show(value[section][key]);
+    input.dataset.kept = now;
+    if (input === document.activeElement || numbers.has(input)) continue;
     if (input.value !== String(now)) input.value = now;
     if (input.type === "range") put(input.nextElementSibling, String(now));
   }
