@@ -17,15 +17,18 @@ from live.results.figures import axis_text, budget_of, figure_lines, film_line, 
 from live.results.finished.figures_file import finished_in
 from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
+from live.results.maps.colours import number
 from live.results.report import curves
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
 from live.results.report.maps import MapPictures, map_pictures, maps, statuses, whole_maps
 from live.results.report.noise_floor import StillPhase, still_phase_of
 from live.results.report.page import (
     Html,
+    band,
     captioned,
     element,
     facts,
+    fold,
     joined,
     page,
     paragraph,
@@ -143,9 +146,9 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
         *_lens_section(run),
         section("Status of the ZOIs", statuses(run, max(chosen), pictures, min(side, 480))),
         section("Frame counts and events", frame_counts(run), events(run), *_unreadable(run)),
-        section("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
-        section("Definitions", definitions(run)),
-        section("Versions and files", version_table(run), content.files),
+        fold("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
+        fold("Definitions", definitions(run)),
+        fold("Versions and files", version_table(run), content.files),
     ]
 
 
@@ -161,8 +164,8 @@ def _head(run: RunFolder, curve: EvaluatedCurve, test: FinishedTest) -> Html:
         [
             element("h1", run.title),
             paragraph(f"{words} Report made by phasedic on {now}.", "dim"),
-            paragraph(unfinished, "warning") if run.strain.unfinished else Html(""),
-            *(paragraph(text, "warning") for text in doubts(findings(test))),
+            band(unfinished, "bad") if run.strain.unfinished else Html(""),
+            *(band(text, "look") for text in doubts(findings(test))),
             tiles({**tensile(curve), **_extent(run, curve)}),
         ]
     )
@@ -182,7 +185,7 @@ def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
     if np.isfinite(curve.axial).any():
         largest = curve.axial[np.nanargmax(np.abs(curve.axial))] * e.factor
         name = curve.figures.strain or run.axial
-        found[f"largest {name}"] = f"{largest:.4g} {e.name}"
+        found[f"largest {name}"] = f"{number(float(f'{largest:.4g}'))} {e.name}"
     return found
 
 

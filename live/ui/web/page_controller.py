@@ -29,7 +29,7 @@ from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.page_consumer import PageConsumer, RunningTest
 from live.ui.web.page_consumers import PageConsumers
-from live.ui.web.painting import RAMP, as_png
+from live.ui.web.painting import as_png
 from live.ui.web.run_result import peaks
 from live.ui.web.server import DEFAULT_PORT, REPORT_POLICY, PageServer, Response, jpeg_response
 from live.ui.web.setup.config_draft import ConfigDraft, next_name, second_draft
@@ -240,7 +240,7 @@ class PageController:
             {"kind": name, "label": one.label, "hint": one.hint, "gesture": one.gesture}
             for name, one in GAUGE_KINDS.items()
         ]
-        self._broadcaster.publish("stage", stage | {"components": FIELD_MAPS, "ramp": RAMP, "kinds": kinds})
+        self._broadcaster.publish("stage", stage | {"components": FIELD_MAPS, "kinds": kinds})
 
     # -- requests of the page -----------------------------------------------------------------
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from analysis.field import ZoiGrid
-from live.results.maps.colours import ramp
 
 MAX_SIDE_PX = 960
 """Of a picture; larger ones are reduced."""
@@ -19,8 +18,6 @@ QUALITY = 80
 RED = (40, 40, 255)  # blue, green, red
 
 Bytes = NDArray[np.uint8]
-RAMP = [f"#{bytes(row).hex()}" for row in ramp(11, 1)[:, 0]]
-"""The colours of a map from its highest value down."""
 
 
 def shrunk(image: NDArray[Any], bits: int, max_side_px: int = MAX_SIDE_PX) -> tuple[Bytes, float]:

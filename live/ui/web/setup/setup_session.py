@@ -159,6 +159,7 @@ class SetupSession:
             "overlays": self.overlays,
             "region": region,
             "gauges": gauge_shapes(config),
+            "can": self.region.can,
             "plates": plate_shapes(config),
             "measure": {"zoi": m.zoi, "step": m.step, "burst": m.burst or DEFAULT_BURST},
             "specimen": {key: getattr(specimen, key) for key in SPECIMEN_KEYS}

@@ -1,5 +1,6 @@
 // Camera and load cell by hand: lists of what there is, addresses, format and rate; the live force and its zero.
 import { $, change, el, fill, put } from "./base.js";
+import { numberField, onEscape } from "./fields.js";
 import { fixed, short, withSigma } from "./numbers.js";
 import { t } from "./words.js";
 
@@ -21,8 +22,9 @@ for (const [select, kind, other] of [["cameras", "address", "cameraaddress"], ["
 }
 $("cameraform").addEventListener("submit", (event) => { event.preventDefault(); change({ do: "address", value: $("cameraaddress").value.trim() }); document.activeElement.blur(); });
 $("loadform").addEventListener("submit", (event) => { event.preventDefault(); change({ do: "load", value: $("loadaddress").value.trim() }); document.activeElement.blur(); });
+for (const input of [$("cameraaddress"), $("loadaddress")]) onEscape(input, () => input.blur());
 onChoice($("format"), (value) => change({ do: "option", key: "format", value }));
-$("rate").addEventListener("change", (event) => { change({ do: "option", key: "fps", value: event.target.value }); event.target.blur(); });
+const rate = numberField($("rate"), { unit: "1/s", onvalue: (value) => change({ do: "option", key: "fps", value: value ?? "" }) });
 $("identify").addEventListener("click", () => change({ do: "identify", port: $("loadaddress").value.split("?")[0] }));
 
 export function showDevices(value) {
@@ -34,7 +36,7 @@ export function showDevices(value) {
   keep($("loadaddress"), load.address);
   const query = new URLSearchParams(value.address.split("?")[1] ?? "");
   offerFormats(value.camera?.formats ?? [], value.camera?.format ?? "", query.get("format") ?? "");
-  keep($("rate"), query.get("fps") ?? "");
+  rate.show(Number(query.get("fps")) || null);
   $("rate").placeholder = short(value.camera?.fps);
   fill($("rates"), value.camera?.rates ?? [], (rate) => el("option", { value: rate }));
   fill($("camerawarnings"), value.camera?.warnings ?? [], (text) => el("li", { text: t(text) }));

@@ -1,6 +1,7 @@
 // The picture of a running test with its map over it: opacity, colours, range, the value under the pointer.
 import { $, el, post, put } from "./base.js";
 import { drawGauges, moved, position, showCross, zoomable } from "./draw.js";
+import { numberField } from "./fields.js";
 import { factorOf, setRatio, showLegend, unitOf } from "./legend.js";
 import { fixed, strainText, strainUnit } from "./numbers.js";
 import { t } from "./words.js";
@@ -33,16 +34,16 @@ showOpacity();
 
 let choosing = false; // "fixed" is chosen and waits for its limit: the range of the program does not take its place
 
-for (const id of ["component", "range", "limit"]) {
-  $(id).addEventListener("change", () => {
-    showLimit();
-    const limit = Number($("limit").value.replace(",", ".")) / strainUnit().factor;
-    choosing = $("range").value === "fixed" && !(limit > 0);
-    if (choosing) { $("limit").focus(); return; }
-    post("/map", { of: $("component").value, range: $("range").value, limit });
-  });
+const limit = numberField($("limit"), { unit: () => strainUnit().name, onvalue: choose });
+for (const id of ["component", "range"]) $(id).addEventListener("change", () => choose(limit.read()));
+
+function choose(value) {
+  showLimit();
+  choosing = $("range").value === "fixed" && !(value > 0);
+  if (choosing) { $("limit").focus(); return null; }
+  return post("/map", { of: $("component").value, range: $("range").value, limit: value / strainUnit().factor });
 }
-const showLimit = () => { $("limit").closest(".box").hidden = $("range").value !== "fixed"; };
+const showLimit = () => { $("limit").closest(".field").hidden = $("range").value !== "fixed"; };
 
 // The next picture is requested when the last has arrived: a slow page gets fewer pictures, never old ones.
 function load(n) {
@@ -71,7 +72,7 @@ for (const kind of ["unit", "language"]) addEventListener(kind, () => { if (pict
 function showChoice() {
   for (const [id, now] of [["component", picture.of], ["range", choosing ? "fixed" : picture.range]]) if ($(id) !== document.activeElement) $(id).value = now;
   showLimit();
-  if ($("limit") !== document.activeElement && picture.high != null && picture.range === "fixed" && picture.strain) $("limit").value = String(Number((picture.high * factorOf(picture)).toPrecision(4)));
+  if (picture.high != null && picture.range === "fixed" && picture.strain) limit.show(Number((picture.high * factorOf(picture)).toPrecision(6)));
   put($("limitunit"), strainUnit().name);
   showLegend($("maplegend"), picture);
 }

@@ -32,14 +32,14 @@ function stop(event) {
   event.stopImmediatePropagation();
 }
 
-const REPEATED = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Tab", "Backspace", "Delete"];
+const REPEATED = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Tab", "Backspace", "Delete", "z", "y"];
 const isTyping = (target) => target.closest?.("input:not([type=range]):not([type=checkbox]), select, textarea");
 const lastDown = new Map();
 document.addEventListener("keydown", (event) => {
   const before = lastDown.get(event.key), typed = isTyping(event.target) && event.key !== "Enter";
   lastDown.set(event.key, event);
   if (event.key === "Escape" && armed) { disarm(false); return stop(event); }
-  if (typed || REPEATED.includes(event.key) || event.key === "z") return;
+  if (typed || REPEATED.includes(event.key)) return;
   if (event.repeat || (before?.target === event.target && event.timeStamp - before.timeStamp < BOUNCE_MS)) stop(event);
 }, true);
 

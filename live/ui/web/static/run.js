@@ -52,9 +52,10 @@ function show(value) {
   put($("elapsed"), time(value.elapsed_s));
   showRecording(value.recording, isEnded);
   $("pause").dataset.line = isPaused ? "resume" : "pause";
+  if (isPaused) delete $("pause").dataset.ask; else $("pause").dataset.ask = "Pause measuring?";
   const word = $("pause").querySelector("span");
   word.dataset.t = isPaused ? "Resume" : "Pause";
-  put(word, t(word.dataset.t));
+  if (!$("pause").classList.contains("armed")) put(word, t(word.dataset.t));
   showFigures(value);
   put($("elongation"), value.elongation_mm == null ? "–" : fixed(value.elongation_mm, 4));
   put($("strainrate"), value.strain_rate == null ? "–" : rate(value.strain_rate));
@@ -147,7 +148,7 @@ function rate(value) {
 const withPart = (text, part) => (part ? `${text} ${t(part)}` : text);
 
 function showGauges(value) {
-  const gauges = (value.gauges ?? []).map((one, k) => ({ k, ...one })), list = $("others");
+  const gauges = (value.gauges ?? []).map((one, k) => ({ k: one.colour ?? k, ...one })), list = $("others");
   list.hidden = !gauges.length;
   fill(list, gauges.map(({ name, k }) => [name, k]), ([name, k]) => el("li", {}, key(k), el("span", { class: "name", text: name }), el("b", { class: "num" })));
   gauges.forEach((one, i) => {

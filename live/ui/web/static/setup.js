@@ -3,6 +3,7 @@ import { $, change, el, fill, put } from "./base.js";
 import { beginDrawing, forgetDrawing, showDrawing } from "./drawing.js";
 import { showCheck, showStart } from "./check.js";
 import { showDevices } from "./devices.js";
+import { numberField, onEscape } from "./fields.js";
 import { icon, key, putIcon } from "./icons.js";
 import { setRatio } from "./legend.js";
 import { fixed, percent, short, strainText, strainUnit } from "./numbers.js";
@@ -81,7 +82,7 @@ export function showSetup(state, isSecond) {
   put($("file"), `· ${value.file} · ${t(value.unsaved.length ? "not saved" : "saved")}`);
   showPicture(value);
   showDrawing(value);
-  listGauges(Object.keys(value.gauges));
+  listGauges(value.gauges);
   showSliders(c?.sliders ?? []);
   showFields(value);
   for (const button of document.querySelectorAll("[data-overlay]")) button.setAttribute("aria-pressed", String(value.overlays[button.dataset.overlay]));
@@ -120,12 +121,13 @@ function showPicture(value) {
   }
 }
 
-function listGauges(names) {
+function listGauges(gauges) {
   const list = $("gauges");
   if (list.contains(document.activeElement) && document.activeElement !== list) return;
-  fill(list, names, (name, k) => {
+  fill(list, Object.entries(gauges).map(([name, { colour }]) => [name, colour]), ([name, colour], k) => {
     const input = el("input", { value: name, maxLength: 32, "aria-label": t("Name") });
     const remove = el("button", { type: "button", class: "button plain", "aria-label": `${t("Remove")} ${name}` }, icon("remove"));
+    onEscape(input, () => { input.value = name; input.blur(); });
     input.addEventListener("change", async () => {
       const { refused } = await change({ do: "gauge", name: input.value, was: name });
       if (refused) input.value = name;
@@ -133,7 +135,7 @@ function listGauges(names) {
       list.dataset.mark = "";
     });
     remove.addEventListener("click", () => { remove.blur(); change({ do: "gauge", name, gauge: null }); });
-    return el("li", {}, key(k), input, remove);
+    return el("li", {}, key(colour ?? k), input, remove);
   });
 }
 
@@ -166,16 +168,24 @@ function sliderValue(input) {
 }
 const number = (value) => (value >= 100 ? value.toFixed(0) : value.toPrecision(3));
 
+const numbers = new Map();
 for (const input of document.querySelectorAll("[data-set]")) {
-  const isRange = input.type === "range", isNumber = isRange || input.dataset.number;
+  const isRange = input.type === "range", send = (value) => change({ do: "set", key: input.dataset.set, value });
+  if (input.dataset.number) {
+    numbers.set(input, numberField(input, { unit: input.dataset.number, onvalue: (value) => send(value ?? "") }));
+    continue;
+  }
+  if (!isRange && input.type === "text") onEscape(input, () => { input.value = input.dataset.kept ?? ""; input.blur(); });
   if (isRange) input.addEventListener("input", () => put(input.previousElementSibling, input.value));
-  input.addEventListener("change", () => change({ do: "set", key: input.dataset.set, value: isNumber && input.value !== "" ? Number(input.value.replace(",", ".")) : input.value }));
+  input.addEventListener("change", () => send(isRange ? Number(input.value) : input.value));
 }
 
 function showFields(value) {
   for (const input of document.querySelectorAll("[data-set]")) {
-    if (input === document.activeElement) continue;
     const [section, key] = input.dataset.set.split("."), now = value[section][key] ?? "";
+    numbers.get(input)?.show(value[section][key]);
+    input.dataset.kept = now;
+    if (input === document.activeElement || numbers.has(input)) continue;
     if (input.value !== String(now)) input.value = now;
     if (input.type === "range") put(input.previousElementSibling, String(now));
   }

@@ -96,6 +96,7 @@ def test_a_browser_comes_to_the_page_by_the_file_that_it_is_given(
 
 def set_up(page: Page, folder: Path) -> None:
     page.until(lambda: "specimen" in page.text("region"), "the specimen is found")
+    page.page.keyboard.press("1")
     page.drag((60.0, 50.0), (420.0, 330.0))
     page.until(lambda: "as drawn" in page.text("region"), "the rectangle is taken")
     page.page.keyboard.press("4")
@@ -173,6 +174,7 @@ def run(page: Page, program: Program) -> None:
     page.page.keyboard.press("Enter")
     page.until(lambda: "grip slipped" in page.text("events"), "the note is an event")
     page.page.keyboard.press("p")
+    page.confirm()
     page.until(lambda: page.page.get_attribute("#state", "data-word") == "paused", "paused")
     page.page.wait_for_timeout(350)  # sooner it is a bounce
     page.page.keyboard.press("p")

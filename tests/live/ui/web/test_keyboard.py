@@ -45,6 +45,7 @@ def last_posted(page: Page, what: str) -> dict[str, object]:
 
 def draw(page: Page) -> None:
     """A rectangle and an extensometer; the cross begins in the middle of 256 x 192 px."""
+    page.press("1")
     tab_to(page, "#drawing")
     assert "Space" in page.text("hint")
     keys(page, ("Shift+ArrowLeft", 8), ("Shift+ArrowUp", 6))
