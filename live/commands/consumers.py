@@ -10,7 +10,7 @@ from acquire.addresses import Options, parse_address
 from acquire.events import EventKind, Level
 from acquire.serial_line.ports import LineSettings
 from live.config.channels import DEFAULT_CHANNELS, OF_LOAD, joint_channels
-from live.config.gauges import outlines
+from live.config.gauges import gauge_colours, outlines
 from live.config.listen_address import ListenAddress, read_token
 from live.config.loading import Config
 from live.pipeline.channel_values import ChannelValues
@@ -162,9 +162,10 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
         strain_range=v.strain_range,
         with_load=about.config.load.address != "none:",
         outlines=outlines(about.config.gauges, about.grid.size),
+        colours=gauge_colours(about.config.gauges),
         light=v.light,
         picture_hz=1.0 if v.light else 5.0,
-        scale="automatic" if v.scale == "automatic" else "symmetric",
+        scale="symmetric" if v.scale == "symmetric" else "automatic",
     )
     rrd = about.folder / "view.rrd" if v.rrd else None
 

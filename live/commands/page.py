@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from acquire.errors import PhasedicError
+from acquire.errors import DeviceError, PhasedicError
 from acquire.text.printable import brief
 from live.commands.attended import page_opened
 from live.commands.exit_codes import EXIT_INTERRUPTED
@@ -43,8 +43,7 @@ def command(arguments: argparse.Namespace) -> int:
     path, given = Path(arguments.config or RIG), overrides(arguments)
     draft = ConfigDraft(load_config(path if path.exists() else None, given), path, given)
     if not draft.config.camera.address:
-        found = find_devices(given, screen)
-        draft.change_all({"camera.address": found.camera, "load.address": found.load})
+        choose_devices(draft, given, screen)
     interrupted = threading.Event()
     with PageController(draft, arguments.page_port) as controller:
 
@@ -55,6 +54,16 @@ def command(arguments: argparse.Namespace) -> int:
         with signals(interrupt, screen.print), page_opened(controller, screen):
             serve(controller, given, screen, interrupted)
     return EXIT_INTERRUPTED if interrupted.is_set() else 0
+
+
+def choose_devices(draft: ConfigDraft, given: dict[str, Any], screen: Screen) -> None:
+    """The devices that are there; without a camera the page opens all the same, with the list to choose from."""
+    try:
+        found = find_devices(given, screen)
+    except DeviceError as error:
+        screen.print(f"{brief(error)}; or choose one on the page")
+        return
+    draft.change_all({"camera.address": found.camera, "load.address": found.load})
 
 
 def serve(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from acquire.errors import ConfigError
 from analysis.evaluate import GAUGE_KINDS, Gauge, Parameter
-from live.config.values import CORNERS, POINT, RECTANGLE, Check, choice, length, number
+from live.config.values import CORNERS, POINT, RECTANGLE, Check, choice, integer, length, number
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid
@@ -25,13 +25,14 @@ NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 """The name of a gauge is part of column names in files."""
 DEFAULT_KIND = "line"
 """The kind of a gauge without ``kind``."""
+MAX_COLOUR = 999
 _POSITIONS = {"point": POINT, "box": RECTANGLE, "corners": CORNERS}
 
 
 def gauge_checks(kind: object) -> dict[str, Check]:
     """The checks of the keys of a gauge; keys of other kinds are checked too, and have no effect."""
     own = [one for name, one in GAUGE_KINDS.items() if name == kind]
-    checks = {"kind": choice(*GAUGE_KINDS)}
+    checks = {"kind": choice(*GAUGE_KINDS), "colour": integer(0, MAX_COLOUR)}
     for one in (*GAUGE_KINDS.values(), *own):
         checks |= {key: _check(found) for key, found in one.parameters().items()}
     return checks
@@ -41,6 +42,24 @@ def _check(one: Parameter) -> Check:
     if one.kind == "choice":
         return choice(*one.choices)
     return length(number(one.low, one.high)) if one.kind == "length" else _POSITIONS[one.kind]
+
+
+def with_colours(tables: Mapping[str, GaugeTable]) -> dict[str, GaugeTable]:
+    """The tables, each with the index of its colour: the given one, else the first that is free.
+
+    So a gauge keeps its colour when it is renamed, or when another one is removed.
+    """
+    taken = {table.get("colour") for table in tables.values()}
+    free = (index for index in range(MAX_COLOUR + 1) if index not in taken)
+    return {
+        name: table if table.get("colour") is not None else {**table, "colour": next(free, 0)}
+        for name, table in tables.items()
+    }
+
+
+def gauge_colours(tables: Mapping[str, GaugeTable]) -> dict[str, int]:
+    """The index of the colour of each gauge."""
+    return {name: table["colour"] for name, table in with_colours(tables).items()}
 
 
 def make_gauge(name: str, table: GaugeTable, axis: str) -> Gauge:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
@@ -34,7 +34,7 @@ def new_rig(path: Path, text: str, changes: Mapping[str, Any] | None = None) -> 
     return _write_checked(path, _changed(_parsed(text, path), changes or {}, path))
 
 
-def write_rig(path: Path, changes: Mapping[str, Any]) -> Config:
+def write_rig(path: Path, changes: Mapping[str, Any], gauges: Sequence[str] = ()) -> Config:
     """Change keys of a rig file, or make a new file of them; returns its configuration.
 
     Parameters
@@ -43,6 +43,8 @@ def write_rig(path: Path, changes: Mapping[str, Any]) -> Config:
         The former file is kept beside it as ``NAME.bak``.
     changes : mapping of "section.key" or "gauges.NAME" to a value
         Numbers, texts, flags, lists; for a gauge a mapping of its keys. None removes the key or gauge.
+    gauges : sequence of str
+        Their order; without, new ones come last.
 
     Raises
     ------
@@ -50,7 +52,20 @@ def write_rig(path: Path, changes: Mapping[str, Any]) -> Config:
         The file is not TOML, or the result is not a configuration; then nothing is changed.
     """
     path = path.resolve()  # a symbolic link stays a link
-    return _write_checked(path, _changed(_read(path), changes, path))
+    document = _read(path)
+    text = _changed(document, changes, path)
+    return _write_checked(path, _in_order(document, gauges) or text)
+
+
+def _in_order(document: TOMLDocument, names: Sequence[str]) -> str:
+    """The document with its gauges in this order; empty where they are so already."""
+    table: Any = document.get("gauges", {})
+    if [name for name in names if name in table] == list(table):
+        return ""
+    for name in names:
+        if name in table:
+            table[name] = table.pop(name)
+    return document.as_string()
 
 
 def _changed(document: TOMLDocument, changes: Mapping[str, Any], path: Path) -> str:

@@ -259,8 +259,8 @@ class ViewConfig:
     spawn: bool = key(FLAG, True, "open the viewer if there is a display")
     strain_range: float | None = key(number(1e-7, 10), None,
         "fixed symmetric range of the strain maps (default: from the data)")
-    scale: str = key(choice("symmetric", "automatic"), "symmetric",
-        "colour range: symmetric about zero, or automatic (from lowest to highest value)")
+    scale: str = key(choice("automatic", "symmetric"), "automatic",
+        "colour range: automatic (lowest to highest value, about zero for both signs), or symmetric about zero")
     light: bool = key(FLAG, False, "for slow connections: a small picture, and maps once a second",
         Option("light", on=True, expert=True))
 

@@ -95,9 +95,13 @@ class TensileRow:
     @property
     def number(self) -> str:
         """Value, interval and unit for a person."""
-        if not self.figure.known:
-            return "not known"
-        return f"{AT_LEAST} {self.quantity}" if self.figure.is_bound else str(self.quantity)
+        return str(self.printed) if self.figure.known else "not known"
+
+    @property
+    def printed(self) -> Printed:
+        """The parts of the number; a bound has its words before the value."""
+        shown = self.quantity.printed()
+        return shown._replace(value=f"{AT_LEAST} {shown.value}") if self.figure.is_bound else shown
 
     @property
     def quantity(self) -> Quantity:

@@ -1,6 +1,7 @@
-"""Numbers to colours: a diverging table, round numbers, ticks and units; numpy only.
+"""Numbers to colours: a sequential and a diverging table, round numbers, ticks and units; numpy only.
 
-Blue is compression, red is tension, white is zero, transparent is not measured.
+Sequential: dark violet is low, yellow is high. Diverging: blue is below zero, red above, white is zero. Transparent is
+not measured.
 """
 
 from __future__ import annotations
@@ -14,6 +15,10 @@ from numpy.typing import NDArray
 
 from acquire.text.quantity import unit_of
 
+_SEQUENTIAL = "431480 39349c 1a51b0 046fa5 0187a1 029f9f 06b696 4acc7b 93d866 c9e35b faed5a"
+LINES = ("#0060ad", "#bd4a00", "#007a62", "#9a3a80", "#7a5c00", "#56606b")
+"""Of curves and gauges on a light ground or over a picture, by their index; told apart with any colour vision."""
+LINES_ON_DARK = ("#6db3f2", "#f59453", "#3cc6a8", "#e28cc2", "#d6b64a", "#a4aeb8")
 _COLD, _HOT, _BEND = (59, 76, 192), (180, 4, 38), 88.0
 _NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
 
@@ -33,6 +38,20 @@ def unit_for(largest: float) -> Unit:
     """The unit for strains up to ``largest``."""
     unit = unit_of("strain", largest)
     return Unit(unit.name, 1 / unit.one)
+
+
+@lru_cache(maxsize=1)
+def sequential_table() -> NDArray[np.uint8]:
+    """(256, 3) uint8 sRGB, violet over blue, teal and green to yellow, lighter step by step.
+
+    Between colours of an even rise of lightness in OKLCh, from 0.34 to 0.93; with a colour vision deficiency too.
+    """
+    anchors = np.array([list(bytes.fromhex(colour)) for colour in _SEQUENTIAL.split()], np.float64)
+    places = np.linspace(0, len(anchors) - 1, 256)
+    channels = [np.interp(places, np.arange(len(anchors)), channel) for channel in anchors.T]
+    table: NDArray[np.uint8] = np.rint(np.stack(channels, axis=1)).astype(np.uint8)
+    table.flags.writeable = False
+    return table
 
 
 @lru_cache(maxsize=1)
@@ -90,14 +109,17 @@ def _from_msh(msh: NDArray[np.float64]) -> NDArray[np.uint8]:
     return np.asarray(np.rint(srgb * 255), np.uint8)
 
 
-def colour(values: NDArray[np.floating], limit: float, alpha: int = 255) -> NDArray[np.uint8]:
+def colour(
+    values: NDArray[np.floating], low: float, high: float, table: NDArray[np.uint8], alpha: int = 255
+) -> NDArray[np.uint8]:
     """RGBA of a map.
 
     Parameters
     ----------
     values : (R, C) float
-    limit : float
-        Colours span -limit..limit; beyond, they stay at the ends.
+    low, high : float
+        Ends of the colours; beyond, they stay at the ends.
+    table : (256, 3) uint8
     alpha : int
         Opacity of valid cells, 0..255; NaN is fully transparent.
 
@@ -106,18 +128,11 @@ def colour(values: NDArray[np.floating], limit: float, alpha: int = 255) -> NDAr
     (R, C, 4) uint8
     """
     valid = np.isfinite(values)
-    scaled = np.clip(np.where(valid, values, 0.0) / limit, -1.0, 1.0)
+    shares = np.clip((np.where(valid, values, low) - low) / (high - low), 0.0, 1.0)
     rgba = np.empty((*values.shape, 4), np.uint8)
-    rgba[..., :3] = diverging_table()[np.rint((scaled + 1.0) * 127.5).astype(np.intp)]
+    rgba[..., :3] = table[np.rint(shares * 255).astype(np.intp)]
     rgba[..., 3] = np.where(valid, alpha, 0)
     return rgba
-
-
-def ramp(height: int, width: int) -> NDArray[np.uint8]:
-    """(height, width, 3) uint8: the colour bar, largest value on top."""
-    steps = np.linspace(255, 0, height).round().astype(np.intp)
-    bar: NDArray[np.uint8] = np.repeat(diverging_table()[steps][:, None], width, axis=1)
-    return bar
 
 
 def nice_above(value: float) -> float:

@@ -22,7 +22,8 @@ from live.results.maps.scale import (
 )
 
 _PRINCIPAL = ("e1", "e2")
-FIELD_MAPS = ("exx", "eyy", "exy", *_PRINCIPAL, "u", "v", "sigma", "residual", "status")
+_STRAINS = ("exx", "eyy", "exy", *_PRINCIPAL)
+FIELD_MAPS = (*_STRAINS, "u", "v", "sigma", "residual", "status")
 """e1 and e2 are the principal strains, sigma is that of the strain along the load, residual is chi squared."""
 
 
@@ -56,8 +57,8 @@ class FieldMaps:
         Of the load.
     fixed : float or None
         Range of the strains, -fixed to fixed.
-    about_zero : bool
-        The range of strains is about zero; else over the values.
+    is_symmetric : bool
+        Ranges are about zero where there are two signs; else over the values.
     alpha : int
         Opacity, 0..255.
     """
@@ -67,17 +68,16 @@ class FieldMaps:
         axis: Literal["x", "y"],
         fixed: float | None = None,
         *,
-        about_zero: bool = True,
+        is_symmetric: bool = False,
         alpha: int = OPACITY,
     ) -> None:
         self._along, self._alpha = f"e{axis * 2}", alpha
         self._ranges: dict[str, AutoRange] = {}
         for name in FIELD_MAPS:
             kind: Kind = range_kind(name)
-            strain = kind == "about zero"
-            if strain and not about_zero and fixed is None:
-                kind = "free"
-            self._ranges[name] = AutoRange(kind, fixed if strain else None)
+            if kind == "free" and is_symmetric:
+                kind = "about zero"
+            self._ranges[name] = AutoRange(kind, fixed if name in _STRAINS else None)
 
     def paint(self, field: StrainField, names: Iterable[str]) -> dict[str, Painted]:
         """The named maps, of ``FIELD_MAPS``."""

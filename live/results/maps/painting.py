@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from analysis.field import ZoiGrid
-from live.results.maps.colours import number, ramp, ticks
+from live.results.maps.colours import ticks
 from live.results.maps.scale import OPACITY, ColourScale, StatusCount, status_colours, status_legend
 from live.results.reader import Strain
 
@@ -195,14 +195,16 @@ def _bar(full: Image, place: tuple[int, int, int], name: str, scale: ColourScale
     """The colour bar with ticks and unit, mixed with grey like a map with its picture."""
     cv2 = load_cv2()
     left, top, bottom = place
-    colours = ramp(bottom - top, _BAR)[..., ::-1]
+    colours = np.repeat(scale.ramp(bottom - top)[::-1, None, ::-1], _BAR, axis=1)
     alpha = np.full((*colours.shape[:2], 1), OPACITY, np.uint8)
     full[top:bottom, left : left + _BAR] = _mixed(np.full_like(colours, _PLAIN), colours, alpha)
+    if scale.is_diverging:
+        cv2.line(full, (left, (top + bottom) // 2), (left + _BAR, (top + bottom) // 2), _INK, 2)
     cv2.rectangle(full, (left, top), (left + _BAR, bottom), _LINE, 1)
     for value in ticks(scale.low, scale.high, about=max(3, min(7, (bottom - top) // 60))):
         y = round(bottom - (value - scale.low) / (scale.high - scale.low) * (bottom - top))
         cv2.line(full, (left + _BAR, y), (left + _BAR + _TICK, y), _LINE, 1)
-        _write(full, number(value), (left + _BAR + _TICK + 5, y + 5), 0.45)
+        _write(full, scale.mark(value), (left + _BAR + _TICK + 5, y + 5), 0.45)
     label = f"{name}, {scale.unit}" if scale.unit else name
     _write(full, label, (left, top - 11), 0.5, full.shape[1] - left - 4)
 

@@ -1,4 +1,4 @@
-"""The colour scale of a map: its range and unit, and the colours of statuses."""
+"""The colour scale of a map: its range, colours and unit, and the colours of statuses."""
 
 from __future__ import annotations
 
@@ -6,26 +6,33 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Status
-from live.results.maps.colours import colour, nice_above, unit_for
+from live.results.maps.colours import (
+    colour,
+    diverging_table,
+    nice_above,
+    number,
+    sequential_table,
+    unit_for,
+)
 
 if TYPE_CHECKING:
     from live.results.reader import Strain
 
 Floats = NDArray[np.floating]
 Image = NDArray[np.uint8]
-Span = tuple[float, float]
 Kind = Literal["about zero", "from zero", "free"]
 
 OPACITY = 184
 """Of a map over a picture, 0..255."""
 _WITHIN = 98.0  # percent of the values lie within the colours
 _NOISE = 4.0  # sigma that the colours reach at least
+_BOTH_SIDES = 0.1  # of the larger end: beyond it the values lie on both sides of zero
 _SHRINK, _SHRINK_AFTER = 0.55, 20
 _SAMPLE = 25  # instants that give the range of a run
 _UNITS = dict.fromkeys(("u", "v", "blur", "sigma_u", "sigma_v", "sigma_blur"), "px")
@@ -37,8 +44,7 @@ _UNITS["chi2"] = "chi\u00b2"
 _SHOWN = {
     "compliance": ("µm/m/MPa", 1e12), "rate": ("µm/m/s", 1e6), "leaves_at_stress": ("MPa", 1e-6),
 }  # fmt: skip
-_FREE = ("u", "v", "iterations", "amplification", "poisson", "leaves_at_strain", *_SHOWN)
-_FROM_ZERO = ("residual", "chi2", "instants", "fate")
+_FROM_ZERO = ("residual", "chi2", "blur", "instants", "fate")
 
 
 def shown_unit(name: str) -> tuple[str, float]:
@@ -47,10 +53,16 @@ def shown_unit(name: str) -> tuple[str, float]:
 
 
 def range_kind(name: str) -> Kind:
-    """The kind of range of a map: about zero for strains, from zero for uncertainties, else over the values."""
-    if name in _FREE:
-        return "free"
-    return "from zero" if name.startswith("sigma") or name in _FROM_ZERO else "about zero"
+    """The kind of range of a map: from zero for uncertainty, residual and blur, else over the values."""
+    return "from zero" if name.startswith("sigma") or name in _FROM_ZERO else "free"
+
+
+class ColourRange(NamedTuple):
+    """The range of the colours of a map, in the unit of its values; diverging is symmetric about zero."""
+
+    low: float
+    high: float
+    is_diverging: bool = False
 
 
 class AutoRange:
@@ -58,11 +70,13 @@ class AutoRange:
 
     98 % of the values are inside. It grows at once, and shrinks when the data have been small for
     ``shrink_after`` maps. Noise alone does not fill the colours: the range of a strain reaches at least four
-    times the typical sigma. For a single map, it is the result of the first ``update``.
+    times the typical sigma. For a single map, it is the result of the first ``update``. Every map that the program
+    shows has its range from here, and so its colours.
 
     Parameters
     ----------
     kind : "about zero", "from zero" or "free"
+        Free: over the values; about zero where these lie on both sides of it.
     fixed : float or None
         Always -fixed to fixed, or 0 to fixed.
     """
@@ -71,50 +85,58 @@ class AutoRange:
         self, kind: Kind = "about zero", fixed: float | None = None, *, shrink_after: int = _SHRINK_AFTER
     ) -> None:
         self._kind, self._fixed, self._shrink_after = kind, fixed, shrink_after
-        self._span: Span | None = None if fixed is None else (0.0 if kind == "from zero" else -fixed, fixed)
+        self._span: ColourRange | None = None
+        if fixed is not None:
+            self._span = ColourRange(0.0, fixed) if kind == "from zero" else ColourRange(-fixed, fixed, True)
         self._small = 0
 
-    def update(self, values: Floats, sigmas: Floats | None = None) -> Span:
-        """The ends of the range after a further map and its uncertainty, in the unit of ``values``."""
+    def update(self, values: Floats, sigmas: Floats | None = None) -> ColourRange:
+        """The range after a further map and its uncertainty, in the unit of ``values``."""
         if self._fixed is None:
             wanted = _wanted_span(self._kind, values, sigmas)
             if wanted is not None:
                 self._follow(wanted)
-        return self._span or (-1e-4 if self._kind == "about zero" else 0.0, 1e-4)
+        return self._span or (
+            ColourRange(-1e-4, 1e-4, True) if self._kind == "about zero" else ColourRange(0.0, 1e-4)
+        )
 
-    def _follow(self, wanted: Span) -> None:
-        low, high = self._span or (math.inf, -math.inf)
-        outside = wanted[0] < low or wanted[1] > high
-        self._small = self._small + 1 if wanted[1] - wanted[0] < _SHRINK * (high - low) else 0
+    def _follow(self, wanted: ColourRange) -> None:
+        low, high, _ = self._span or (math.inf, -math.inf, False)
+        outside = wanted.low < low or wanted.high > high
+        self._small = self._small + 1 if wanted.high - wanted.low < _SHRINK * (high - low) else 0
         if outside or self._small >= self._shrink_after:
             self._span, self._small = _rounded(self._kind, wanted), 0
 
 
-def _wanted_span(kind: Kind, values: Floats, sigmas: Floats | None) -> Span | None:
+def _wanted_span(kind: Kind, values: Floats, sigmas: Floats | None) -> ColourRange | None:
     """The range of one map before rounding; None where the map is empty or all zero."""
     found = np.asarray(values[np.isfinite(values)], np.float64)
     if not found.size:
         return None
     noise = sigmas[np.isfinite(sigmas)] if sigmas is not None else found[:0]
     least = _NOISE * float(np.median(noise)) if noise.size else 0.0
-    if kind == "free":
-        low, high = (float(v) for v in np.percentile(found, (50 - _WITHIN / 2, 50 + _WITHIN / 2)))
+    low, high = (float(v) for v in np.percentile(found, (50 - _WITHIN / 2, 50 + _WITHIN / 2)))
+    smaller, tenth = min(-low, high), _BOTH_SIDES * max(-low, high)
+    if kind == "free" and smaller <= max(tenth, least):
+        if 0 < smaller <= least <= tenth:  # noise beyond zero
+            low, high = (0.0, high) if high > -low else (low, 0.0)
         width = max(2 * least, 1e-3 * max(abs(low), abs(high))) or 1e-6
         margin = max(width - (high - low), 0) / 2
-        return low - margin, high + margin
+        return ColourRange(low - margin, high + margin)
     largest = 1.05 * float(np.percentile(np.abs(found), _WITHIN))
-    if kind == "about zero":
-        largest = max(largest, least)
-    return ((-largest if kind == "about zero" else 0.0), largest) if largest > 0 else None
+    if kind == "from zero":
+        return ColourRange(0.0, largest) if largest > 0 else None
+    largest = max(largest, least)
+    return ColourRange(-largest, largest, True) if largest > 0 else None
 
 
-def _rounded(kind: Kind, span: Span) -> Span:
+def _rounded(kind: Kind, span: ColourRange) -> ColourRange:
     """Round ends; those of a free range are multiples of a fifth of it."""
-    low, high = span
-    if kind == "free":
+    low, high, is_diverging = span
+    if kind == "free" and not is_diverging:
         step = nice_above(high - low) / 5
-        return math.floor(low / step) * step, math.ceil(high / step) * step
-    return (0.0 if kind == "from zero" else -nice_above(high)), nice_above(high)
+        return ColourRange(math.floor(low / step) * step, math.ceil(high / step) * step)
+    return ColourRange(0.0 if kind == "from zero" else -nice_above(high), nice_above(high), is_diverging)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,16 +150,19 @@ class ColourScale:
     unit : str
     factor : float
         From the values of the map to ``unit``.
+    is_diverging : bool
+        About zero; else sequential.
     """
 
     low: float
     high: float
     unit: str
     factor: float
+    is_diverging: bool = False
 
     @classmethod
-    def of(cls, name: str, span: Span, unit: str = "", factor: float = 1.0) -> ColourScale:
-        """The scale of the map ``name`` from ``span[0]`` to ``span[1]`` of its values.
+    def of(cls, name: str, span: ColourRange, unit: str = "", factor: float = 1.0) -> ColourScale:
+        """The scale of the map ``name`` over ``span`` of its values.
 
         ``unit`` and ``factor`` convert the values; without a unit, strains are in um/m or %. Those of the whole test
         have units of their own.
@@ -146,10 +171,10 @@ class ColourScale:
             unit, factor = shown_unit(name)
         unit = unit or _UNITS.get(name, "")
         if not unit and name not in _UNITS:
-            shown = unit_for(max(abs(end) for end in span))
+            shown = unit_for(max(abs(span.low), abs(span.high)))
             unit, factor = shown.name, factor * shown.factor
-        low, high = sorted(end * factor for end in span)
-        return cls(float(f"{low:.9g}"), float(f"{high:.9g}"), unit, factor)
+        low, high = sorted((span.low * factor, span.high * factor))
+        return cls(float(f"{low:.9g}"), float(f"{high:.9g}"), unit, factor, span.is_diverging)
 
     @classmethod
     def of_run(
@@ -174,8 +199,19 @@ class ColourScale:
 
     def colours(self, values: Floats, alpha: int = OPACITY) -> Image:
         """(R, C, 4) RGBA of stored values; transparent where there is none."""
-        middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
-        return colour(np.asarray(values, np.float64) * self.factor - middle, half, alpha)
+        return colour(np.asarray(values, np.float64) * self.factor, self.low, self.high, self._table, alpha)
+
+    def ramp(self, length: int) -> Image:
+        """(length, 3): the colours from the lowest to the highest value."""
+        return self._table[np.linspace(0, 255, length).round().astype(np.intp)]
+
+    def mark(self, value: float) -> str:
+        """A value of the bar for a person; with a plus sign where zero is its middle."""
+        return "+" * (self.is_diverging and value > 0) + number(value)
+
+    @property
+    def _table(self) -> Image:
+        return diverging_table() if self.is_diverging else sequential_table()
 
 
 _STATUSES = {
@@ -220,11 +256,11 @@ def status_colours(statuses: NDArray[np.integer], alpha: int = OPACITY) -> Image
 def status_legend(statuses: NDArray[np.integer]) -> tuple[StatusCount, ...]:
     """The statuses in a map and how often each occurs, without ZOIs that are not active."""
     numbers, counts = np.unique(np.asarray(statuses, np.uint8), return_counts=True)
-    known = {int(status): (status.name, status.text) for status in Status}
+    known = {int(one): (one.name, one.text) for one in Status}
     found = []
-    for number, count in zip(numbers.tolist(), counts.tolist(), strict=True):
-        if number != Status.NOT_MEASURED:
-            name, text = known.get(number, (f"status {number}", "of a later version of phasedic"))
-            red, green, blue, _ = _status_table(255)[number].tolist()
+    for status, count in zip(numbers.tolist(), counts.tolist(), strict=True):
+        if status != Status.NOT_MEASURED:
+            name, text = known.get(status, (f"status {status}", "of a later version of phasedic"))
+            red, green, blue, _ = _status_table(255)[status].tolist()
             found.append(StatusCount(name, text, count, (red, green, blue)))
     return tuple(found)

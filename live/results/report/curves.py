@@ -126,7 +126,7 @@ def force(run: RunFolder) -> Plot | None:
     if not np.isfinite(f).any():
         return None
     unit = force_unit(f)
-    curve = PlotLine("", t, f * unit.factor, colour=4)
+    curve = PlotLine("", t, f * unit.factor)
     return Plot("force-time", "Force", "time, s", f"force, {unit.name}", (curve,), x_range=time_range(run))
 
 
@@ -134,9 +134,9 @@ def valid_share(run: RunFolder) -> Plot:
     """Share of ZOIs with a value against time."""
     values = run.strain.values
     share = 100.0 * np.asarray(values["n_valid"], np.float64) / np.maximum(values["n_zoi"], 1)
-    curve = PlotLine("", run.strain.time_s, share, colour=2)
+    curve = PlotLine("", run.strain.time_s, share)
     return Plot(
-        "valid-time", "ZOIs with a value", "time, s", "share, %", (curve,), (), time_range(run), (0.0, 105.0)
+        "valid-time", "ZOIs with a value", "time, s", "share, %", (curve,), (), time_range(run), (0.0, 100.0)
     )
 
 

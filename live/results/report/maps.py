@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from acquire.frame import CameraInfo
-from live.results.maps.colours import number, ramp, ticks
+from live.results.maps.colours import ticks
 from live.results.maps.painting import Levels, Painter, caption
 from live.results.maps.scale import ColourScale, status_legend
 from live.results.quantities import quantity_of
@@ -22,7 +22,7 @@ from live.results.response.words import response_lines, response_title
 from live.results.run_folder import RunFolder
 
 _QUALITY = 80
-_STEPS = 16  # colours of the bar
+_STEPS = 48  # colours of the bar
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,15 +124,16 @@ def _picture(image: NDArray[np.uint8], words: str) -> Html:
 
 def _bar(name: str, scale: ColourScale) -> Html:
     """The colours from low to high with their numbers, as SVG."""
-    colours = ramp(_STEPS, 1)[::-1, 0]
     boxes = "".join(
         f'<rect x="{10 + k * 480 / _STEPS:.1f}" y="4" width="{480 / _STEPS + 0.5:.1f}" height="14"'
         f' fill="rgb({r},{g},{b})"/>'
-        for k, (r, g, b) in enumerate(colours.tolist())
+        for k, (r, g, b) in enumerate(scale.ramp(_STEPS).tolist())
     )
+    if scale.is_diverging:
+        boxes += '<path class="zero" d="M250 4v14"/>'
     words = "".join(
         f'<text class="word" text-anchor="middle" x="{10 + 480 * (v - scale.low) / (scale.high - scale.low):.1f}"'
-        f' y="34">{safe(number(v))}</text>'
+        f' y="34">{safe(scale.mark(v))}</text>'
         for v in ticks(scale.low, scale.high, about=7)
     )
     label = safe(f"colours of {name} from {scale.low:g} to {scale.high:g} {scale.unit}")

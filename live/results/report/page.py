@@ -8,40 +8,63 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Mapping, Sequence
 
+from acquire.text.quantity import PLUS_MINUS, Printed
+from live.results.maps.colours import LINES, LINES_ON_DARK
 from live.results.report.svg import STYLE
 
 # A browser may only apply the page's own styles and show the pictures inside it.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 
-_CSS = """
-:root{color-scheme:light dark;--ink:#20242a;--paper:#fff;--faint:#e6e8eb;--line:#9aa0a8;--dim:#5b626c;--mark:#9a3412;
---c0:#1f5fbf;--c1:#b8480c;--c2:#2b7a3d;--c3:#7b3fa0;--c4:#8a6d00;--c5:#0f7b83}
-@media (prefers-color-scheme:dark){:root{--ink:#e3e6ea;--paper:#15181c;--faint:#2b3036;--line:#7b828c;--dim:#9ba3ad;
---mark:#f0a35e;--c0:#74a7f5;--c1:#f59a62;--c2:#73c486;--c3:#c195e6;--c4:#d9bd55;--c5:#5cc5ce}}
+_LIGHT = (
+    "--ground:#e9ecef;--panel:#fff;--sunk:#f3f5f7;--ink:#12171d;--soft:#4c5660;--line:#d5dae0;--edge:#76808b;"
+    "--look:#855000;--look-tint:#fcefd6;--bad:#b3261e;--bad-tint:#fce6e4;--grid:#e3e7eb"
+    + "".join(f";--c{k}:{line}" for k, line in enumerate(LINES, 1))
+)
+_DARK = (
+    "--ground:#0d1115;--panel:#171c22;--sunk:#10151a;--ink:#eef2f5;--soft:#abb5bf;--line:#2d353e;--edge:#7c8792;"
+    "--look:#f0b952;--look-tint:#38290c;--bad:#ff9289;--bad-tint:#421a17;--grid:#262d35"
+    + "".join(f";--c{k}:{line}" for k, line in enumerate(LINES_ON_DARK, 1))
+)
+_CSS = (
+    f"""
+:root{{color-scheme:light dark;{_LIGHT}}}
+@media (prefers-color-scheme:dark){{:root{{{_DARK}}}}}
+@media print{{:root{{color-scheme:light;{_LIGHT};--ground:#fff}}}}
+"""
+    + """
 *{box-sizing:border-box}
-body{margin:0 auto;padding:1.5rem 1.2rem 4rem;max-width:72rem;background:var(--paper);color:var(--ink);
-font:15px/1.5 system-ui,-apple-system,"Segoe UI",sans-serif}
-h1{font-size:1.7rem;margin:.2rem 0}h2{font-size:1.2rem;margin:2.4rem 0 .6rem;border-bottom:1px solid var(--faint)}
-h3{font-size:1rem;margin:1.2rem 0 .3rem}p{max-width:60rem;margin:.4rem 0}.dim{color:var(--dim)}
-.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(11.5rem,1fr));gap:.6rem;margin:1rem 0}
-.tile{border:1px solid var(--faint);border-radius:6px;padding:.5rem .7rem}.tile b{display:block;font-size:1.05rem}
+body{margin:0 auto;padding:1rem .5rem 3rem;max-width:76rem;background:var(--ground);color:var(--ink);
+font:15px/1.4 "Liberation Sans",Arial,"Helvetica Neue","Noto Sans","DejaVu Sans",sans-serif;
+font-variant-numeric:tabular-nums lining-nums}
+h1{font-size:1.5rem;margin:.2rem .25rem}h2{font-size:1.125rem;margin:0 0 .5rem}h3{font-size:1rem;margin:1rem 0 .25rem}
+p{max-width:62rem;margin:.4rem 0}.dim{color:var(--soft)}body>.dim{margin:.2rem .25rem .75rem}
+.panel{margin:.5rem 0;padding:.75rem;background:var(--panel);border:1px solid var(--line);border-radius:6px}
+.band{margin:.5rem 0;padding:.5rem .75rem;max-width:none;border:1px solid var(--line);border-left:8px solid var(--edge);
+border-radius:6px;background:var(--panel);font-weight:700}
+.band.look{border-left-color:var(--look);color:var(--look)}
+.band.bad{border-left-color:var(--bad);background:var(--bad-tint);color:var(--bad)}
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(11rem,1fr));gap:.5rem;margin:.5rem 0}
+.tile{padding:.5rem .75rem;background:var(--panel);border:1px solid var(--line);border-radius:6px}
+.tile h3{margin:0;font-size:.9375rem;font-weight:600;color:var(--soft)}.tile p{margin:0}
+.tile .value{display:flex;flex-wrap:wrap;gap:.3rem;align-items:baseline;color:var(--soft)}
+.tile .value b{font-size:1.5rem;line-height:1.2;color:var(--ink)}.tile .sigma{font-size:.8125rem;color:var(--soft)}
+.fold>summary{cursor:pointer;font-size:1.125rem;font-weight:700}.fold[open]>summary{margin-bottom:.5rem}
 table{border-collapse:collapse;margin:.4rem 0;font-size:.94em}th,td{text-align:left;vertical-align:top;
-padding:.22rem .9rem .22rem 0;border-bottom:1px solid var(--faint);overflow-wrap:anywhere}th{font-weight:600}
-th,td:first-child{overflow-wrap:normal}.wide{overflow-x:auto}.number{text-align:right;font-variant-numeric:tabular-nums}
-.open{color:var(--mark)}.error{color:#c0271b}.warning{color:var(--mark)}
-svg.plot,figure{max-width:100%;margin:0}figcaption{color:var(--dim);font-size:.85rem;margin:.15rem 0 .6rem}
-.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(30rem,100%),1fr));gap:.4rem 1.2rem}
-.pairs{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(30rem,100%),1fr));
-gap:.6rem 1.6rem}
+padding:.22rem .9rem .22rem 0;border-bottom:1px solid var(--line);overflow-wrap:anywhere}th{font-weight:600}
+th,td:first-child{overflow-wrap:normal}.wide{overflow-x:auto}.number{text-align:right}
+.open,.warning{color:var(--look)}.error{color:var(--bad)}
+svg.plot,figure{max-width:100%;margin:0}figcaption{color:var(--soft);font-size:.8125rem;margin:.15rem 0 .6rem}
+.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(30rem,100%),1fr));gap:.5rem 1.2rem}
+.pairs{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(30rem,100%),1fr));gap:.6rem 1.6rem}
 .pair div{display:flex;gap:.4rem}
 .pair img{max-height:25rem;min-width:0;max-width:calc(50% - .2rem);height:auto;width:auto;object-fit:contain}
 .bar{max-width:34rem}.code{font:.82rem ui-monospace,monospace}
-.key{display:inline-block;width:.8rem;height:.8rem;margin-right:.35rem;border:1px solid var(--line)}
-@media print{body{max-width:none;padding:0;font-size:11px}h2{break-after:avoid}figure,.tile,tr{break-inside:avoid}
-:root{color-scheme:light;--ink:#000;--paper:#fff;--faint:#ddd;--line:#888;--dim:#444;--mark:#9a3412;
---c0:#1f5fbf;--c1:#b8480c;--c2:#2b7a3d;--c3:#7b3fa0;--c4:#8a6d00;--c5:#0f7b83}
-.plots,.pairs{grid-template-columns:1fr 1fr}}
+.key{display:inline-block;width:.8rem;height:.8rem;margin-right:.35rem;border:1px solid var(--edge)}
+@media print{body{max-width:none;padding:0;font-size:11px}.panel{padding:0;border:0}h2{break-after:avoid}
+figure,.tile,.band,tr{break-inside:avoid}.plots,.pairs{grid-template-columns:1fr 1fr}
+*{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
 """
+)
 
 
 class Html(str):
@@ -69,7 +92,21 @@ def element(name: str, inside: object, **attributes: str) -> Html:
 def section(title: str, *parts: Html) -> Html:
     """A heading and its parts; empty where all parts are empty."""
     inside = joined(part for part in parts if part)
-    return Html(f"<section>\n{element('h2', title)}\n{inside}\n</section>") if inside else Html("")
+    return (
+        Html(f'<section class="panel">\n{element("h2", title)}\n{inside}\n</section>') if inside else Html("")
+    )
+
+
+def fold(title: str, *parts: Html) -> Html:
+    """A section that a reader can close; empty where all parts are empty."""
+    inside = joined(part for part in parts if part)
+    words = f'<details class="panel fold" open><summary>{safe(title)}</summary>\n{inside}\n</details>'
+    return Html(words) if inside else Html("")
+
+
+def band(words: object, kind: str) -> Html:
+    """A message over the whole width: ``look`` or ``bad``."""
+    return element("p", words, class_=f"band {kind}")
 
 
 def paragraph(words: object, kind: str = "") -> Html:
@@ -95,10 +132,23 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]], numbers: Seque
     return Html(f'<div class="wide"><table><tr>{head}</tr>\n{body}</table></div>')
 
 
-def tiles(pairs: Mapping[str, str]) -> Html:
-    """The main figures, a tile each."""
-    found = (f'<div class="tile">{safe(name)}<b>{safe(value)}</b></div>' for name, value in pairs.items())
-    return Html(f'<div class="tiles">{"".join(found)}</div>')
+Shown = str | tuple[Printed, str]
+"""A text, or the parts of a quantity with a remark."""
+
+
+def tiles(pairs: Mapping[str, Shown]) -> Html:
+    """The main figures, a tile each: a value with its unit, below it its uncertainty and remark."""
+    return Html(f'<div class="tiles">{"".join(_tile(*pair) for pair in pairs.items())}</div>')
+
+
+def _tile(name: str, shown: Shown) -> str:
+    (value, half, unit), remark = (Printed(shown, "", ""), "") if isinstance(shown, str) else shown
+    words = " ".join(filter(None, (f"{PLUS_MINUS} {half}" if half else "", remark)))
+    sigma = f'<p class="sigma">{safe(words)}</p>' if words else ""
+    return (
+        f'<section class="tile"><h3>{safe(name)}</h3><p class="value"><b>{safe(value)}</b> {safe(unit)}</p>'
+        f"{sigma}</section>"
+    )
 
 
 def captioned(inside: Html, caption: str, kind: str = "") -> Html:

@@ -18,15 +18,19 @@ from live.results.finished.answers import MeasuredAgain, checks_line, missing_li
 from live.results.finished.figures_file import finished_in
 from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
+from live.results.maps.colours import number
 from live.results.report import curves
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
 from live.results.report.maps import MapPictures, map_pictures, maps, statuses, whole_maps
 from live.results.report.noise_floor import StillPhase, still_phase_of
 from live.results.report.page import (
     Html,
+    Shown,
+    band,
     captioned,
     element,
     facts,
+    fold,
     joined,
     page,
     paragraph,
@@ -144,9 +148,9 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
         *_lens_section(run),
         section("Status of the ZOIs", statuses(run, max(chosen), pictures, min(side, 480))),
         section("Frame counts and events", frame_counts(run), events(run), *_unreadable(run)),
-        section("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
-        section("Definitions", definitions(run)),
-        section("Versions and files", version_table(run), content.files),
+        fold("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
+        fold("Definitions", definitions(run)),
+        fold("Versions and files", version_table(run), content.files),
     ]
 
 
@@ -162,7 +166,7 @@ def _head(run: RunFolder, curve: EvaluatedCurve, test: FinishedTest) -> Html:
         [
             element("h1", run.title),
             paragraph(f"{words} Report made by phasedic on {now}.", "dim"),
-            paragraph(unfinished, "warning") if run.strain.unfinished else Html(""),
+            band(unfinished, "bad") if run.strain.unfinished else Html(""),
             tiles(_extent(run, curve)),
             *_answers(run, curve, test),
         ]
@@ -177,8 +181,8 @@ def _answers(run: RunFolder, curve: EvaluatedCurve, test: FinishedTest) -> list[
     why = f"E is not known: {test.figures.E.why if test.has_force else 'no force is known'}."
     return [
         paragraph(f"{checks_line(found)}."),
-        *(paragraph(text, "warning") for text in doubts(found)),
-        tiles(tensile(curve)) if test.figures.E.known else paragraph(why, "open"),
+        *(band(text, "look") for text in doubts(found)),
+        tiles(_figures(curve)) if test.figures.E.known else paragraph(why, "open"),
         *(paragraph(text, "open") for text in missing_lines(test, again)),
     ]
 
@@ -191,13 +195,20 @@ def tensile(curve: EvaluatedCurve) -> dict[str, str]:
     return found | strain
 
 
+def _figures(curve: EvaluatedCurve) -> dict[str, Shown]:
+    """``tensile`` in parts."""
+    rows = headline(curve.figures, stresses=curve.is_stress)
+    found: dict[str, Shown] = {row.name: (row.printed, row.remark) for row in rows if row.figure.known}
+    return found | {name: text for name, text in tensile(curve).items() if name not in found}
+
+
 def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
     values, e = run.strain.values, curves.strain_unit(curve.axial)
     found = {"ZOIs with a value, last": f"{int(values['n_valid'][-1])} of {int(values['n_zoi'][-1])}"}
     if np.isfinite(curve.axial).any():
         largest = curve.axial[np.nanargmax(np.abs(curve.axial))] * e.factor
         name = curve.figures.strain or run.axial
-        found[f"largest {name}"] = f"{largest:.4g} {e.name}"
+        found[f"largest {name}"] = f"{number(float(f'{largest:.4g}'))} {e.name}"
     return found
 
 

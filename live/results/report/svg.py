@@ -16,26 +16,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from live.results.maps.colours import number, ticks
+from live.results.maps.colours import LINES, number, ticks
 
 Array = NDArray[np.float64]
 WIDTH, HEIGHT = 580, 310
-_LEFT, _RIGHT, _TOP, _BOTTOM = 74, 14, 26, 46
+_LEFT, _RIGHT, _TOP, _BOTTOM = 64, 18, 44, 42
 MAX_POINTS = 1600  # of a curve; a longer one is thinned to the extremes of each interval
 
 STYLE = """
-.axis{stroke:var(--line,#8a8f98);stroke-width:1;fill:none}
-.grid{stroke:var(--faint,#e3e5e8);stroke-width:1}
-.word{fill:var(--ink,#20242a);font:12px system-ui,sans-serif}
-.curve{fill:none;stroke-width:1.6;stroke-linejoin:round}
-.dashed{stroke-dasharray:6 4;stroke-width:1.2}
-.c0{stroke:var(--c0,#1f5fbf)} .c1{stroke:var(--c1,#b8480c)} .c2{stroke:var(--c2,#2b7a3d)}
-.c3{stroke:var(--c3,#7b3fa0)} .c4{stroke:var(--c4,#8a6d00)} .c5{stroke:var(--c5,#0f7b83)}
-.f0{fill:var(--c0,#1f5fbf)} .f1{fill:var(--c1,#b8480c)} .f2{fill:var(--c2,#2b7a3d)}
-.f3{fill:var(--c3,#7b3fa0)} .f4{fill:var(--c4,#8a6d00)} .f5{fill:var(--c5,#0f7b83)}
-.band{stroke:none;opacity:.25}
+.axis,.zero{stroke:var(--edge,#76808b);stroke-width:1;fill:none}
+.zero{stroke:var(--ink,#12171d);stroke-width:2}
+.grid{stroke:var(--grid,#e3e7eb);stroke-width:1}
+.word{fill:var(--soft,#4c5660);font:12px "Liberation Sans",Arial,"Helvetica Neue","Noto Sans","DejaVu Sans",sans-serif}
+.word.ink{fill:var(--ink,#12171d);font-weight:700}
+.curve{fill:none;stroke-width:2.25;stroke-linejoin:round}
+.d2{stroke-dasharray:9 4} .d3{stroke-dasharray:3 3} .d4{stroke-dasharray:11 3 3 3} .d5{stroke-dasharray:15 4}
+.d6{stroke-dasharray:2 5} .curve.dashed{stroke:var(--ink,#12171d);stroke-dasharray:6 4;stroke-width:1.2}
+.band{stroke:none;opacity:.25} .dot{fill:var(--ink,#12171d);stroke:var(--panel,#fff);stroke-width:2}
 """
-COLOURS = 6
+COLOURS = len(LINES)
+STYLE += "".join(
+    f".c{k}{{stroke:var(--c{k},{line})}} .f{k}{{fill:var(--c{k},{line})}}\n"
+    for k, line in enumerate(LINES, 1)
+)
+_TICKS = 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +116,10 @@ class _Axes:
 
 def draw(figure: Plot, *, standalone: bool = False) -> str:
     """The figure as an ``svg`` element, or as a file of its own (``standalone``)."""
-    axes = _Axes(figure.x_range or _span(figure.curves, "x"), figure.y_range or _span(figure.curves, "y"))
+    axes = _Axes(
+        _rounded(*(figure.x_range or _span(figure.curves, "x"))),
+        _rounded(*(figure.y_range or _span(figure.curves, "y"))),
+    )
     style = (
         f'<style>{STYLE}</style><rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>' if standalone else ""
     )
@@ -120,8 +127,8 @@ def draw(figure: Plot, *, standalone: bool = False) -> str:
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{words}">',
         style,
-        f'<clipPath id="{figure.name}-clip"><rect x="{_LEFT}" y="{_TOP}" width="{WIDTH - _LEFT - _RIGHT}"'
-        f' height="{HEIGHT - _TOP - _BOTTOM}"/></clipPath>',
+        f'<clipPath id="{figure.name}-clip"><rect x="{_LEFT - 3}" y="{_TOP - 3}" width="{WIDTH - _LEFT - _RIGHT + 6}"'
+        f' height="{HEIGHT - _TOP - _BOTTOM + 6}"/></clipPath>',
         *_frame(figure, axes),
         f'<g clip-path="url(#{figure.name}-clip)">',
         *(part for curve in figure.curves for part in _line(curve, axes)),
@@ -140,48 +147,68 @@ def _span(curves: Sequence[PlotLine], axis: str) -> tuple[float, float]:
     ]
     finite = np.concatenate([v[np.isfinite(v)] for v in values]) if values else np.zeros(0)
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
-    margin = 0.03 * (high - low) or 0.5 * abs(high) or 1.0
+    margin = 0.0 if high > low else 0.5 * abs(high) or 1.0
     return low - margin, high + margin
+
+
+def _rounded(low: float, high: float) -> tuple[float, float]:
+    """The next round numbers outward; a hundredth of the range beyond zero is shown beside the axis."""
+    if abs(low) < 0.01 * high:
+        low = 0.0
+    if abs(high) < -0.01 * low:
+        high = 0.0
+    marks = ticks(low, high, about=_TICKS)
+    step = marks[1] - marks[0]
+    return (
+        float(f"{math.floor(low / step + 1e-9) * step:.12g}"),
+        float(f"{math.ceil(high / step - 1e-9) * step:.12g}"),
+    )
 
 
 def _frame(figure: Plot, axes: _Axes) -> Iterator[str]:
     bottom, right = HEIGHT - _BOTTOM, WIDTH - _RIGHT
-    for value in ticks(*axes.x, about=6):
+    for value in _marks(*axes.x):
         x = axes.across(value)
         yield f'<line class="grid" x1="{x:.1f}" y1="{_TOP}" x2="{x:.1f}" y2="{bottom}"/>'
         yield _word(x, bottom + 16, number(value), "middle")
-    for value in ticks(*axes.y, about=6):
+    for value in _marks(*axes.y):
         y = axes.down(value)
         yield f'<line class="grid" x1="{_LEFT}" y1="{y:.1f}" x2="{right}" y2="{y:.1f}"/>'
         yield _word(_LEFT - 6, y + 4, number(value), "end")
     yield f'<path class="axis" d="M{_LEFT} {_TOP}V{bottom}H{right}"/>'
-    yield _word((_LEFT + right) / 2, HEIGHT - 8, figure.x_label, "middle")
-    middle = (_TOP + bottom) / 2
-    yield (
-        f'<text class="word" text-anchor="middle" transform="translate(14 {middle:.0f}) rotate(-90)">'
-        f"{html.escape(figure.y_label)}</text>"
-    )
+    yield _word(right, HEIGHT - 6, figure.x_label, "end")
+    yield _word(4, 14, figure.y_label, kind="word ink")
 
 
-def _word(x: float, y: float, words: str, anchor: str = "start") -> str:
-    return f'<text class="word" x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{html.escape(words)}</text>'
+def _marks(low: float, high: float) -> list[float]:
+    """Round numbers from end to end."""
+    marks = ticks(low, high, about=_TICKS)
+    return marks if marks[0] == low and marks[-1] == high else ticks(low, high, about=_TICKS + 3)
+
+
+def _word(x: float, y: float, words: str, anchor: str = "start", kind: str = "word") -> str:
+    return f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{html.escape(words)}</text>'
+
+
+def _look(curve: PlotLine) -> str:
+    """The classes of a line: its colour with the dash of that, or that of a construction."""
+    k = curve.colour % COLOURS + 1
+    return f"curve c{k} dashed" if curve.dashed else f"curve c{k} d{k}"
 
 
 def _line(curve: PlotLine, axes: _Axes) -> Iterator[str]:
     chosen = _thinned(curve.y)
     x, y = axes.across(curve.x[chosen]), axes.down(curve.y[chosen])
-    colour = curve.colour % COLOURS
     if curve.sigma is not None:
         low, high = (axes.down(curve.y[chosen] + side * curve.sigma[chosen]) for side in (-1, 1))
-        yield _band(x, low, high, colour)
-    dashed = " dashed" if curve.dashed else ""
+        yield _band(x, low, high, curve.colour % COLOURS + 1)
     path = "".join(
         f"{'L' if inside else 'M'}{a:.1f} {b:.1f}"
         for a, b, inside in zip(x, y, _follows(x, y), strict=True)
         if math.isfinite(a) and math.isfinite(b)
     )
     if path:
-        yield f'<path class="curve c{colour}{dashed}" d="{path}"/>'
+        yield f'<path class="{_look(curve)}" d="{path}"/>'
 
 
 def _follows(x: Array, y: Array) -> list[bool]:
@@ -213,8 +240,10 @@ def _thinned(y: Array) -> NDArray[np.intp]:
 def _mark(mark: Mark, axes: _Axes) -> str:
     x, y = axes.across(mark.x), axes.down(mark.y)
     left = x > WIDTH - 150
-    words = _word(x + (-8 if left else 8), y + 18, f"{mark.name} = {mark.value}", "end" if left else "start")
-    return f'<circle class="f3" cx="{x:.1f}" cy="{y:.1f}" r="4"/>{words}'
+    words = _word(
+        x + (-8 if left else 8), y + 18, f"{mark.name} = {mark.value}", "end" if left else "start", "word ink"
+    )
+    return f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="5"/>{words}'
 
 
 def _legend(curves: Sequence[PlotLine]) -> Iterator[str]:
@@ -223,7 +252,6 @@ def _legend(curves: Sequence[PlotLine]) -> Iterator[str]:
     for curve in curves:
         if not curve.label:
             continue
-        dashed = " dashed" if curve.dashed else ""
-        yield f'<path class="curve c{curve.colour % COLOURS}{dashed}" d="M{x:.0f} 12h22"/>'
-        yield _word(x + 27, 16, curve.label)
-        x += 42 + 6.6 * len(curve.label)
+        yield f'<path class="{_look(curve)}" d="M{x:.0f} 30h24"/>'
+        yield _word(x + 29, 34, curve.label)
+        x += 44 + 6.6 * len(curve.label)

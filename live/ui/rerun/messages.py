@@ -57,10 +57,12 @@ class ViewSetup:
         Lines of the gauges, drawn on the picture.
     gauges : sequence of str
         Names of those whose strain is plotted over time.
+    colours : mapping of name to int
+        The index of the colour of each gauge; without, by its place.
     light : bool
         For slow connections: smaller pictures, fewer maps.
     scale : "symmetric" | "automatic"
-        Colour range of the maps: symmetric about zero, or that of the values.
+        Colour range of the maps: symmetric about zero; or that of the values, about zero where they have both signs.
     whole : sequence of str
         Further maps: those of the whole test, of a finished one.
     """
@@ -79,8 +81,9 @@ class ViewSetup:
     with_load: bool = True
     outlines: Mapping[str, tuple[tuple[tuple[float, float], ...], ...]] = field(default_factory=dict)
     gauges: Sequence[str] = ()
+    colours: Mapping[str, int] = field(default_factory=dict)
     light: bool = False
-    scale: Literal["symmetric", "automatic"] = "symmetric"
+    scale: Literal["symmetric", "automatic"] = "automatic"
     whole: Sequence[str] = ()
 
 

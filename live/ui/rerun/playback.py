@@ -21,7 +21,7 @@ from acquire.events import Level
 from acquire.frame import Frame, frozen
 from acquire.text.quantity import Quantity
 from analysis.evaluate import evaluate_test
-from live.config.gauges import outlines
+from live.config.gauges import gauge_colours, outlines
 from live.config.loading import from_dict
 from live.pipeline.screen import Screen
 from live.results.figures import figure_lines, tensile_options
@@ -211,6 +211,7 @@ def view_setup(run: RunFolder) -> ViewSetup:
         with_load=bool(np.isfinite(run.force).any()),
         outlines=_outlines(run),
         gauges=tuple(run.gauges),
+        colours=gauge_colours(run.strain.config.get("gauges") or {}),
         whole=tuple(name for name in run.strain.whole_names if name not in (FATE, "instants")),
     )
 

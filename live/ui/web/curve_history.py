@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Sequence
 from typing import Any
@@ -35,6 +36,17 @@ class CurveHistory:
         """Edition (rows of another edition are useless) and number of rows."""
         with self._lock:
             return self._rows.halvings, len(self._rows.kept)
+
+    def outline(self, count: int) -> dict[str, Any]:
+        """The curve of a finished test, to be drawn behind the next one: at most ``count`` of its points, SI units."""
+        with self._lock:
+            rows = [row for row in self._rows.kept if math.isfinite(row[1]) and math.isfinite(row[2])]
+        rows = rows[:: max(1, math.ceil(len(rows) / count))]
+        return {
+            "stress": self._names[1] == "stress",
+            "load": [row[1] for row in rows],
+            "strain": [row[2] for row in rows],
+        }
 
     def since(self, edition: int, count: int) -> dict[str, Any]:
         """The rows that a page with ``count`` rows of ``edition`` lacks."""

@@ -9,17 +9,18 @@ import numpy as np
 
 from acquire.text import Message
 from analysis.field import VALUES, Status
-from live.config.gauges import complete_gauges
+from live.config.gauges import complete_gauges, gauge_colours
 from live.config.loading import Config
 from live.pipeline.measurement import Measurement
 from live.results.maps.colours import MICROSTRAIN, PERCENT
 from live.results.maps.field_maps import FIELD_MAPS, FieldMaps, Painted
 from live.results.maps.painting import overlay_cells
-from live.ui.web.painting import as_jpeg, shrunk
+from live.ui.web.painting import Bytes, as_jpeg, cells_png, shrunk
 
 RANGES = ("automatic", "symmetric", "fixed")
 BARS = 24
 """Of the histogram, over the range of the colours."""
+_RAMP = 11  # colours of the bar, between which the page shades
 OUTSIDE = Message("no ZOI is here")
 
 
@@ -62,7 +63,7 @@ class MapView:
     def _take(self, choice: MapChoice) -> None:
         self.choice = choice
         limit = choice.limit if choice.span == "fixed" else None
-        self._maps = FieldMaps(self._axis, limit, about_zero=choice.span == "symmetric")
+        self._maps = FieldMaps(self._axis, limit, is_symmetric=choice.span == "symmetric")
 
     def choose(self, name: object, span: object, limit: object) -> str:
         """Show another map, or another range; the reason of a refusal, or empty."""
@@ -80,14 +81,24 @@ class MapView:
 
     def draw(self, m: Measurement) -> tuple[bytes, dict[str, Any]]:
         """The picture of ``m`` with its map, as JPEG, and its scale as the page shows it."""
+        picture, zoom, painted, shown = self._drawn(m)
+        overlay_cells(picture, zoom, m.field.grid, painted.rgba, (m.time_step.u, m.time_step.v))
+        return as_jpeg(picture), shown
+
+    def layers(self, m: Measurement) -> tuple[bytes, bytes, dict[str, Any]]:
+        """The picture of ``m`` as JPEG, its map as PNG to lay over it, and its scale as the page shows it."""
+        picture, zoom, painted, shown = self._drawn(m)
+        size, moved = (picture.shape[1], picture.shape[0]), (m.time_step.u, m.time_step.v)
+        return as_jpeg(picture), cells_png(size, zoom, m.field.grid, painted.rgba, moved), shown
+
+    def _drawn(self, m: Measurement) -> tuple[Bytes, float, Painted, dict[str, Any]]:
         picture, zoom = shrunk(m.burst.mean, m.burst.bits)
         painted = self._maps.paint(m.field, (self.choice.name,))[self.choice.name]
-        overlay_cells(picture, zoom, m.field.grid, painted.rgba, (m.time_step.u, m.time_step.v))
         self._painted = m, painted
         height, width = m.burst.mean.shape
         shown = {"of": self.choice.name, "range": self.choice.span, "width": width, "height": height}
         shapes = gauge_shapes(self._config) | plate_shapes(self._config)
-        return as_jpeg(picture), shown | _scale_of(painted) | {"gauges": shapes}
+        return picture, zoom, painted, shown | _scale_of(painted) | {"gauges": shapes}
 
     def value_at(self, x: float, y: float) -> dict[str, Any]:
         """Value, sigma and status of the ZOI that is shown at a place of the picture, px."""
@@ -110,7 +121,7 @@ class MapView:
 
 
 def _scale_of(painted: Painted) -> dict[str, Any]:
-    """The colours of a map: ends, unit and histogram, strains without unit; or the legend of statuses."""
+    """The colours of a map: from low to high, ends, unit and histogram, strains without unit; or the legend."""
     scale, values = painted.scale, painted.values
     if scale is None or values is None:
         legend = [{"text": one.text, "count": one.count, "colour": f"rgb{one.rgb}"} for one in painted.legend]
@@ -120,7 +131,9 @@ def _scale_of(painted: Painted) -> dict[str, Any]:
     low, high = scale.low / factor, scale.high / factor
     counts, _ = np.histogram(values[np.isfinite(values)], BARS, (low, high))
     unit = "" if strain else scale.unit
-    return {"low": low, "high": high, "strain": strain, "unit": unit, "histogram": counts.tolist()}
+    ramp = [f"#{bytes(row).hex()}" for row in scale.ramp(_RAMP)]
+    colours = {"ramp": ramp, "diverging": scale.is_diverging}
+    return {"low": low, "high": high, "strain": strain, "unit": unit, "histogram": counts.tolist()} | colours
 
 
 def plate_shapes(config: Config) -> dict[str, Any]:
@@ -135,12 +148,14 @@ def plate_shapes(config: Config) -> dict[str, Any]:
 
 
 def gauge_shapes(config: Config) -> dict[str, Any]:
-    """The gauges of a configuration as the page draws them: kind, handles and lines, px."""
+    """The gauges of a configuration as the page draws them: kind, index of the colour, handles and lines, px."""
+    colours = gauge_colours(config.gauges)
     found = complete_gauges(config.gauges, config.specimen.first_axis)
     zoi = config.measure.zoi
     return {
         one.name: {
             "kind": one.kind,
+            "colour": colours[one.name],
             "handles": one.handles(),
             "outline": [[(round(x, 1), round(y, 1)) for x, y in line] for line in one.outline(zoi)],
         }

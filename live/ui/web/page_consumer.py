@@ -32,6 +32,7 @@ from live.pipeline.timed.figure import TimedFigure
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.cameras_panel import CamerasPanel
 from live.ui.web.curve_history import CurveHistory
+from live.ui.web.limits import FigureLimits
 from live.ui.web.map_view import MapView, gauge_shapes, plate_shapes
 from live.ui.web.painting import as_jpeg, shrunk
 
@@ -87,7 +88,9 @@ class PageConsumer(Consumer):
     Attributes
     ----------
     picture : bytes
-        The newest picture with its map, as JPEG.
+        The newest picture as JPEG: the camera's alone; after the run that at the highest force with its map.
+    layers : dict of str to bytes
+        What else belongs to it: the ``map`` as PNG to lay over it; after the run the ``last`` picture with its map.
     curve : CurveHistory
     map : MapView
     """
@@ -112,6 +115,8 @@ class PageConsumer(Consumer):
         self.curve = CurveHistory(["t", "stress" if config.specimen.area_m2 else "force", "axial", *names])
         self._names = names
         self.picture = picture
+        self.layers: dict[str, bytes] = {}
+        self._limits = FigureLimits(config.alarm)
         self._shown = 0
         self._scale: dict[str, Any] = {}
         self._running: Running | None = None
@@ -162,7 +167,9 @@ class PageConsumer(Consumer):
         axis = first_axis if running is None else running.run_state.history.current_axis
         strains = [i.gauges[n].value if n in i.gauges else getattr(i, n, math.nan) for n in self._names]
         stress = i.force / (self._config.specimen.area_m2 or 1.0)
-        self.curve.add([i.t - self._t0, stress, i.axial(axis)[0], *strains])
+        axial = i.axial(axis)[0]
+        self.curve.add([i.t - self._t0, stress, axial, *strains])
+        self._limits.add(i.t, {FORCE: i.force, STRESS: stress, AXIAL: axial})
         if self._channels is not None:
             self._rate = self._channels.read(measurement)["strain_rate"]
         self._keep_peak(measurement)
@@ -204,20 +211,27 @@ class PageConsumer(Consumer):
         return Message("{shown} pictures shown", self._shown)
 
     def at_peak(self) -> dict[str, Any]:
-        """For the page after the test: the map and the gauges at the highest force, without one at the end."""
-        m = self._peak
+        """For the page after the test: map and gauges at the highest force, without one at the end; the last map."""
+        m, last = self._peak, self._newest
         if m is None:
             return {"peak": None, "gauges": [], "points": self.curve.position}
-        self.picture, shown = self.map.draw(m)
         self._shown += 1
+        found: dict[str, Any] = {}
+        if last is not None and last is not m:
+            self.layers["last"], shown = self.map.draw(last)
+            found["last"] = self._shown_after(last, shown, "&layer=last")
+        self.picture, shown = self.map.draw(m)
         words = Message("at the end") if math.isnan(self._peak_N) else Message("at the highest force")
-        peak = shown | {"picture": f"/picture?side={self._side}&after={self._shown}"}
-        return {
-            "peak": peak,
+        return found | {
+            "peak": self._shown_after(m, shown),
             "atpeak": words,
             "gauges": _gauges(m.time_step, {}),
             "points": self.curve.position,
         }
+
+    def _shown_after(self, m: Measurement, shown: dict[str, Any], layer: str = "") -> dict[str, Any]:
+        address = f"/picture?side={self._side}&after={self._shown}{layer}"
+        return shown | {"picture": address, "s": max(m.time_step.t - self._start_t, 0.0)}
 
     # -- messages to the page -----------------------------------------------------------------
 
@@ -235,7 +249,7 @@ class PageConsumer(Consumer):
             "state": self._state_name(s),
             "elapsed_s": s.elapsed_s,
             "recording": None if running is None else running.recording,
-            "figures": {name: shown(s.figure(name)) for name in (FORCE, STRESS, AXIAL)},
+            "figures": {name: self._figure(s, name) for name in (FORCE, STRESS, AXIAL)},
             "troubles": [printable(text) for text in s.troubles],
             "force_N": s.figure(FORCE).value,
             "peak_N": s.peak_N,
@@ -265,6 +279,10 @@ class PageConsumer(Consumer):
         s = running.run_state.snapshot(now, self._matched.time_step)
         return replace(s, peak_N=self._peak_N, latency_p95_s=math.nan)
 
+    def _figure(self, s: Snapshot, name: str) -> dict[str, Any]:
+        figure = s.figure(name)
+        return shown(figure) | {"limit": self._limits.of(name, figure.value, s.axial_name)}
+
     def _elongation(self, s: Snapshot) -> float | None:
         if self._length_mm is None:
             return None
@@ -284,7 +302,7 @@ class PageConsumer(Consumer):
         self._fresh = False
         m, frame = self._newest, self._frame
         if m is not None:
-            self.picture, self._scale = self.map.draw(m)
+            self.picture, self.layers["map"], self._scale = self.map.layers(m)
         elif frame is not None:
             height, width = frame.image.shape
             self.picture = as_jpeg(shrunk(frame.image, frame.bits)[0])
@@ -313,7 +331,8 @@ def elongation_length(config: Config) -> tuple[str, float | None]:
 def shown(figure: TimedFigure) -> dict[str, Any]:
     """A figure as the page draws it; ``value`` is null unless it is live, and then ``last`` is shown with its age."""
     return {
-        "state": str(figure.state), "value": figure.value, "last": figure.last, "age_s": figure.age, "why": figure.why
+        "state": str(figure.state), "value": figure.value, "last": figure.last, "age_s": figure.age, "why": figure.why,
+        "sigma": figure.sigma,
     }  # fmt: skip
 
 

@@ -82,8 +82,12 @@ class PageConsumers:
         return json_response(consumer.map.value_at(x, y))
 
     def picture(self, query: Mapping[str, str]) -> bytes:
-        """The newest picture of a camera, as JPEG; empty where there is none."""
-        return self._of(query.get("side", "")).picture if self.by_name else b""
+        """The newest picture of a camera, as JPEG, or a ``layer`` that belongs to it; empty where there is none."""
+        if not self.by_name:
+            return b""
+        consumer = self._of(query.get("side", ""))
+        layer = query.get("layer", "")
+        return consumer.layers.get(layer, b"") if layer in ("map", "last") else consumer.picture
 
     def select_map(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Show another map, on the pictures of all cameras."""

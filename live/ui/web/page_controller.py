@@ -29,7 +29,7 @@ from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.page_consumer import PageConsumer, RunningTest
 from live.ui.web.page_consumers import PageConsumers
-from live.ui.web.painting import RAMP, as_png
+from live.ui.web.painting import as_png
 from live.ui.web.run_result import peaks
 from live.ui.web.server import DEFAULT_PORT, REPORT_POLICY, PageServer, Response, jpeg_response
 from live.ui.web.setup.config_draft import ConfigDraft, next_name, second_draft
@@ -42,6 +42,7 @@ SET_UP, RUN, AFTER = "setup", "run", "after"
 START, NEXT, AGAIN, QUIT = "start", "next", "again", "quit"
 FIRST = "specimen-1"
 GOODBYE_S = 0.5
+OUTLINE = 500  # points of the specimen before
 
 
 class ControlledRun(Controls, RunningTest, Protocol):
@@ -85,6 +86,8 @@ class PageController:
         self._requests: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._folder = TemporaryDirectory(prefix="phasedic-")
         self._message = ""
+        self._what: dict[str, Any] | None = None
+        self._before: dict[str, Any] | None = None
         self.viewer: Callable[[int], Answer] = lambda port: refusal("there is no viewer here")
         gets = {
             "/points": lambda query: self._consumers.points(query),
@@ -167,9 +170,19 @@ class PageController:
 
     def begin(self, configs: Mapping[str, Config]) -> Mapping[str, PageConsumer]:
         """Begin the stage of a run with these cameras, by name; the consumers of their data."""
+        what = _described(next(iter(configs.values())))
+        self._before, self._what = self._outline(what), what
         self._consumers, self._live = PageConsumers(self._broadcaster, configs, self._last_pictures), None
         self._enter(RUN, "")
         return self._consumers.by_name
+
+    def _outline(self, what: Mapping[str, Any]) -> dict[str, Any] | None:
+        """The curve of the specimen before; None where nothing was measured, or where it was of another material."""
+        before = self._consumers.first
+        is_same = self._what is not None and self._what["material"] == what["material"]
+        if before is None or self._what is None or not (is_same and before.curve.position[1]):
+            return None
+        return before.curve.outline(OUTLINE) | {"specimen": self._what["specimen"]}
 
     def attach(self, live: ControlledRun) -> None:
         """Pass commands to ``live`` from now on, and show it."""
@@ -220,12 +233,14 @@ class PageController:
             "n": self._stages,
             "words": self._message,
             "alone": self.draft is None,
+            "what": self._what,
+            "before": self._before if self.stage == RUN else None,
         }
         kinds = [
             {"kind": name, "label": one.label, "hint": one.hint, "gesture": one.gesture}
             for name, one in GAUGE_KINDS.items()
         ]
-        self._broadcaster.publish("stage", stage | {"components": FIELD_MAPS, "ramp": RAMP, "kinds": kinds})
+        self._broadcaster.publish("stage", stage | {"components": FIELD_MAPS, "kinds": kinds})
 
     # -- requests of the page -----------------------------------------------------------------
 
@@ -236,8 +251,10 @@ class PageController:
         else:
             picture = sessions.of(query.get("side")).picture
         if picture:
-            return jpeg_response(picture)
-        return Response(as_png(np.zeros((1, 1), np.uint8)), "image/png")
+            return (
+                Response(picture, "image/png") if picture.startswith(b"\x89PNG") else jpeg_response(picture)
+            )
+        return Response(as_png(np.zeros((1, 1, 4), np.uint8)), "image/png")  # nothing is seen
 
     def _mask(self, query: Mapping[str, str]) -> Response:
         sessions = self.sessions
@@ -302,3 +319,16 @@ class PageController:
             return refusal(printable(brief(error)))._asdict()
         sessions.refresh()
         return Answer()._asdict()
+
+
+def _described(config: Config) -> dict[str, Any]:
+    """The specimen of a test, as the head of the page names it."""
+    specimen, names = config.specimen, config.metadata
+    return {
+        "specimen": str(names.get("specimen", "")),
+        "material": str(names.get("material", "")),
+        "width_mm": specimen.width_mm,
+        "thickness_mm": specimen.thickness_mm,
+        "diameter_mm": specimen.diameter_mm,
+        "area_mm2": None if specimen.area_m2 is None else specimen.area_m2 * 1e6,
+    }

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
-from live.results.maps.colours import ramp
+from analysis.field import ZoiGrid
 
 MAX_SIDE_PX = 960
 """Of a picture; larger ones are reduced."""
@@ -18,8 +18,6 @@ QUALITY = 80
 RED = (40, 40, 255)  # blue, green, red
 
 Bytes = NDArray[np.uint8]
-RAMP = [f"#{bytes(row).hex()}" for row in ramp(11, 1)[:, 0]]
-"""The colours of a map from its highest value down."""
 
 
 def shrunk(image: NDArray[Any], bits: int, max_side_px: int = MAX_SIDE_PX) -> tuple[Bytes, float]:
@@ -55,6 +53,30 @@ def as_jpeg(picture: Bytes) -> bytes:
 def as_png(picture: NDArray[Any]) -> bytes:
     """A picture as the bytes of a file, without loss."""
     _, content = load_cv2().imencode(".png", picture)
+    return bytes(content)
+
+
+def cells_png(
+    size: tuple[int, int], zoom: float, grid: ZoiGrid, cells: Bytes, moved: tuple[float, float]
+) -> bytes:
+    """RGBA ``cells`` (R, C, 4) of ``grid``, moved by (x, y) px, as a PNG of (width, height) px to lay over a picture.
+
+    Where there is a colour it is full: the page has the opacity. ``zoom``: px of the PNG for one of the camera.
+    """
+    step = grid.step * zoom
+    at = [
+        (start + (m if math.isfinite(m) else 0.0) + 0.5) * zoom - 0.5
+        for start, m in zip((grid.x[0], grid.y[0]), moved, strict=True)
+    ]
+    full = np.concatenate([cells[..., 2::-1], np.where(cells[..., 3:] > 0, 255, 0).astype(np.uint8)], axis=-1)
+    cv2 = load_cv2()
+    place = np.array([[step, 0, at[0]], [0, step, at[1]]], np.float64)
+    layer = cv2.warpAffine(full, place, size, flags=cv2.INTER_NEAREST, borderValue=(0, 0, 0, 0))
+    _, content = cv2.imencode(
+        ".png",
+        layer,
+        [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE],
+    )
     return bytes(content)
 
 

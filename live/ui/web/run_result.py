@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from acquire.text import Message
-from acquire.text.message import about
+from acquire.text.message import about, joined
 from analysis.evaluate import TensileFigures
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import sentence
 from live.pipeline.run_state import RunState
-from live.results.figures import TensileRow, tensile_table
+from live.results.figures import TensileRow, headline, tensile_table
 from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
 from live.results.report.curves import load_unit, strain_unit, stress_strain
 from live.results.report.evaluation import EvaluatedCurve, intercept_of
 from live.results.summary import why_nothing
 from live.run.outcome import Outcome
-from live.ui.web.cameras_panel import figures_of, side_figures
+from live.ui.web.cameras_panel import figures_of
 from live.ui.web.page_consumer import PageConsumer
 
 MAX_TROUBLES = 20
@@ -50,6 +50,9 @@ def run_result(run_state: RunState, test: FinishedTest, folder: Path, words: str
         "folder": str(folder),
         "words": words,
         "figures": [] if figures is None else _figures(figures, specimen),
+        "belief": None
+        if figures is None
+        else belief(headline(figures, stresses=specimen.area_m2 is not None), troubles),
         "lines": [] if figures is None else list(_lines(run_state, specimen, figures)),
         "ledger": run_state.frame_counts.line(),
         "troubles": troubles if measured else [*troubles, why_nothing(run_state)],
@@ -63,13 +66,22 @@ def cameras_result(
     results = {side: run_result(state, tests[side], folder / side, words) for side, state in states.items()}
     specimen = next(iter(tests.values())).specimen
     found = figures_of(states, specimen)
-    figures: list[dict[str, Any]] = [*side_figures(found, specimen)]
+    troubles = [about(side, text) for side, one in results.items() for text in one["troubles"]]
+    first = next(iter(found), "")
+    stresses = specimen.area_m2 is not None
+    figures: list[dict[str, Any]] = [
+        {**_figure(row), "side": where, "head": where == first}
+        for where, one in found.items()
+        for row in headline(one, stresses=stresses)
+        if row.figure.known
+    ]
     figures += [_interval_of_e(one) for one in list(found.values())[:1] if one.E.known]
     return {
         **next(iter(results.values())),
         "folder": str(folder),
         "figures": figures,
-        "troubles": [about(side, text) for side, one in results.items() for text in one["troubles"]],
+        "belief": belief(headline(found[first], stresses=stresses), troubles) if found else None,
+        "troubles": troubles,
     }
 
 
@@ -84,8 +96,34 @@ def peaks(consumers: Mapping[str, PageConsumer]) -> dict[str, Any]:
     return {**first, "gauges": gauges, "side": name, "second": {**others[0][1], "side": others[0][0]}}
 
 
+def belief(rows: Sequence[TensileRow], troubles: Sequence[str]) -> dict[str, Any]:
+    """One sentence on whether the first figures can be believed, each exception named; good, look or bad.
+
+    What the data say against a test (``troubles``) stands against all of its figures.
+    """
+    known = [row for row in rows if row.figure.known]
+    doubtful = [row.name for row in known if row.remark]
+    sure = [row.name for row in known if not row.remark]
+    if not known:
+        return {"kind": "bad", "words": Message("No figure is known; the list says why.")}
+    if troubles:
+        names = ", ".join(row.name for row in known)
+        return {"kind": "look", "words": Message("Look at the remarks before you believe {names}.", names)}
+    if doubtful and sure:
+        words = Message("{sure} can be believed; look at {doubtful}.", ", ".join(sure), ", ".join(doubtful))
+        return {"kind": "look", "words": words}
+    if doubtful:
+        return {
+            "kind": "look",
+            "words": Message("Look at {doubtful}: each has a remark.", ", ".join(doubtful)),
+        }
+    more = Message("The data say nothing against them; the intervals (95 %) hold the scatter.")
+    return {"kind": "good", "words": Message("{sure} can be believed.", ", ".join(sure)), "more": more}
+
+
 def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str, Any]]:
-    found = [_figure(row) for row in _rows(figures, specimen)]
+    first = {row.name for row in headline(figures, stresses=specimen.area_m2 is not None)}
+    found = [_figure(row) | {"head": row.name in first} for row in _rows(figures, specimen)]
     if figures.E.known and figures.elastic_strain:
         found.append(
             {
@@ -103,7 +141,7 @@ def _interval_of_e(figures: TensileFigures) -> dict[str, Any]:
     parts = (
         figures.budget if len(figures.budget) > 1 else ("scatter", Message("no limits of error are stated"))
     )
-    text = "; ".join(parts)
+    text = joined("; ", parts)
     return {"name": Message("interval of E"), "text": text, "words": True}
 
 

@@ -127,7 +127,7 @@ def test_the_view_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[Any] = []
     monkeypatch.setattr(consumers, "View", lambda setup, **more: made.append((setup, more)))
     given = {**LINE, "specimen.area_mm2": 40.0, "specimen.axis": "x", "view.light": True, "view.rrd": True,
-             "load.address": "none:", "view.strain_range": 0.02, "view.scale": "automatic"}  # fmt: skip
+             "load.address": "none:", "view.strain_range": 0.02, "view.scale": "symmetric"}  # fmt: skip
     consumers._view(about(load_config(None, given)), RunState.new(1.0), Said())
     usual = {"load.address": "sim:", "view.port": 9999, "view.rrd": False}
     consumers._view(about(load_config(None, usual)), RunState.new(1.0), Said())
@@ -137,13 +137,13 @@ def test_the_view_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
         pytest.approx(40e-6),
         "x",
         0.02,
-        "automatic",
+        "symmetric",
     )
     assert (light.picture_hz, light.light, light.with_load) == (1.0, True, False) and set(light.outlines) == {
         "mid"
     }
     assert more["rrd"] == Path("run") / "view.rrd"
-    assert (plain.picture_hz, plain.with_load, plain.axis, plain.scale) == (5.0, True, "y", "symmetric")
+    assert (plain.picture_hz, plain.with_load, plain.axis, plain.scale) == (5.0, True, "y", "automatic")
     assert (other["port"], other["rrd"]) == (9999, None)
 
 

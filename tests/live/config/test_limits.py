@@ -73,7 +73,7 @@ OTHERS = {
     "record": {"enabled": True, "mode": "all", "armed": False, "when_full": "gap"},
     "operate": {"orders": None, "token_file": None},
     "strain_out": {"tcp": None, "udp": None, "serial": None, "format": "json", "channels": None},
-    "view": {"enabled": True, "rrd": True, "spawn": True, "scale": "symmetric", "light": False},
+    "view": {"enabled": True, "rrd": True, "spawn": True, "scale": "automatic", "light": False},
     "specimen": {
         "axis": "auto", "standard": "iso6892", "test": "auto", "modulus_between": (0.0005, 0.0025), "zero": "raw",
     },

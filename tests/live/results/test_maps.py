@@ -23,11 +23,12 @@ from live.results.maps.colours import (
     diverging_table,
     nice_above,
     number,
-    ramp,
+    sequential_table,
     ticks,
     unit_for,
 )
 from live.results.maps.map import MapRequest, draw
+from live.results.maps.scale import ColourScale
 from live.results.reader import Strain
 
 
@@ -44,18 +45,21 @@ def test_the_table_runs_from_blue_over_near_white_to_red_without_jumps() -> None
 
 
 def test_rejected_is_transparent_and_the_ends_hold() -> None:
-    rgba = colour(np.array([[-2.0, -1.0, 0.0, 1.0, 2.0, np.nan]]), 1.0, alpha=200)[0]
+    rgba = colour(np.array([[-2.0, -1.0, 0.0, 1.0, 2.0, np.nan]]), -1.0, 1.0, diverging_table(), alpha=200)[0]
     assert rgba[:, 3].tolist() == [200] * 5 + [0]
     assert (rgba[0] == rgba[1]).all()
     assert (rgba[3] == rgba[4]).all()
     assert rgba[2, :3].min() > 215
 
 
-def test_the_ramp_has_the_largest_value_on_top() -> None:
-    bar = ramp(64, 3)
-    assert bar.shape == (64, 3, 3)
-    assert (bar[0, 0] == diverging_table()[-1]).all()
-    assert (bar[-1, 0] == diverging_table()[0]).all()
+@pytest.mark.parametrize("is_diverging", [False, True])
+def test_the_ramp_runs_from_the_lowest_value_to_the_highest(is_diverging: bool) -> None:
+    ramp, table = (
+        ColourScale(-1.0, 1.0, "%", 100.0, is_diverging).ramp(64),
+        diverging_table() if is_diverging else sequential_table(),
+    )
+    assert ramp.shape == (64, 3)
+    assert (ramp[0] == table[0]).all() and (ramp[-1] == table[-1]).all()
 
 
 @given(st.floats(1e-7, 1e7))

@@ -14,7 +14,7 @@ from acquire.errors import ConfigError, DataError
 from analysis import Roi, ZoiGrid
 from analysis.field import Status
 from analysis.field.strain_field import StrainField
-from live.results.maps.colours import diverging_table
+from live.results.maps.colours import diverging_table, sequential_table
 from live.results.maps.map import MapRequest, draw, for_display, save
 from live.results.maps.painting import Levels, Painter, _mixed, caption, overlay_cells, overlay_quads
 from live.results.maps.scale import OPACITY, AutoRange, ColourScale, range_kind, status_colours
@@ -59,8 +59,34 @@ def test_the_table_is_that_of_the_paper() -> None:
     assert table[0].tolist() == [59, 76, 192] and table[255].tolist() == [180, 4, 38]
 
 
+# R. A. Machado and others, doi:10.1109/TVCG.2009.113: linear sRGB as it is seen, at full severity.
+VISIONS = {
+    "normal": np.eye(3),
+    "protan": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "deutan": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+    "tritan": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("vision", VISIONS)
+def test_a_higher_value_is_lighter_for_everyone(vision: str) -> None:
+    """CIE L* of the sequential table: from 21 to 92, by 4.8 or more a tenth, and never back."""
+    srgb = sequential_table() / 255
+    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    seen = np.clip(linear @ np.transpose(VISIONS[vision]), 0, 1)
+    lightness = 116 * np.cbrt(seen @ [0.2126729, 0.7151522, 0.0721750]) - 16
+    assert np.diff(lightness).min() > -0.06  # 8 bit
+    assert (lightness[3:] > lightness[:-3]).all()
+    assert np.diff(np.interp(np.linspace(0, 255, 11), np.arange(256), lightness)).min() >= 4.7
+    assert 20 < lightness[0] < 24 and 90 < lightness[-1] < 93
+    if vision == "normal":
+        assert [bytes(row).hex() for row in sequential_table()[[0, 51, 102, 153, 204, 255]]] == [
+            "431480", "1a51b0", "0187a1", "06b696", "93d866", "faed5a",
+        ]  # fmt: skip
+
+
 def test_frame_ticks_and_bar_lie_at_their_values(strain: Strain) -> None:
-    painter = Painter(strain, "eyy", ColourScale(-2.0, 2.0, "%", 100.0), (128, 96))
+    painter = Painter(strain, "eyy", ColourScale(-2.0, 2.0, "%", 100.0, True), (128, 96))
     image = np.full((420, 560, 3), 77, np.uint8)
     full = painter.framed(image, ["a title"], 0, axes=True)
     assert painter.size == (560, 420) and full.shape == (510, 764, 3)
@@ -74,7 +100,7 @@ def test_frame_ticks_and_bar_lie_at_their_values(strain: Strain) -> None:
     down = np.flatnonzero((full[top:bottom, left - 3] == LINE).all(axis=1))
     assert down.tolist() == [round((v + 0.5) * 4.375) for v in (0, 20, 40, 60, 80)]
     bar = full[68:454, 640:658]
-    for k, rgb in ((2, diverging_table()[255]), (-3, diverging_table()[0]), (193, diverging_table()[128])):
+    for k, rgb in ((2, diverging_table()[255]), (-3, diverging_table()[0]), (185, diverging_table()[133])):
         assert np.abs(bar[k, 9] - through(rgb)).max() <= 6, k
     marks = np.flatnonzero((full[60:460, 661] == LINE).all(axis=1)) + 60
     assert marks.tolist() == [68, 164, 261, 358, 454]
@@ -277,11 +303,11 @@ def test_a_range_shrinks_to_data_below_a_half_of_it() -> None:
 
 
 def test_a_free_range_is_never_empty() -> None:
-    low, high = AutoRange("free").update(np.full((3, 3), 100.0))
+    low, high, _ = AutoRange("free").update(np.full((3, 3), 100.0))
     assert (low, high) == (pytest.approx(99.94), pytest.approx(100.06, abs=0.01)) and low < 100 < high
-    low, high = AutoRange("free").update(np.zeros((3, 3)))
+    low, high, _ = AutoRange("free").update(np.zeros((3, 3)))
     assert low <= -4e-7 and 4e-7 <= high <= 2e-6
-    low, high = AutoRange("free").update(np.array([[1.0, 2.0]]), np.array([[1.0]]))
+    low, high, _ = AutoRange("free").update(np.array([[1.0, 2.0]]), np.array([[1.0]]))
     assert high - low >= 8.0 and (low + high) / 2 == pytest.approx(1.5, abs=1.0)
 
 
@@ -293,7 +319,7 @@ def test_one_scale_holds_for_all_instants(strain: Strain) -> None:
     assert (sigma.low, sigma.high, sigma.unit) == (0.0, 12.0, "µm/m")
     assert ColourScale.of_run(strain, "eyy", [1], 0.005).high == 5000.0
     assert ColourScale.of_run(strain, "eyy", [0]).high >= 40.0, "noise reaches a quarter"
-    assert range_kind("iterations") == range_kind("v") == "free" and range_kind("blur") == "about zero"
+    assert range_kind("iterations") == range_kind("v") == "free" and range_kind("blur") == "from zero"
 
 
 @pytest.mark.parametrize(

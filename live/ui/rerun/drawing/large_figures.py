@@ -12,33 +12,37 @@ from acquire.cv2_loader import load_cv2
 from acquire.text.printable import share_text
 from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
 from live.pipeline.timed.figure import BEYOND, LACKING, FigureState, TimedFigure
-from live.ui.rerun.drawing.shapes import BACKGROUND
 
 WIDTH, HEIGHT = 1600, 168
 """px of the picture; the digits are nearly half of the height."""
 
 Colour = tuple[int, int, int]  # blue, green, red
-WHITE, GREY, RED, GREEN, AMBER = (
-    (245, 240, 235),
-    (170, 160, 150),
-    (40, 30, 200),
-    (110, 220, 90),
-    (60, 190, 255),
+WHITE, GREY, RED, GREEN, AMBER, BAR = (
+    (248, 246, 244),
+    (167, 157, 147),
+    (30, 38, 179),
+    (124, 207, 62),
+    (61, 184, 245),
+    (36, 29, 23),
 )
+_LABELS = (204, 195, 185)
 _CELLS = ((14, 370), (400, 506), (920, 346), (1280, 306))  # left edge and width
 _LABEL_Y, _VALUE_Y, _LINE_Y = 28, 116, 157  # base lines
-_STATES = {"REC": RED, "ARMED": AMBER, "NOT RECORDING": AMBER, "REPLAY": GREY}
+_BEYOND = (106, 110, 255)  # red on the dark ground
+_STATES = {"REC": _BEYOND, "ARMED": AMBER, "NOT RECORDING": AMBER, "REPLAY": GREY}
 
 
 def paint(snapshot: Snapshot) -> NDArray[np.uint8]:
     """(HEIGHT, WIDTH, 3) uint8, blue, green, red."""
     alarmed = bool(snapshot.troubles)
     picture = np.empty((HEIGHT, WIDTH, 3), np.uint8)
-    picture[:] = RED if alarmed else BACKGROUND[::-1]
-    labels = WHITE if alarmed else GREY
+    picture[:] = RED if alarmed else BAR
+    labels = WHITE if alarmed else _LABELS
     for (x, width), (label, value, colour) in zip(_CELLS, _cells(snapshot), strict=True):
         _write(picture, label, (x, _LABEL_Y), 24, width, labels)
-        _write(picture, value, (x, _VALUE_Y), 76, width, WHITE if alarmed else colour)
+        is_thin = colour == GREY and value != "-"
+        shown = (_LABELS if is_thin else WHITE) if alarmed else colour
+        _write(picture, value, (x, _VALUE_Y), 76, width, shown, is_thin=is_thin)
     _write(picture, _line(snapshot), (14, _LINE_Y), 29, WIDTH - 28, labels)
     return picture
 
@@ -56,14 +60,14 @@ def _cells(s: Snapshot) -> tuple[tuple[str, str, Colour], ...]:
 
 
 def _cell(label: str, figure: TimedFigure, factor: float, form: str) -> tuple[str, str, Colour]:
-    """Label and value; without a value what is there instead, and in the label the last one with its age."""
+    """Label and value; without a value what is there instead: the last one in grey, with its age in the label."""
     if figure.known:
         return label, format(figure.value * factor, form).replace(",", " "), WHITE
     if figure.state in BEYOND:
-        return label, figure.state.upper(), RED
+        return label, figure.state.upper(), _BEYOND
     if figure.state in LACKING and figure.last == figure.last:
         last = format(figure.last * factor, form).replace(",", " ")
-        return f"{label.split()[-1]}  {last}, {figure.age:.0f} s ago", "-", GREY
+        return f"{label.split()[0]} {label.split()[-1]}  {figure.age:.0f} s old", last, GREY
     return label if figure.state is FigureState.NONE else f"{label}  {figure.state}", "-", GREY
 
 
@@ -81,14 +85,21 @@ def _line(s: Snapshot) -> str:
 
 
 def _write(
-    picture: NDArray[Any], text: str, at: tuple[int, int], height: int, width: int, colour: Colour
+    picture: NDArray[Any],
+    text: str,
+    at: tuple[int, int],
+    height: int,
+    width: int,
+    colour: Colour,
+    *,
+    is_thin: bool = False,
 ) -> None:
     """Write text of ``height`` px on a base line, smaller where it would be wider than ``width``."""
     cv2 = load_cv2()
-    font, thick = cv2.FONT_HERSHEY_SIMPLEX, max(2, height // 12)
+    font, thick = cv2.FONT_HERSHEY_SIMPLEX, 1 if is_thin else max(2, height // 12)
     text = text.replace("µ", "u").encode("ascii", "replace").decode()
     scale = cv2.getFontScaleFromHeight(font, height, thick)
     (wide, _), _ = cv2.getTextSize(text, font, scale, thick)
     if wide > width:
-        scale, thick = scale * width / wide, max(2, int(thick * width / wide))
+        scale, thick = scale * width / wide, 1 if is_thin else max(2, int(thick * width / wide))
     cv2.putText(picture, text, at, font, scale, colour, thick, cv2.LINE_AA)

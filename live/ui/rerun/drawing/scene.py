@@ -16,7 +16,7 @@ from acquire.events import Event, EventKind
 from analysis.field import Status
 from live.pipeline.queues import Thinned
 from live.pipeline.snapshot import Snapshot
-from live.results.maps.colours import number, ramp
+from live.results.maps.colours import LINES, LINES_ON_DARK, number
 from live.results.maps.field_maps import FieldMaps, Painted
 from live.results.maps.scale import AutoRange, ColourScale, range_kind
 from live.ui.rerun.drawing.curve import MAX_POINTS, CurveDrawing
@@ -53,9 +53,9 @@ from live.ui.rerun.messages import MAPS, STRAINS, PictureMessage, Row, ViewSetup
 if TYPE_CHECKING:
     from analysis.field import StrainField, ZoiGrid
 
-COLOURS = {"exx": (255, 107, 107), "eyy": (81, 207, 102), "exy": (116, 163, 255)}
-GAUGES = ((255, 0, 255), (64, 224, 255), (255, 212, 59), (81, 207, 102), (255, 107, 107), (116, 163, 255))
-RED, GAUGE, GAUGE_NAME = (255, 90, 60), (255, 0, 255), (255, 200, 255)
+ON_PICTURE, ON_DARK = ([tuple(bytes.fromhex(c[1:])) for c in one] for one in (LINES, LINES_ON_DARK))
+COLOURS = dict(zip(STRAINS, ON_DARK, strict=False))
+RED, WHITE = (255, 90, 60), (255, 255, 255)
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 _RAMP = (8, 256)
 _MAX_STRAINS, _MAX_FORCES = 5000, 10_000
@@ -79,8 +79,8 @@ class ViewScene:
     def __init__(self, sinks: Sequence[RerunSink], setup: ViewSetup) -> None:
         self._sinks, self._setup = sinks, setup
         self._due: Sequence[RerunSink] = sinks
-        symmetric = setup.scale == "symmetric"
-        self._maps = FieldMaps(setup.axis, setup.strain_range, about_zero=symmetric, alpha=_ALPHA)
+        is_symmetric = setup.scale == "symmetric"
+        self._maps = FieldMaps(setup.axis, setup.strain_range, is_symmetric=is_symmetric, alpha=_ALPHA)
         self._drawn: dict[str, object] = {}
         self._curve: Thinned[Row] = Thinned(MAX_POINTS)
         self._drawn_curve = CurveDrawing(self._log_due, self._log, setup)
@@ -94,14 +94,12 @@ class ViewScene:
         import rerun as rr
 
         self._at(self._setup.start_monotonic)
-        for name in (*MAPS, *self._setup.whole):
-            if name != "status":
-                self._bar(name)
         for name in STRAINS:
             style = rr.Measurements.from_fields(names=name, colors=COLOURS[name], widths=2.0)
             self._log(f"strain/{name}", style, static=True)
         for k, name in enumerate(self._setup.gauges):
-            style = rr.Measurements.from_fields(names=name, colors=GAUGES[k % len(GAUGES)], widths=2.0)
+            colour = ON_DARK[self._setup.colours.get(name, k) % len(ON_DARK)]
+            style = rr.Measurements.from_fields(names=name, colors=colour, widths=2.0)
             self._log(gauge_path(name), style, static=True)
         self._log("load/force", rr.SeriesLines(colors=YELLOW, names="load", widths=2.0), static=True)
         self._outlines(self._setup.grid)
@@ -165,7 +163,7 @@ class ViewScene:
             data = encode(".png", painted.rgba[..., [2, 1, 0, 3]], 1)
             picture = rr.EncodedImage(contents=data, media_type="image/png", draw_order=10)
             self._log(f"specimen/map/{name}", picture, static=True)
-            self._log(f"bar/{name}/ticks", self._ticks(painted), static=True)
+            self._bar(name, painted, is_static=True)
 
     def _outlines(self, grid: ZoiGrid) -> None:
         """Draw the outlines of gauges and ZOIs, and place the maps."""
@@ -179,10 +177,14 @@ class ViewScene:
         lines = [[np.array(line) + 0.5 for line in lines] for lines in self._setup.outlines.values()]
         strips = [strip for gauge in lines for strip in gauge]
         if strips:
-            width = rr.Radius.ui_points(2.0)
-            gauges = rr.LineStrips2D(strips, colors=GAUGE, radii=width, draw_order=50)
+            rim = rr.LineStrips2D(strips, colors=WHITE, radii=rr.Radius.ui_points(3.0), draw_order=49)
+            self._log("specimen/gauges/rim", rim, static=True)
+            places = enumerate(self._setup.outlines)
+            colours = [ON_PICTURE[self._setup.colours.get(n, k) % len(ON_PICTURE)] for k, n in places]
+            each = [c for c, gauge in zip(colours, lines, strict=True) for _ in gauge]
+            gauges = rr.LineStrips2D(strips, colors=each, radii=rr.Radius.ui_points(2.0), draw_order=50)
             self._log("specimen/gauges", gauges, static=True)
-            names = text_labels([gauge[0][0] for gauge in lines], list(self._setup.outlines), GAUGE_NAME)
+            names = text_labels([gauge[0][0] for gauge in lines], list(self._setup.outlines), WHITE)
             self._log("specimen/gauges/names", names, static=True)
         boxes = sample_boxes(grid)
         self._log(
@@ -241,7 +243,7 @@ class ViewScene:
             self._log_due(f"specimen/map/{name}", picture)
             self._count(data)
             if self._changed(f"bar/{name}", painted.scale or painted.legend):
-                self._log(f"bar/{name}/ticks", self._ticks(painted))
+                self._bar(name, painted)
 
     def _changed(self, name: str, state: object) -> bool:
         """Whether ``state`` differs from what was drawn: the memory of a server grows with everything drawn."""
@@ -255,16 +257,24 @@ class ViewScene:
         for archetype in value_dots(field):
             self._log_due(VALUES, archetype)
 
-    def _bar(self, name: str) -> None:
+    def _bar(self, name: str, painted: Painted, *, is_static: bool = False) -> None:
+        """Draw the colours of a map with their values, or the legend of statuses."""
         import rerun as rr
 
+        self._log(f"bar/{name}/ticks", self._ticks(painted), static=is_static)
+        if painted.scale is None:
+            return
+        colours = painted.scale.ramp(_RAMP[1])[::-1]
+        if painted.scale.is_diverging:
+            colours[_RAMP[1] // 2 - 1 : _RAMP[1] // 2 + 1] = 0
+        data = encode(".png", np.repeat(colours[:, None, ::-1], _RAMP[0], axis=1), 1)
+        picture = rr.EncodedImage(contents=data, media_type="image/png")
+        self._log(f"bar/{name}/ramp", picture, static=is_static)
         w, h = self._setup.width, self._setup.height
-        data = encode(".png", ramp(_RAMP[1], _RAMP[0])[..., ::-1], 1)
-        self._log(f"bar/{name}/ramp", rr.EncodedImage(contents=data, media_type="image/png"), static=True)
         unit = bar_unit(self._setup)
         scale = (BAR_WIDTH * unit / _RAMP[0], BAR_HEIGHT * h / _RAMP[1], 1.0)
         placement = rr.Transform3D(translation=(w + BAR_GAP * unit, BAR_TOP * h, 0.0), scale=scale)
-        self._log(f"bar/{name}/ramp", placement, static=True)
+        self._log(f"bar/{name}/ramp", placement, static=is_static)
 
     def _ticks(self, painted: Painted) -> Any:
         length, height = bar_unit(self._setup), self._setup.height
@@ -277,7 +287,7 @@ class ViewScene:
         y = (BAR_TOP + BAR_HEIGHT * (1 - share)) * height - LETTER * length
         points = [*([x, yk] for yk in y), [x - 0.04 * length, top - 0.09 * length]]
         values = scale.low + share * (scale.high - scale.low)
-        return text_labels(points, [*(number(float(f"{v:.6g}")) for v in values), scale.unit])
+        return text_labels(points, [*(scale.mark(float(f"{v:.6g}")) for v in values), scale.unit])
 
     # -- curves -------------------------------------------------------------------------------
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 GREY, DIM = (170, 175, 185), (62, 66, 74)
 ORANGE, CYAN, YELLOW = (255, 169, 64), (64, 224, 255), (255, 212, 59)
-BACKGROUND = (18, 20, 24)
+BACKGROUND = (23, 29, 36)
 
 Points = NDArray[np.float64]
 _DOT = (255, 255, 255, 70)

@@ -169,7 +169,7 @@ class CameraPreview:
     def _preview(self, asked: Answers) -> None:
         config = self._draft.config.camera
         if not config.address:
-            raise DataError("no camera is chosen: choose one under Devices")
+            raise DataError("no camera is chosen: choose one under Camera")
         rig = open_rig(at_rest(config.address), "none:", self._on_event, crop=config.crop)
         try:
             self._camera_opened(rig.camera)

@@ -16,6 +16,7 @@ from acquire.errors import ConfigError, DataError
 from acquire.files.picture import write_picture
 from acquire.text import Message
 from live.config.cameras import camera_configs, other_cameras
+from live.config.gauges import GaugeTable
 from live.config.loading import Config, from_dict, load_config, settings_in
 from live.config.rig_file import write_rig
 
@@ -77,8 +78,22 @@ class ConfigDraft:
         with self._lock:
             self._change_all(changes)
 
-    def _change_all(self, changes: Mapping[str, Any]) -> None:
+    def replace_gauges(
+        self, gauges: Mapping[str, GaugeTable], changes: Mapping[str, Any] | None = None
+    ) -> None:
+        """Take these gauges in place of all, in their order, and change other keys; raises as ``change_all``."""
+        with self._lock:
+            before = self._config.gauges
+            self._change_all(changes or {}, gauges)
+            self.changes |= {f"gauges.{name}": None for name in before if name not in gauges}
+            self.changes |= {
+                f"gauges.{name}": dict(table) for name, table in gauges.items() if before.get(name) != table
+            }
+
+    def _change_all(self, changes: Mapping[str, Any], gauges: Mapping[str, GaugeTable] | None = None) -> None:
         tree: dict[str, Any] = json.loads(json.dumps(self._config.as_dict()))
+        if gauges is not None:
+            tree["gauges"] = json.loads(json.dumps(dict(gauges)))
         for dotted, value in changes.items():
             section, _, key = dotted.partition(".")
             if section != "gauges" and dotted not in CHANGEABLE:
@@ -101,7 +116,7 @@ class ConfigDraft:
         with self._lock:
             if mask is not None:
                 self._change_all({"measure.mask": str(self._write_mask(mask))})
-            write_rig(self.path, self.changes)
+            write_rig(self.path, self.changes, list(self._config.gauges))
             zero = {"load.zero_N": self._config.load.zero_N}
             self._config = load_config(self.path, self._transient | zero)
             self.changes = {}

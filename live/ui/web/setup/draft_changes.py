@@ -20,6 +20,7 @@ from live.ui.web.setup.setup_session import OVERLAYS, SetupSession
 
 Request = Mapping[str, Any]
 MAX_MM = 1e5
+MIN_FPS, MAX_FPS = 0.01, 1e5
 MAX_GAUGE_POINTS = 100
 MAX_ADDRESS = 500  # letters
 
@@ -37,6 +38,11 @@ def draw(session: SetupSession, request: Request) -> None:
 def undo(session: SetupSession, request: Request) -> None:
     """Undo the last edit of the region or of the gauges."""
     session.region.undo()
+
+
+def redo(session: SetupSession, request: Request) -> None:
+    """Make the edit that was undone last again."""
+    session.region.redo()
 
 
 def find(session: SetupSession, request: Request) -> None:
@@ -70,9 +76,11 @@ def camera(session: SetupSession, request: Request) -> None:
 def option(session: SetupSession, request: Request) -> None:
     """Change the format or the rate in the address of the camera; an empty value leaves it to the camera."""
     key, value = request.get("key"), request.get("value")
-    if key not in ("format", "fps") or not isinstance(value, str) or len(value) > 40:
+    if key not in ("format", "fps") or not isinstance(value, str | int | float) or len(str(value)) > 40:
         raise ConfigError("the options of a camera are format and fps")
-    session.preview.reopen(with_setting(session.draft.config.camera.address, key, value.strip()))
+    if key == "fps" and value != "":
+        value = f"{_number(Message('a rate in 1/s'), value, MIN_FPS, MAX_FPS):.12g}"
+    session.preview.reopen(with_setting(session.draft.config.camera.address, key, str(value).strip()))
 
 
 def address(session: SetupSession, request: Request) -> None:
@@ -142,12 +150,13 @@ def gauge(session: SetupSession, request: Request) -> None:
         name = name or _free_name(GAUGE_KINDS[kind].default_name, gauges)
     if not isinstance(name, str) or not isinstance(table, dict | None):
         raise ConfigError("a gauge has a name and a table")
-    changes: dict[str, Any] = {}
-    if before and was != name:
-        if name in gauges:
-            raise ConfigError("there is already a gauge {name}", name)
-        changes[f"gauges.{was}"] = None
-    session.region.set_gauges(changes | {f"gauges.{name}": table})
+    if table is not None and "colour" in before:
+        table = {"colour": before["colour"], **table}
+    if before and was != name and name in gauges:
+        raise ConfigError("there is already a gauge {name}", name)
+    renamed = {name if before and key == was else key: known for key, known in gauges.items()}
+    tables = {**renamed, name: table}
+    session.region.set_gauges({key: known for key, known in tables.items() if known is not None})
 
 
 def _parameters_at(kind: object, points: object) -> dict[str, Any]:
@@ -217,6 +226,7 @@ def reset_peak(session: SetupSession, request: Request) -> None:
 CHANGES: dict[str, Callable[[SetupSession, Request], None]] = {
     "draw": draw,
     "undo": undo,
+    "redo": redo,
     "find": find,
     "all": whole_picture,
     "overlay": overlay,

@@ -127,6 +127,7 @@ class DrawnRegion:
 
     def __init__(self, mask: Bools, origin: str) -> None:
         self._masks: list[tuple[Bools, str]] = [(mask, origin)]
+        self._undone: list[tuple[Bools, str]] = []
 
     @property
     def mask(self) -> Bools:
@@ -163,9 +164,14 @@ class DrawnRegion:
     def replace(self, mask: Bools, origin: str) -> None:
         """Replace the mask by another of the same size."""
         kept = self._masks[-MAX_UNDO:]
-        self._masks = [*kept, (mask, origin)]
+        self._masks, self._undone = [*kept, (mask, origin)], []
 
     def undo(self) -> None:
         """Undo the last change."""
         if len(self._masks) > 1:
-            self._masks.pop()
+            self._undone.append(self._masks.pop())
+
+    def redo(self) -> None:
+        """Make the change that was undone last again."""
+        if self._undone:
+            self._masks.append(self._undone.pop())

@@ -148,7 +148,7 @@ class LoadPreview:
         elif self._recorded:
             yield CheckLine("load cell", "recorded, with the pictures or for itself", measured=False)
         elif self.trouble:
-            yield CheckLine("load cell", self.trouble, False, "choose the load cell under Devices")
+            yield CheckLine("load cell", self.trouble, False, "choose the load cell under Camera")
         elif found is None:
             yield CheckLine("load cell", "not open yet", False, "wait for the force, then check again")
 

@@ -159,9 +159,11 @@ class SetupSession:
             "overlays": self.overlays,
             "region": region,
             "gauges": gauge_shapes(config),
+            "can": self.region.can,
             "plates": plate_shapes(config),
             "measure": {"zoi": m.zoi, "step": m.step, "burst": m.burst or DEFAULT_BURST},
-            "specimen": {key: getattr(specimen, key) for key in SPECIMEN_KEYS},
+            "specimen": {key: getattr(specimen, key) for key in SPECIMEN_KEYS}
+            | {"area_mm2": None if specimen.area_m2 is None else specimen.area_m2 * 1e6},
             "metadata": dict(self.shared.config.metadata),
             "scale": {"px_per_mm": config.scale.px_per_mm, "sigma": config.scale.sigma_mm_per_px},
             "unsaved": sorted(self.draft.changes),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import write_picture
 from acquire.frame import CameraInfo
-from live.config.gauges import GaugeTable, gauges_for
+from live.config.gauges import GaugeTable, gauges_for, with_colours
 from live.config.loading import Config
 from live.config.values import AUTO, GIVEN
 from live.setup.grid import grid_for
@@ -54,6 +54,7 @@ class SpecimenRegion:
         self.edition = 0
         # What each edit has replaced: the gauges, or None for the mask, which ``drawn`` keeps.
         self._edits: deque[Mapping[str, GaugeTable] | None] = deque(maxlen=MAX_UNDO)
+        self._undone: list[Mapping[str, GaugeTable] | None] = []
 
     def changed(self) -> None:
         """Discard the results of the former region."""
@@ -72,6 +73,7 @@ class SpecimenRegion:
         if self.drawn is not None and self.drawn.mask.shape != (info.height, info.width):
             self.drawn = None
             self._edits.clear()
+            self._undone.clear()
 
     # -- edits ----------------------------------------------------------------------------------
 
@@ -85,26 +87,48 @@ class SpecimenRegion:
         self.known.replace(mask, origin)
         self._edited_mask()
 
-    def set_gauges(self, changes: Mapping[str, Any]) -> None:
-        """Change gauges, by their keys ``gauges.NAME``; raises ConfigError and changes nothing where one is invalid."""
-        before = dict(self._draft.config.gauges)
-        self._draft.change_all(changes)
+    def set_gauges(self, gauges: Mapping[str, GaugeTable], changes: Mapping[str, Any] | None = None) -> None:
+        """Take these gauges in place of all, and ``changes`` of other keys; each keeps its colour.
+
+        Raises ConfigError and changes nothing where one is invalid.
+        """
+        before = self._draft.config.gauges
+        self._draft.replace_gauges(with_colours(gauges), changes or {})
         self._edits.append(before)
+        self._undone.clear()
+
+    @property
+    def can(self) -> list[str]:
+        """Which of "undo" and "redo" has something to do."""
+        return ["undo"] * bool(self._edits) + ["redo"] * bool(self._undone)
 
     def undo(self) -> None:
         """Undo the last edit of the mask or of the gauges; raises ConfigError without one."""
         if not self._edits:
             raise ConfigError("there is nothing to undo")
-        before = self._edits.pop()
-        if before is None:
-            self.known.undo()
+        self._undone.append(self._turned(self._edits.pop(), DrawnRegion.undo))
+
+    def redo(self) -> None:
+        """Make the edit that was undone last again; raises ConfigError without one."""
+        if not self._undone:
+            raise ConfigError("there is nothing to make again")
+        self._edits.append(self._turned(self._undone.pop(), DrawnRegion.redo))
+
+    def _turned(
+        self, gauges: Mapping[str, GaugeTable] | None, turn: Callable[[DrawnRegion], None]
+    ) -> Mapping[str, GaugeTable] | None:
+        """Take these gauges, or turn the mask; what was there before, in the same form."""
+        if gauges is None:
+            turn(self.known)
             self.changed()
-            return
-        removed: dict[str, Any] = {f"gauges.{name}": None for name in self._draft.config.gauges}
-        self._draft.change_all(removed | {f"gauges.{name}": dict(table) for name, table in before.items()})
+            return None
+        before = self._draft.config.gauges
+        self._draft.replace_gauges(gauges)
+        return before
 
     def _edited_mask(self) -> None:
         self._edits.append(None)
+        self._undone.clear()
         self.changed()
 
     # -- found in the picture ---------------------------------------------------------------------
@@ -150,9 +174,10 @@ class SpecimenRegion:
         height, width = drawn.mask.shape
         box = replace(config, measure=replace(config.measure, roi=roi, mask=None))
         placed = auto_gauges(grid_for(box, width, height, drawn.mask), config.specimen.first_axis)
-        self.set_gauges(
-            {f"gauges.{name}": table for name, table in placed.items()} | {"measure.gauges": GIVEN}
-        )
+        known = config.gauges
+        kept = {name: {"colour": known[name].get("colour")} for name in placed if name in known}
+        tables = {name: {**kept.get(name, {}), **table} for name, table in placed.items()}
+        self.set_gauges({**known, **tables}, {"measure.gauges": GIVEN})
 
     # -- for the check, the test and the rig file ---------------------------------------------------
 

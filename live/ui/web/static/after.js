@@ -1,74 +1,117 @@
-// After a test: warnings first, then the figures, the curve with its lines, the map at the highest force, the report.
+// After a test: whether the figures can be believed, the figures, the curve with its lines, the map, the report.
 import { $, el, fill, put } from "./base.js";
 import { finishCurve, updateCurves } from "./curves.js";
 import { drawGauges } from "./draw.js";
-import { quantity, short, strainText, strainUnit } from "./numbers.js";
+import { icon, key, putIcon } from "./icons.js";
+import { setRatio, showLegend } from "./legend.js";
+import { quantity, strainText, time } from "./numbers.js";
 import { t } from "./words.js";
 
-let result = null;
+let result = null, chosen = { side: 0, time: "peak" };
 for (const kind of ["unit", "language"]) addEventListener(kind, () => { if (result) show(); });
 
 export async function showAfter(value) {
   result = value;
   show();
-  if (value.points) await updateCurves(value.points);
+  if (value.points) await updateCurves(value.points, true);
   finishCurve(value.lines ?? []);
 }
 
 function show() {
-  put($("ended"), t(result.words));
-  fill($("troubles"), result.troubles, (text) => el("li", { text: t(text) }));
-  document.querySelector(".warnings").hidden = !result.words && !result.troubles.length;
-  fill($("results"), [{ head: ["figure", "value", "interval"] }, ...result.figures], row);
-  fill($("gaugeresults"), result.gauges.length ? [{ head: ["gauge", result.atpeak, ""] }, ...result.gauges] : [], gaugeRow);
+  showBelief(result);
+  const heads = result.figures.filter((one) => one.head), others = result.figures.filter((one) => !one.head);
+  fill($("tiles"), heads, tile);
+  fill($("results"), others.filter((one) => one.text != null), row);
+  showFold("unknown", others.filter((one) => one.text == null), unknown, `${t("Figures that are not known")}: `);
+  showFold("gauge", result.gauges.map((one, k) => ({ k, ...one })), gauge, `${t("Gauges")}, ${t(result.atpeak ?? "")}: `);
   put($("folder"), result.folder);
   put($("ledger"), t(result.ledger));
   put($("next"), result.next ?? "");
   put($("again"), result.again ?? "");
   finishCurve(result.lines ?? []);
-  showPeak(result, result.side ?? "", document.querySelector(".peak"), "");
-  showPeak(result.second ?? {}, result.second?.side ?? "", document.querySelector(".peak.second"), "2");
-  document.body.classList.toggle("two", Boolean(result.second));
+  showMaps();
   showReport(result.report);
 }
 
-const heads = (head) => el("tr", {}, ...head.map((text) => el("th", { text: t(text), scope: "col" })));
+function showBelief({ belief, words, troubles }) {
+  const kind = words ? "bad" : (belief?.kind ?? "look");
+  $("belief").className = `band ${kind}`;
+  putIcon(document.querySelector("#belief .lamp"), { good: "check", look: "warn", bad: "error" }[kind]);
+  put($("believed"), t(words || belief?.words));
+  put($("ended"), [words && belief ? belief.words : "", troubles[0] ?? belief?.more ?? ""].map((one) => t(one)).filter(Boolean).join(" "));
+  $("troublefold").hidden = !troubles.length;
+  put($("troublecount"), String(troubles.length));
+  fill($("troubles"), troubles, (text) => el("li", { text: t(text) }));
+}
 
-// One line for a figure: its name, its value with unit, its interval; or why it is not known.
+const nameOf = (one) => `${typeof one.name === "string" && !one.name.includes(" ") ? one.name : t(one.name)}${one.side ? `, ${t(one.side)}` : ""}`;
+
+// Value, uncertainty and unit of a figure: a quantity, or a text as it is.
+function parts(one) {
+  if (typeof one.text === "string" || one.text?.say != null) return { value: t(one.text), sigma: "", unit: "" };
+  const found = quantity(one.text);
+  return one.bound ? { ...found, value: `${t("at least")} ${found.value}` } : found;
+}
+
+function tile(one) {
+  const isKnown = one.text != null, { value, sigma, unit } = isKnown ? parts(one) : { value: "–", sigma: "", unit: "" }, says = isKnown ? one.remark : one.why;
+  const reason = says ? [el("p", { class: `says ${isKnown ? "look" : ""}` }, icon(isKnown ? "warn" : "info"), el("span", { text: t(says), title: t(says) }))] : [];
+  const interval = sigma ? [el("span", { text: "95 %" }), el("span", { class: "num" }, "± ", el("b", { text: sigma }))] : [];
+  return el("section", { class: `tile ${isKnown ? (says ? "look" : "") : "stale"}`.trim() }, el("h3", { text: nameOf(one) }), el("span", { class: "age" }),
+    el("p", { class: "value" }, el("span", { class: "figure num", text: value }), el("span", { text: unit })), el("p", { class: "sigma" }, ...interval), ...reason);
+}
+
 function row(one) {
-  if (one.head) return heads(one.head);
-  const name = el("th", { text: ofSide(one.name.includes(" ") ? t(one.name) : one.name, one), scope: "row" });
-  if (one.text == null) return el("tr", { class: "unknown" }, name, el("td", { text: t(one.why), title: t(one.why), colSpan: 2 }));
-  if (one.words) return el("tr", {}, name, el("td", { class: "words", text: t(one.text), colSpan: 2 }));
-  const remark = one.remark ? [el("span", { class: "words", text: ` ${t(one.remark)}` })] : [];
-  if (typeof one.text === "string") return el("tr", {}, name, el("td", { text: one.text, colSpan: 2 }, ...remark));
-  const { value, sigma, unit } = quantity(one.text), least = one.bound ? `${t("at least")} ` : "";
-  return el("tr", {}, name, el("td", { text: `${least}${value} ${unit}` }, ...remark), el("td", { text: sigma && `± ${sigma}` }));
+  if (one.words) return el("li", { class: "row words" }, el("span", { text: nameOf(one) }), el("span", { class: "small", text: t(one.text) }));
+  const remark = one.remark ? [el("span", { class: "small", text: t(one.remark) })] : [], { value, sigma, unit } = parts(one);
+  return el("li", { class: "row" }, el("span", { text: nameOf(one) }), el("b", { class: "num" }, `${value} ${unit} `, el("small", { text: sigma && `± ${sigma}` })), ...remark);
 }
 
-const ofSide = (name, one) => (one.side ? `${name}, ${t(one.side)}` : name);
+const unknown = (one) => el("li", { class: "row words" }, el("span", { text: nameOf(one) }), el("span", { class: "small", text: t(one.why) }));
 
-function gaugeRow(one) {
-  if (one.head) return heads(one.head);
+function gauge(one) {
   const text = one.value == null ? t(one.reason || "lost") : strainText(one.value, one.sigma);
-  return el("tr", {}, el("th", { text: ofSide(one.name, one), scope: "row" }), el("td", { text, colSpan: 2 }));
+  return el("li", { class: "row" }, el("span", {}, key(one.k), " ", nameOf(one)), el("b", { class: "num", text }));
 }
 
-function showPeak({ peak, atpeak }, side, section, suffix) {
-  section.hidden = !peak;
-  if (!peak) return;
-  const of = (name) => $(name + suffix), factor = peak.strain ? strainUnit().factor : 1, unit = peak.strain ? strainUnit().name : peak.unit;
-  put(of("peakwords"), `${side ? `${t(side)}: ` : ""}${t(peak.of)}, ${t(atpeak)}`);
-  if (!of("peakmap").src.endsWith(peak.picture)) of("peakmap").src = peak.picture;
-  drawGauges(of("peakgauges"), peak.gauges, peak.width, peak.height);
-  put(of("peakscale"), peak.high == null ? "" : `${short(peak.low * factor)} … ${short(peak.high * factor)} ${unit}`);
+function showFold(name, list, make, words) {
+  $(`${name}fold`).hidden = !list.length;
+  put($(`${name}count`), `${words}${list.length}`);
+  fill($(name === "gauge" ? "gaugeresults" : name), list, make);
+}
+
+// The map at the highest force or in the last picture, of the camera that is chosen.
+function showMaps() {
+  const sides = result.second ? [result, result.second] : [result], side = sides[chosen.side] ?? result;
+  choices($("peakside"), sides.length > 1 ? sides.map((one, k) => [k, t(one.side)]) : [], chosen.side, (k) => { chosen.side = k; });
+  const times = [["peak", result.atpeak], ["last", "last picture"]].filter(([name, words]) => side[name] && words);
+  if (!side[chosen.time]) chosen.time = "peak";
+  choices($("peaktime"), times.length > 1 ? times.map(([name, words]) => [name, t(words)]) : [], chosen.time, (name) => { chosen.time = name; });
+  const shown = side[chosen.time], shot = $("peakmap").closest(".shot");
+  shot.hidden = !shown;
+  if (!shown) return;
+  if (!$("peakmap").src.endsWith(shown.picture)) $("peakmap").src = shown.picture;
+  setRatio(shot, shown.width, shown.height);
+  drawGauges($("peakgauges"), shown.gauges, shown.width, shown.height);
+  const words = chosen.time === "peak" ? t(side.atpeak) : t("last picture"), at = shown.s == null ? "" : `${time(shown.s)}, `;
+  put($("peakwords"), `${at}${side.side ? `${t(side.side)}, ` : ""}${words}`);
+  showLegend($("peaklegend"), shown);
+}
+
+function choices(box, list, now, choose) {
+  box.hidden = !list.length;
+  fill(box, list, ([value, words]) => {
+    const button = el("button", { type: "button", class: "button" }, el("span", { text: words }));
+    button.addEventListener("click", () => { choose(value); showMaps(); });
+    return button;
+  });
+  list.forEach(([value], k) => box.children[k].setAttribute("aria-pressed", String(value === now)));
 }
 
 // The report opens in a window of its own, or the page shows why there is none.
 function showReport(report) {
-  const link = $("report"), ready = report === true, words = { wait: "The report is being made …", ready: "Open the report", none: "No report" };
-  put(link, t(report === null ? words.wait : ready ? words.ready : words.none));
-  link.setAttribute("aria-disabled", String(!ready));
-  put($("whynoreport"), typeof report === "string" ? t(report) : "");
+  const link = $("report"), isReady = report === true, words = { wait: "The report is being made …", ready: "Open the report", none: "No report" };
+  put(link.querySelector("span"), t(report === null ? words.wait : isReady ? words.ready : words.none));
+  link.setAttribute("aria-disabled", String(!isReady));
+  put($("whynoreport"), typeof report === "string" || report?.say ? t(report) : "");
 }
-

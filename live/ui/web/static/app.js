@@ -1,10 +1,12 @@
 // The page: receives the events of phasedic, shows the stage, sends commands.
 import { $, change, command, el, post, put } from "./base.js";
+import { addIcons } from "./icons.js";
 import { ask, pause } from "./press.js";
 import { language, setLanguage, t } from "./words.js";
 import { themeChanged } from "./curves.js";
-import { beginRun, showRun, showSecond } from "./run.js";
-import { beginSetup, showSetup } from "./setup.js";
+import { fixed } from "./numbers.js";
+import { beginRun, linkLost, showRun, showSecond } from "./run.js";
+import { beginSetup, openStep, sectionOf, showSetup } from "./setup.js";
 import { setupKeys } from "./drawing.js";
 import { showAfter } from "./after.js";
 
@@ -18,9 +20,12 @@ const handlers = {
     document.body.dataset.stage = value.stage;
     document.body.classList.toggle("alone", value.alone);
     for (const item of $("stages").children) {
-      item.classList.toggle("here", item.dataset.of === value.stage);
-      item.toggleAttribute("aria-current", item.dataset.of === value.stage);
+      if (item.dataset.of === value.stage) item.setAttribute("aria-current", "step");
+      else item.removeAttribute("aria-current");
     }
+    if (value.ramp) document.documentElement.style.setProperty("--seq", value.ramp.toReversed().join(", "));
+    put($("specimen"), value.what?.specimen ?? "");
+    if (value.stage !== "setup") put($("file"), value.what ? [value.what.material, sectionOf(value.what)].filter(Boolean).map((one) => `· ${one}`).join(" ") : "");
     $("failed").hidden = !value.words;
     put($("whyfailed"), t(value.words));
     if (!changed) return;
@@ -55,21 +60,25 @@ function connect() {
 }
 
 setInterval(() => {
-  document.body.classList.toggle("nolink", stage.stage !== "gone" && performance.now() - last > LOST_MS);
+  const silent = performance.now() - last, isLost = stage.stage !== "gone" && silent > LOST_MS;
+  document.body.classList.toggle("nolink", isLost);
+  put($("nolinkage"), isLost ? t("for {} s").replace("{}", fixed(silent / 1e3)) : "");
+  if (stage.stage === "run") linkLost(isLost ? silent / 1e3 : 0);
 }, 200);
 
-// One command at a time; what needs it is asked for. A tare under load is refused once, and forced when confirmed.
-let busy = false;
-async function order(button) {
-  if (busy) return;
-  busy = true;
+// One command at a time; what needs it is confirmed. A tare under load is refused once, and forced when confirmed. An
+// armed button is its own question: another press of it comes here only when that is answered.
+let busy = null;
+async function order(button, isHeld = false) {
+  if (busy && busy === button) return;
+  busy = button;
   try {
     const { line, ask: question, because, yes } = button.dataset;
-    if (question && !(await ask(question, because ?? "", yes))) return;
+    if (question && !isHeld && !(await ask(question, because ?? "", yes, button))) return;
     const { risk } = await command(line);
-    if (risk && (await ask("Tare in mid-test?", risk, "Tare"))) await command("tare force");
+    if (risk && (await ask("Tare in mid-test?", risk, "Tare", button))) await command("tare force");
   } finally {
-    busy = false;
+    if (busy === button) busy = null;
   }
 }
 
@@ -79,19 +88,25 @@ document.addEventListener("click", (event) => {
   if (button.dataset.line) order(button);
   if (button.dataset.do) change({ do: button.dataset.do });
 });
+document.addEventListener("held", (event) => { if (event.target.dataset.line) order(event.target, true); });
 
+addIcons();
 for (const button of document.querySelectorAll("[data-key]")) {
   button.append(el("kbd", { text: button.dataset.key, "aria-hidden": "true" }));
   button.setAttribute("aria-keyshortcuts", button.dataset.key);
 }
 
 document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.altKey || event.metaKey || $("ask").open) return;
+  if (event.altKey && !event.ctrlKey && /^[1-4]$/.test(event.key) && stage.stage === "setup") { event.preventDefault(); openStep(Number(event.key) - 1); return; }
+  if (event.ctrlKey || event.altKey || event.metaKey) return;
   if (event.target.closest("input:not([type=range]):not([type=checkbox]), select")) return;
   if (stage.stage === "setup" && setupKeys(event)) return;
   if (event.key === "n" && stage.stage === "run") { event.preventDefault(); $("notetext").focus(); return; }
-  const button = $(stage.stage)?.querySelector(`[data-key="${CSS.escape(event.key)}"]`);
-  if (button && !button.disabled) { event.preventDefault(); button.click(); }
+  const button = document.querySelector(`[data-part="${stage.stage}"] [data-key="${CSS.escape(event.key)}"]:not([hidden])`);
+  if (!button || button.disabled) return;
+  event.preventDefault();
+  openStep(button); // of the set-up: where the button is
+  button.click();
 });
 
 $("note").addEventListener("submit", async (event) => {

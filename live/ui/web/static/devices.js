@@ -1,5 +1,6 @@
 // Camera and load cell by hand: lists of what there is, addresses, format and rate; the live force and its zero.
 import { $, change, el, fill, put } from "./base.js";
+import { numberField, onEscape } from "./fields.js";
 import { fixed, short, withSigma } from "./numbers.js";
 import { t } from "./words.js";
 
@@ -21,10 +22,10 @@ for (const [select, kind, other] of [["cameras", "address", "cameraaddress"], ["
 }
 $("cameraform").addEventListener("submit", (event) => { event.preventDefault(); change({ do: "address", value: $("cameraaddress").value.trim() }); document.activeElement.blur(); });
 $("loadform").addEventListener("submit", (event) => { event.preventDefault(); change({ do: "load", value: $("loadaddress").value.trim() }); document.activeElement.blur(); });
+for (const input of [$("cameraaddress"), $("loadaddress")]) onEscape(input, () => input.blur());
 onChoice($("format"), (value) => change({ do: "option", key: "format", value }));
-$("rate").addEventListener("change", (event) => { change({ do: "option", key: "fps", value: event.target.value }); event.target.blur(); });
+const rate = numberField($("rate"), { unit: "1/s", onvalue: (value) => change({ do: "option", key: "fps", value: value ?? "" }) });
 $("identify").addEventListener("click", () => change({ do: "identify", port: $("loadaddress").value.split("?")[0] }));
-$("tab-devices").addEventListener("click", () => { if (!shown.cameras?.length) change({ do: "devices" }); });
 
 export function showDevices(value) {
   const { devices, load } = value;
@@ -35,7 +36,7 @@ export function showDevices(value) {
   keep($("loadaddress"), load.address);
   const query = new URLSearchParams(value.address.split("?")[1] ?? "");
   offerFormats(value.camera?.formats ?? [], value.camera?.format ?? "", query.get("format") ?? "");
-  keep($("rate"), query.get("fps") ?? "");
+  rate.show(Number(query.get("fps")) || null);
   $("rate").placeholder = short(value.camera?.fps);
   fill($("rates"), value.camera?.rates ?? [], (rate) => el("option", { value: rate }));
   fill($("camerawarnings"), value.camera?.warnings ?? [], (text) => el("li", { text: t(text) }));
@@ -45,12 +46,14 @@ export function showDevices(value) {
 
 function showLoad(load) {
   const none = load.address === "none:", [force, noise] = withSigma(load.force_N, load.noise_N, { factor: 1, digits: 1 });
-  put($("setupforce"), none ? t("none") : load.force_N == null ? "–" : `${force} N`);
-  put($("forcenoise"), none || load.noise_N == null ? "–" : `${noise || fixed(load.noise_N, 1)} N`);
+  put($("setupforce"), none ? t("none") : load.force_N == null ? "–" : force);
+  put($("forcenoise"), none || load.noise_N == null ? "" : `± ${noise || fixed(load.noise_N, 1)} N`);
+  put($("forcerate"), load.rate == null ? "" : `${fixed(load.rate)} 1/s`);
   put($("loadtrouble"), t(load.trouble));
-  put($("loadname"), none ? t("no load cell: no force, no stress, no modulus") : load.rate == null ? t(load.name) : `${t(load.name)}, ${load.rate.toPrecision(3)} 1/s`);
+  put($("loadname"), none ? t("no load cell: no force, no stress, no modulus") : load.rate == null ? t(load.name) : `${t(load.name)}, ${fixed(load.rate)} 1/s`);
   put($("zero"), load.zero_N ? `${t("zero")} ${fixed(load.zero_N, 1)} N` : "");
-  $("setupforce").classList.toggle("bad", Boolean(load.trouble));
+  $("setupforcetile").classList.toggle("stale", Boolean(load.trouble));
+  $("setupforce").nextElementSibling.hidden = none;
 }
 
 function keep(input, value) {

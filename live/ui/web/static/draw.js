@@ -38,8 +38,8 @@ export function drawGauges(svg, gauges, width, height, handles) {
   const size = Math.max(width, height) / 38, focused = document.activeElement?.dataset?.handle;
   const all = Object.entries(gauges), places = namePlaces(all, size, width, height), parts = [], names = [], dots = [];
   all.forEach(([name, gauge], k) => {
-    const colour = colourOf(k), [x, y] = places[k];
-    const text = make("text", { class: "gaugename", x, y, "font-size": size, fill: inkOf(k) });
+    const index = gauge.colour ?? k, colour = colourOf(index), [x, y] = places[k];
+    const text = make("text", { class: "gaugename", x, y, "font-size": size, fill: inkOf(index) });
     text.textContent = name;
     parts.push(...outline(gauge, colour));
     names.push(text);
@@ -71,8 +71,14 @@ export function showCross(svg, at) {
   svg.append(make("path", { class: "cross", d: `M${x - r} ${y}h${2 * r}M${x} ${y - r}v${2 * r}` }));
 }
 
-// The wheel zooms a picture about the pointer, + and - about the place that the keyboard has; a double click shows
-// all of it again.
+// The wheel zooms a picture about the pointer, a trackpad by as much as it is moved, + and - about the place that the
+// keyboard has; a double click shows all of it again.
+const NOTCH_PX = 100, PINCH_PX = 10, LINE_PX = 33;
+function wheelFactor({ deltaY, deltaMode, ctrlKey }) {
+  const moved = (deltaY * (deltaMode ? LINE_PX : 1)) / (ctrlKey ? PINCH_PX : NOTCH_PX);
+  return 0.8 ** Math.min(Math.max(moved, -1), 1);
+}
+
 export function zoomable(content, place) {
   const frame = content.parentElement, svg = content.querySelector("svg");
   let scale = 1, x = 0, y = 0;
@@ -86,9 +92,11 @@ export function zoomable(content, place) {
     scale = next;
     show();
   };
+  svg.addEventListener("fit", reset);
   frame.addEventListener("wheel", (event) => {
+    if (Math.abs(event.deltaY) <= Math.abs(event.deltaX)) return;
     event.preventDefault();
-    zoom(event.deltaY < 0 ? 1.25 : 0.8, event.clientX, event.clientY);
+    zoom(wheelFactor(event), event.clientX, event.clientY);
   }, { passive: false });
   svg.addEventListener("keydown", (event) => {
     const factor = { "+": 1.25, "=": 1.25, "-": 0.8 }[event.key];

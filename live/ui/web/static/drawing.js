@@ -1,12 +1,14 @@
-// Drawing on the picture during set-up: region, gauges and scale, with the mouse or the keyboard. The keyboard moves a
-// cross; Space presses and releases there what the mouse would.
+// Drawing on the picture during set-up: region, gauges and scale, with mouse, touch or keyboard. The keyboard moves a
+// cross; Space presses and releases there what the mouse would. A stroke that is short on the screen changes nothing,
+// nor does one to which a second pointer comes.
 import { $, change, el, put } from "./base.js";
 import { ask } from "./press.js";
 import { drawGauges, make, moved, position, showCross, zoomable } from "./draw.js";
+import { numberField, onEscape } from "./fields.js";
 import { t } from "./words.js";
 
-const svg = $("drawing");
-let state = {}, tool = "rectangle", points = [], drag = null, pending = null, kinds = {}, cross = null;
+const svg = $("drawing"), LEAST_PX = 12, REACH_PX = 22, pointers = new Set();
+let state = {}, tool = "move", points = [], drag = null, pending = null, kinds = {}, cross = null;
 
 const HINTS = {
   rectangle: "Drag a rectangle over the specimen; with Shift it is added.",
@@ -15,6 +17,7 @@ const HINTS = {
   eraser: "Paint what is not measured.",
   move: "Drag the handles; with the keyboard Tab and the arrows.",
   scale: "Click two points whose distance is known.",
+  short: "Too short a stroke: nothing has changed.",
   board: "Hold the board where the specimen will be. Of a checkerboard count the inner corners, of a ChArUco board the squares.",
   keys: "Arrows move the cross, with Shift by 10 px; Space sets a point or begins and ends a stroke; + and - zoom.",
 };
@@ -48,8 +51,15 @@ export function forgetDrawing() {
   sketch();
 }
 
+function cancel() {
+  if (drag && !drag.isClick) points = [];
+  drag = pending = null;
+  sketch();
+}
+
 // A button for each kind of gauge; the first ones have the keys 5 to 8.
 export function beginDrawing(stage) {
+  choose("move");
   kinds = Object.fromEntries(stage.kinds.map((one) => [one.kind, one]));
   $("kinds").replaceChildren(...stage.kinds.map((one, i) => {
     const button = el("button", { type: "button" }, el("span", { t: one.label }));
@@ -73,38 +83,48 @@ $("place").addEventListener("click", async () => {
 // -- the mouse ---------------------------------------------------------------------------------
 
 svg.addEventListener("pointerdown", (event) => {
+  pointers.add(event.pointerId);
+  if (pointers.size > 1) { cancel(); return; }
   if (event.button !== 0 || !state.camera) return;
-  const handle = event.target.dataset?.handle;
+  const at = position(svg, event), handle = tool === "move" ? nearest(at) : tool in kinds && event.target.dataset?.handle?.split(" ");
   cross = null;
-  if (handle && (tool === "move" || tool in kinds)) {
-    const [name, index] = handle.split(" ");
-    drag = { name, index: Number(index) };
+  if (handle) {
+    const [name, index] = handle;
+    drag = { name, index: Number(index), path: [at] };
     pending = state.gauges[name];
   } else {
-    press(position(svg, event));
+    press(at);
   }
   if (drag) svg.setPointerCapture(event.pointerId);
   sketch();
 });
+for (const kind of ["pointerup", "pointercancel"]) addEventListener(kind, (event) => { pointers.delete(event.pointerId); });
+svg.addEventListener("pointercancel", cancel);
+
+// The handle for a finger, which has 44 px of the screen around it; undefined where there is none.
+function nearest(at) {
+  const all = Object.entries(state.gauges ?? {}).flatMap(([name, one]) => one.handles.map((p, index) => [name, index, Math.hypot(p[0] - at[0], p[1] - at[1]) * perPx()]));
+  return all.filter((one) => one[2] <= REACH_PX).toSorted((a, b) => a[2] - b[2])[0];
+}
 
 function press(at) {
-  if (tool === "polygon" || isClicked() || tool === "scale") {
-    points.push(at);
-    if (isClicked() || (tool === "scale" && points.length === 2)) finish(false);
-  } else if (tool !== "move") {
-    points = [at];
-    drag = { tool };
-  }
+  if (tool === "move") return;
+  hint(words());
+  const isClick = tool === "polygon" || isClicked() || tool === "scale";
+  drag = { path: [at], isClick };
+  if (!isClick) points = [at];
 }
 
 svg.addEventListener("pointermove", (event) => {
-  if (!drag) return;
+  if (!drag || pointers.size > 1) return;
   const moves = event.getCoalescedEvents?.() ?? [];
   for (const one of moves.length ? moves : [event]) dragTo(position(svg, one));
   sketch();
 });
 
 function dragTo(at) {
+  drag.path.push(at);
+  if (drag.isClick) return;
   if (drag.name) {
     pending = { ...pending, handles: pending.handles.map((p, i) => (i === drag.index ? at : p)) };
   } else if (isDragged()) {
@@ -118,9 +138,16 @@ svg.addEventListener("pointerup", (event) => { if (drag) release(position(svg, e
 
 function release(at, add) {
   dragTo(at);
-  const was = drag;
+  const was = drag, path = isDragged() && !was.name ? [was.path[0], at] : was.path;
   drag = null;
-  if (was.name) {
+  if (was.isClick) {
+    if (!isLong(path)) points.push(was.path[0]);
+    if (points.length && (isClicked() || (tool === "scale" && points.length === 2))) finish(false);
+  } else if (!isLong(path) || (tool === "rectangle" && !was.name && isThin(path))) {
+    points = [];
+    pending = null;
+    hint(HINTS.short);
+  } else if (was.name) {
     change({ do: "gauge", name: was.name, points: pending.handles });
     state.gauges[was.name] = pending;
     pending = null;
@@ -129,6 +156,11 @@ function release(at, add) {
   }
   sketch();
 }
+
+// On the screen, wherever the picture is zoomed to.
+const perPx = () => svg.getScreenCTM().a;
+const isLong = (path) => path.some((p) => Math.hypot(p[0] - path[0][0], p[1] - path[0][1]) * perPx() >= LEAST_PX);
+const isThin = ([a, b]) => Math.min(Math.abs(b[0] - a[0]), Math.abs(b[1] - a[1])) * perPx() < LEAST_PX;
 svg.addEventListener("dblclick", () => { if (tool === "polygon") { points.pop(); finish(false); } });
 
 function finish(add) {
@@ -136,7 +168,7 @@ function finish(add) {
   points = [];
   if (tool in kinds) newGauge(drawn);
   else if (tool === "scale") askLength(drawn);
-  else if (tool !== "polygon" || drawn.length > 2) change({ do: "draw", strokes: strokes(drawn, add) });
+  else if (tool !== "polygon" || (drawn.length > 2 && isLong(drawn))) change({ do: "draw", strokes: strokes(drawn, add) });
   sketch();
 }
 
@@ -147,30 +179,50 @@ function strokes(drawn, add) {
   return found;
 }
 
-const isShort = (drawn) => drawn.length < 2 || Math.hypot(drawn[1][0] - drawn[0][0], drawn[1][1] - drawn[0][1]) < 3;
+const newGauge = (drawn) => change({ do: "gauge", kind: tool, points: drawn });
 
-function newGauge(drawn) {
-  if (isClicked() || !isShort(drawn)) change({ do: "gauge", kind: tool, points: drawn });
-}
+// Keys of other programs for Undo and Redo.
+document.addEventListener("keydown", (event) => {
+  const isTyped = event.target.closest?.("input:not([type=range]), select, textarea");
+  if (!(event.ctrlKey || event.metaKey) || event.altKey || isTyped || document.body.dataset.stage !== "setup") return;
+  const what = { z: event.shiftKey ? "redo" : "undo", y: "redo" }[event.key.toLowerCase()];
+  if (!what) return;
+  event.preventDefault();
+  if (!event.repeat) change({ do: what });
+});
 
 // -- the scale ---------------------------------------------------------------------------------
 
 let scaled = null, asking = false;
 function askLength(drawn) {
-  if (isShort(drawn)) return;
+  if (!isLong(drawn)) { hint(HINTS.short); return; }
   scaled = drawn;
   asking = false;
-  const input = el("input", { type: "number", min: "0", step: "any", required: true, placeholder: "mm", "aria-label": t("Length in mm") });
-  const form = el("form", {}, input, el("button", { t: "Apply" }));
-  form.addEventListener("submit", async (event) => {
-    event.preventDefault();
-    await change({ do: "scale", points: scaled, mm: Number(input.value) });
-    scaled = null;
-    sketch();
-    showScale();
+  const input = el("input", { "aria-label": t("Length in mm") }), label = el("label", {}, el("span", { t: "Length, mm" }), input);
+  const length = numberField(input, { unit: "mm", isRequired: true });
+  showForm([label], async () => {
+    const mm = length.read();
+    if (mm != null && !(await change({ do: "scale", points: scaled, mm })).refused) closeForm();
   });
+}
+
+// A form with Apply and Cancel; Escape cancels it.
+function showForm(fields, apply) {
+  const no = el("button", { type: "button", class: "button", t: "Cancel" });
+  const form = el("form", {}, ...fields, el("button", { class: "button", t: "Apply" }), no);
+  form.addEventListener("submit", (event) => { event.preventDefault(); apply(); });
+  no.addEventListener("click", closeForm);
+  onEscape(form, closeForm);
   $("scale").replaceChildren(form);
-  input.focus();
+  form.querySelector("input").focus();
+}
+
+function closeForm() {
+  scaled = null;
+  asking = false;
+  if ($("scale").contains(document.activeElement)) svg.focus({ preventScroll: true });
+  showScale();
+  sketch();
 }
 
 // A calibration board is found in the picture: only its dimensions are needed.
@@ -179,22 +231,18 @@ $("board").addEventListener("click", () => {
   asking = true;
   scaled = null;
   hint(HINTS.board);
-  const inputs = Object.entries(BOARD).map(([key, words]) => {
-    const whole = key === "columns" || key === "rows";
-    return labelled(el("input", { name: key, type: "number", min: whole ? "3" : "0", step: whole ? "1" : "any", required: key !== "marker" }), words);
+  const numbers = {}, fields = Object.entries(BOARD).map(([name, words]) => {
+    const isWhole = name === "columns" || name === "rows", input = el("input", { name }), label = labelled(input, words);
+    numbers[name] = numberField(input, { unit: isWhole ? "" : "mm", isWhole, isRequired: name !== "marker" });
+    return label;
   });
   const last = el("input", { name: "dictionary", type: "text", value: "4X4_50", maxLength: 39 });
-  const form = el("form", {}, ...inputs, labelled(last, "Dictionary of the markers"), el("button", { t: "Apply" }));
-  form.addEventListener("submit", async (event) => {
-    event.preventDefault();
-    const request = { do: "board", dictionary: last.value };
-    for (const key of Object.keys(BOARD)) request[key] = form.elements[key].value === "" ? 0 : Number(form.elements[key].value);
-    if ((await change(request)).refused) return;
-    asking = false;
-    showScale();
+  showForm([...fields, labelled(last, "Dictionary of the markers")], async () => {
+    const read = Object.entries(numbers).map(([name, one]) => [name, one.read()]);
+    if (read.some(([name, value]) => value == null && (name !== "marker" || fields[3].matches(".wrong")))) return;
+    const request = { do: "board", dictionary: last.value, ...Object.fromEntries(read.map(([name, value]) => [name, value ?? 0])) };
+    if (!(await change(request)).refused) closeForm();
   });
-  $("scale").replaceChildren(form);
-  inputs[0].querySelector("input").focus();
 });
 
 const labelled = (input, words) => el("label", {}, el("span", { t: words }), input);
@@ -240,7 +288,7 @@ export function setupKeys(event) {
     return true;
   }
   if (event.key === "Enter" && tool === "polygon" && points.length > 2) { finish(false); return true; }
-  if (event.key === "Escape") { points = []; drag = pending = scaled = null; asking = false; showScale(); sketch(); return true; }
+  if (event.key === "Escape") { points = []; drag = pending = null; closeForm(); return true; }
   return false;
 }
 
@@ -273,6 +321,7 @@ svg.addEventListener("blur", () => { cross = null; hint(words()); sketch(); });
 export function showDrawing(value) {
   const dragged = drag?.name ? state.gauges[drag.name] : null;
   state = value;
+  for (const what of ["undo", "redo"]) for (const button of document.querySelectorAll(`[data-do=${what}]`)) button.disabled = !value.can?.includes(what);
   if (dragged) state.gauges[drag.name] = dragged;
   showGauges();
   showScale();
@@ -286,4 +335,4 @@ function showGauges() {
   }
 }
 
-choose("rectangle");
+choose("move");

@@ -1,91 +1,99 @@
-// The map over the picture of a running test: its colours with a histogram, its range, the value under the pointer.
-import { $, el, fill, post, put } from "./base.js";
-import { drawGauges, make, moved, position, showCross, zoomable } from "./draw.js";
-import { fixed, short, strainText, strainUnit } from "./numbers.js";
+// The picture of a running test with its map over it: opacity, colours, range, the value under the pointer.
+import { $, el, post, put } from "./base.js";
+import { drawGauges, moved, position, showCross, zoomable } from "./draw.js";
+import { numberField } from "./fields.js";
+import { factorOf, setRatio, showLegend, unitOf } from "./legend.js";
+import { fixed, strainText, strainUnit } from "./numbers.js";
 import { t } from "./words.js";
 
-const READ_MS = 150;
-const svg = $("gaugemap");
-let loading = false, shownPicture = "", picture = null, side = "", reading = 0, cross = null;
+const READ_MS = 150, OPACITY = 74;
+const svg = $("gaugemap"), shot = svg.closest(".shot");
+let loading = 0, shownPicture = "", picture = null, side = "", reading = 0, cross = null, pointed = null;
 const reset = zoomable(svg.parentElement, () => cross);
 svg.addEventListener("dblclick", reset);
 
 export function beginMap(stage) {
   shownPicture = side = "";
-  loading = false;
+  loading = 0;
+  picture = pointed = null;
   reset();
+  put($("readout"), "");
   if (!$("component").children.length) {
     for (const name of stage.components) $("component").append(el("option", { value: name, t: name }));
   }
-  $("ramp").style.background = `linear-gradient(to left, ${stage.ramp.join(", ")})`;
   load("1");
 }
 
+// Of the map only; at 0 the picture. The choice stays with the browser.
+function showOpacity() {
+  $("opacity").value = localStorage.getItem("opacity") ?? OPACITY;
+  $("map").style.opacity = String($("opacity").value / 100);
+}
+$("opacity").addEventListener("input", () => { localStorage.setItem("opacity", $("opacity").value); showOpacity(); });
+showOpacity();
+
 let choosing = false; // "fixed" is chosen and waits for its limit: the range of the program does not take its place
 
-for (const id of ["component", "range", "limit"]) {
-  $(id).addEventListener("change", () => {
-    $("limit").hidden = $("range").value !== "fixed";
-    const limit = Number($("limit").value) / strainUnit().factor;
-    choosing = $("range").value === "fixed" && !(limit > 0);
-    if (choosing) { $("limit").focus(); return; }
-    post("/map", { of: $("component").value, range: $("range").value, limit });
-  });
-}
+const limit = numberField($("limit"), { unit: () => strainUnit().name, onvalue: choose });
+for (const id of ["component", "range"]) $(id).addEventListener("change", () => choose(limit.read()));
 
-const factor = () => (picture?.strain ? strainUnit().factor : 1);
+function choose(value) {
+  showLimit();
+  choosing = $("range").value === "fixed" && !(value > 0);
+  if (choosing) { $("limit").focus(); return null; }
+  return post("/map", { of: $("component").value, range: $("range").value, limit: value / strainUnit().factor });
+}
+const showLimit = () => { $("limit").closest(".field").hidden = $("range").value !== "fixed"; };
 
 // The next picture is requested when the last has arrived: a slow page gets fewer pictures, never old ones.
 function load(n) {
-  loading = true;
-  const image = $("map");
-  image.onload = image.onerror = () => { loading = false; };
-  image.src = `/picture?side=${side}&run=${n}`;
+  for (const [id, layer] of [["shot", "picture"], ["map", "map"]]) {
+    const image = $(id);
+    loading += 1;
+    image.onload = image.onerror = () => { loading -= 1; };
+    image.src = `/picture?side=${side}&run=${n}&layer=${layer}`;
+  }
 }
 
 export function showMap(value, of) {
-  const name = `${of} ${value.n}`, mark = name !== `${side} ${picture?.n}`;
+  const name = `${of} ${value.n}`, isNew = name !== `${side} ${picture?.n}`;
   side = of;
-  if (name !== shownPicture && !loading) { shownPicture = name; load(value.n); }
+  if (name !== shownPicture && loading <= 0) { shownPicture = name; load(value.n); }
   picture = value;
-  if (mark) showLegend();
+  if (isNew) showChoice();
   if (!value.width) return;
+  setRatio(shot, value.width, value.height);
   drawGauges(svg, value.gauges, value.width, value.height);
-  if (cross) { showCross(svg, cross); read(...cross); }
+  if (cross) showCross(svg, cross);
+  if (isNew && (cross ?? pointed)) read(...(cross ?? pointed));
 }
-addEventListener("unit", () => { if (picture) showLegend(); });
+for (const kind of ["unit", "language"]) addEventListener(kind, () => { if (picture) showChoice(); });
 
-function showLegend() {
+function showChoice() {
   for (const [id, now] of [["component", picture.of], ["range", choosing ? "fixed" : picture.range]]) if ($(id) !== document.activeElement) $(id).value = now;
-  $("limit").hidden = $("range").value !== "fixed";
-  const scaled = picture.high != null, unit = picture.strain ? strainUnit().name : (picture.unit ?? "");
-  if ($("limit") !== document.activeElement && scaled && picture.range === "fixed" && picture.strain) $("limit").value = String(Number((picture.high * factor()).toPrecision(4)));
-  $("ramp").closest(".legend").classList.toggle("status", Boolean(picture.legend));
-  fill($("statuses"), picture.legend ?? [], (one) => {
-    const key = el("i", { class: "key" });
-    key.style.background = one.colour;
-    return el("li", {}, key, `${one.count} ${t(one.text)}`);
-  });
-  const at = (share) => (scaled ? `${short((picture.low + share * (picture.high - picture.low)) * factor())}` : "");
-  put($("low"), at(0));
-  put($("middle"), at(0.5));
-  put($("high"), scaled ? `${at(1)} ${unit}` : "");
-  const bars = picture.histogram ?? [], most = Math.max(...bars, 1);
-  $("histogram").replaceChildren(...bars.map((n, k) => make("rect", { x: k, y: 1 - n / most, width: 1, height: n / most })));
+  showLimit();
+  if (picture.high != null && picture.range === "fixed" && picture.strain) limit.show(Number((picture.high * factorOf(picture)).toPrecision(6)));
+  put($("limitunit"), strainUnit().name);
+  showLegend($("maplegend"), picture);
 }
 
-// The value under the pointer, or at the cross that the arrow keys move.
+// The value under the pointer, or at the cross that the arrow keys move; read again with each picture.
 async function read(x, y) {
   const now = performance.now();
   if (!picture?.width || now - reading < READ_MS) return;
   reading = now;
-  const response = await fetch(`/value?side=${side}&x=${x.toFixed(1)}&y=${y.toFixed(1)}`);
-  if (!response.ok) return;
-  const found = await response.json(), place = `x ${x.toFixed(0)}, y ${y.toFixed(0)} px`;
-  put($("readout"), found.value == null ? `${place}: ${t(found.status)}` : `${place}: ${picture.strain ? strainText(found.value, found.sigma) : `${fixed(found.value, 4)} ${picture.unit ?? ""}`}`);
+  let found;
+  try {
+    const response = await fetch(`/value?side=${side}&x=${x.toFixed(1)}&y=${y.toFixed(1)}`);
+    if (!response.ok) return;
+    found = await response.json();
+  } catch { return; } // no link: the page says so
+  if (!cross && !pointed) return;
+  const place = `x ${x.toFixed(0)}, y ${y.toFixed(0)} px`;
+  put($("readout"), found.value == null ? `${place}: ${t(found.status)}` : `${place}: ${picture.strain ? strainText(found.value, found.sigma) : `${fixed(found.value, 4)} ${unitOf(picture)}`}`);
 }
-svg.addEventListener("pointermove", (event) => read(...position(svg, event)));
-svg.addEventListener("pointerleave", () => put($("readout"), ""));
+for (const kind of ["pointerdown", "pointermove"]) svg.addEventListener(kind, (event) => { pointed = position(svg, event); read(...pointed); });
+svg.addEventListener("pointerleave", (event) => { if (event.pointerType !== "touch") { pointed = null; put($("readout"), ""); } }); // a touch stays read
 svg.addEventListener("keydown", (event) => {
   const { width, height } = picture ?? {}, next = width && moved(event, cross ?? [width >> 1, height >> 1], width, height);
   if (!next) return;

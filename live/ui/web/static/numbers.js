@@ -85,10 +85,9 @@ export function short(value) {
 
 export const percent = (value) => (Number.isFinite(value) ? (value > 0 && value < 1e-4 ? `< ${fixed(0.01, 2)} %` : `${fixed(value * 100, 2)} %`) : DASH);
 
-const COLOURS = [
-  "#1f77b4", "#d9541e", "#2a9134", "#c62f6b", "#8757c9", "#8c6239", "#0097a7", "#7a7f00", "#d13ad1", "#5c6bc0", "#00897b", "#b8860b",
-];
-// The colour of a gauge, in the curves, in the lists and on the picture.
+// Blue, vermilion, green, purple, ochre, grey, told apart with any colour vision: --c1 to --c6 of phasedic.css, light.
+const COLOURS = ["#0060ad", "#bd4a00", "#007a62", "#9a3a80", "#7a5c00", "#56606b"];
+// The colour of a gauge over a picture.
 export const colourOf = (k) => COLOURS[k % COLOURS.length];
 // The same, dark enough for letters on white.
 export const inkOf = (k) => `color-mix(in srgb, ${colourOf(k)} 70%, black)`;

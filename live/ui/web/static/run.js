@@ -1,26 +1,31 @@
-// A running test: what is done with the frames, large figures, alarms, machine and events.
+// A running test: what is done with the frames, figures with their age and limits, alarms, machine and events.
 import { $, el, fill, put } from "./base.js";
-import { clearCurves, updateCurves } from "./curves.js";
+import { clearCurves, showAges, updateCurves } from "./curves.js";
+import { key, putIcon } from "./icons.js";
 import { beginMap, showMap } from "./map.js";
-import { chooseStrainUnit, colourOf, fixed, strainText, strainUnit, time, withSigma } from "./numbers.js";
+import { chooseStrainUnit, fixed, short, strainText, strainUnit, time, withSigma } from "./numbers.js";
 import { beginViews, noteFailed, received } from "./views.js";
 import { t } from "./words.js";
 
 const WORDS = {
   opening: "opening", reference: "reference: keep still", measuring: "measuring", paused: "paused", ended: "closing the files",
+  silent: "Load cell silent", blind: "No picture",
 };
 const RECORDING = { on: "REC", off: "NOT RECORDING" };
-let state = null, firstEnded = false, secondGoesOn = false;
+const LABELLED = { force: "Force", stress: "Stress", axial: "Strain along the load" };
+let state = null, stage = {}, firstEnded = false, secondGoesOn = false, silentS = 0, digits = 0;
 
 $("strainunit").value = strainUnit().name;
 $("strainunit").addEventListener("change", (event) => { chooseStrainUnit(event.target.value); event.target.blur(); });
-addEventListener("unit", () => { if (state) showStrains(state); });
+for (const kind of ["unit", "language"]) addEventListener(kind, () => { if (state) { digits = 0; show(state); } });
 
-export function beginRun(stage) {
+export function beginRun(value) {
+  stage = value;
   secondGoesOn = false;
-  clearCurves();
-  beginMap(stage);
-  beginViews("run", (value) => { if (value.picture) showMap(value.picture, value.side); });
+  digits = 0;
+  clearCurves(value);
+  beginMap(value);
+  beginViews("run", (one) => { if (one.picture) showMap(one.picture, one.side); });
   showRun({ state: "opening", elapsed_s: 0, events: [], troubles: [], figures: {}, gauges: [], recording: null });
 }
 
@@ -33,89 +38,124 @@ export function showRun(value) {
   if (value.points) updateCurves(value.points);
 }
 
+// Without a link all figures are old, and their ages run on.
+export function linkLost(seconds) {
+  const was = silentS;
+  silentS = seconds;
+  if (state && (seconds || was)) showFigures(state);
+}
+
 function show(value) {
   state = value;
-  const paused = value.state === "paused", ended = value.state === "ended";
+  const isPaused = value.state === "paused", isEnded = value.state === "ended";
   $("state").dataset.word = value.state;
-  put($("word"), t(WORDS[value.state] ?? value.state));
   put($("elapsed"), time(value.elapsed_s));
-  showRecording(value.recording, ended);
-  $("pause").dataset.line = paused ? "resume" : "pause";
-  $("pause").firstElementChild.dataset.t = paused ? "Resume" : "Pause";
-  put($("pause").firstElementChild, t($("pause").firstElementChild.dataset.t));
-  showFigure("force", value.figures.force, (one) => fixed(one, 1));
-  showFigure("stress", value.figures.stress, (one) => fixed(one / 1e6, 2));
-  showStrains(value);
-  put($("peak"), value.peak_N == null ? "–" : `${fixed(value.peak_N, 1)} N`);
-  put($("elongation"), value.elongation_mm == null ? "–" : `${fixed(value.elongation_mm, 4)} mm`);
-  put($("strainrate"), value.strain_rate == null ? "–" : `${rate(value.strain_rate)} 1/s`);
+  showRecording(value.recording, isEnded);
+  $("pause").dataset.line = isPaused ? "resume" : "pause";
+  if (isPaused) delete $("pause").dataset.ask; else $("pause").dataset.ask = "Pause measuring?";
+  const word = $("pause").querySelector("span");
+  word.dataset.t = isPaused ? "Resume" : "Pause";
+  if (!$("pause").classList.contains("armed")) put(word, t(word.dataset.t));
+  showFigures(value);
+  put($("elongation"), value.elongation_mm == null ? "–" : fixed(value.elongation_mm, 4));
+  put($("strainrate"), value.strain_rate == null ? "–" : rate(value.strain_rate));
+  showGauges(value);
   showSides(value.sides);
-  showStrip(value);
+  showMachine(value);
   showEvents(value.events);
-  showAlarm(value);
+  showState(value);
 }
 
-// A figure that is not live has no value: a word instead, and of one that is old the last value, grey, with its age.
+// -- figures -----------------------------------------------------------------------------------------
+
+function showFigures(value) {
+  const unit = strainUnit(), axial = value.axial, figures = value.figures;
+  const name = value.side ? `${axial?.name ?? ""}, ${t(value.side)}` : axial?.name;
+  const N = { factor: 1, digits: 1, name: "N" }, MPa = { factor: 1e-6, digits: 2, name: "MPa" };
+  showTile("force", figures.force, N, value.peak_N == null ? "" : `${t("highest")} ${fixed(value.peak_N, 1)} N`);
+  showTile("stress", figures.stress, MPa, stage.what?.area_mm2 ? `${t("over")} ${fixed(stage.what.area_mm2, 2)} mm²` : "");
+  showTile("axial", figures.axial, unit, withPart(withPart(name ?? "", axial?.assumed), value.part));
+  const isPictureOld = silentS || ["old", "unknown"].includes(figures.axial?.state);
+  $("gaugemap").closest(".frame").classList.toggle("old", Boolean(isPictureOld));
+  put($("pictureage"), isPictureOld && figures.axial?.age_s != null ? time(value.elapsed_s - figures.axial.age_s) : "");
+  showAges(figures, value);
+}
+
+// A figure that is not live has a word and its age; the last value of one that is old is thin and grey.
 const LABELS = {
-  overload: "OVERLOAD", underload: "UNDERLOAD", old: "old", unknown: "not known", "not yet": "not yet", paused: "paused", ended: "ended",
+  overload: "OVERLOAD", underload: "UNDERLOAD", unknown: "not known", "not yet": "not yet", paused: "paused", ended: "ended",
+  near: "near limit", beyond: "beyond limit",
 };
-function showFigure(id, one, text, beside = "") {
-  const state = one?.state ?? "not yet", isBeyond = state.endsWith("load"), isOld = state === "old" || state === "unknown";
-  const age = one?.age_s == null ? "" : t("{} s ago").replace("{}", fixed(one.age_s));
-  const instead = isOld && one.last != null ? `${text(one.last)}, ${age}` : isBeyond ? "" : t(LABELS[state] ?? "");
-  $(id).parentElement.hidden = state === "none" && id !== "axial";
-  put($(id), state === "live" ? text(one.value) : isBeyond ? t(LABELS[state]) : "–");
-  put($(`${id}sigma`), state === "live" ? beside : instead);
-  $(id).classList.toggle("bad", isBeyond);
-  $(id).classList.toggle("isold", isOld);
+const SAYS = { near: ["look", "warn"], beyond: ["bad", "error"], paused: ["open", "pause"] };
+function showTile(id, one, unit, of) {
+  const isLost = silentS > 0 && one?.state === "live", state = isLost ? "old" : (one?.state ?? "not yet"), tile = $(`${id}tile`);
+  const isOld = state === "old" || state === "unknown", isBeyond = state.endsWith("load"), isLive = state === "live";
+  const last = isLost ? one.value : one?.last, isKept = (isOld || state === "paused" || state === "ended") && last != null;
+  tile.hidden = state === "none" && id !== "axial";
+  const limit = isLive ? one.limit : null, says = isBeyond || limit?.beyond ? "beyond" : limit?.near ? "near" : state;
+  const text = isLive ? number(one.value, one.sigma, unit) : isKept ? number(last, 0, unit) : isBeyond ? t(LABELS[state]) : "–";
+  put($(id), text);
+  $(id).classList.toggle("word", isBeyond);
+  if (isLive || isKept) grow(text);
+  put($(`${id}unit`), isBeyond ? "" : unit.name);
+  const age = (one?.age_s ?? 0) + (isLost ? silentS : 0), two = isLive ? withSigma(one.value, one.sigma, unit)[1] : "";
+  const since = state === "unknown" && one.why ? t(one.why) : isKept && one.age_s != null ? `${t("last value at")} ${time(state_s() - one.age_s)}` : t(LABELS[state] ?? "");
+  put($(`${id}sigma`), isLive ? (two && `± ${two} ${unit.name}`) : since);
+  put($(`${id}of`), isLive ? of : "");
+  tile.className = ["tile", id === "axial" ? "strain" : "", isOld || state === "paused" ? "stale" : "", says === "beyond" ? "bad" : says === "near" ? "look" : ""].join(" ").trim();
+  showChip(tile.querySelector(".age"), isOld ? ["full", "error", `${fixed(age)} ${t("s old")}`] : SAYS[says] && [...SAYS[says], t(LABELS[says])]);
+  showLimit(tile.querySelector(".to"), limit, unit);
+}
+const state_s = () => state?.elapsed_s ?? 0;
+const number = (value, sigma, unit) => withSigma(value, sigma, unit)[0];
+
+function showChip(place, says) {
+  const [kind, name, words] = says ?? [];
+  if (!kind) { place.replaceChildren(); place.dataset.now = ""; return; }
+  if (place.dataset.now !== kind + name) {
+    place.dataset.now = kind + name;
+    place.replaceChildren(el("span", { class: `chip ${kind}` }, el("span"), el("span")));
+    putIcon(place.firstChild.firstChild, name);
+  }
+  put(place.firstChild.lastChild, words);
 }
 
-// The other one of two cameras has its card, and its map where it is chosen; the figures too once the first has ended.
-export function showSecond(value) {
-  secondGoesOn = value.state !== "ended";
-  if (firstEnded && secondGoesOn) show({ ...value, sides: state.sides && { ...state.sides, strains: [] } });
-  showMapOf(value, true);
+// The share of the limit, and the limit.
+function showLimit(place, limit, unit) {
+  place.hidden = !limit;
+  if (!limit) return;
+  place.querySelector(".fill").setAttribute("width", `${Math.min(Math.max(limit.share, 0), 1) * 100}%`);
+  put(place.lastElementChild, `${fixed(100 * limit.share)} % ${t("of the limit")}, ${short(limit.value * unit.factor)} ${unit.name}`);
 }
 
-function showMapOf(value, isSecond) {
-  const shown = received("run", value, isSecond);
-  if (shown?.picture) showMap(shown.picture, shown.side);
-}
-
-// Always written: REC or NOT RECORDING.
-function showRecording(recording, ended) {
-  $("state").classList.toggle("unrecorded", recording !== true && !ended);
-  put($("rec"), t(recording === true ? RECORDING.on : RECORDING.off));
-  $("rec").className = recording === true ? "on" : "off";
-  document.querySelector("#run [data-line=start]").disabled = recording !== false;
-  document.querySelector("#run [data-line=stop]").disabled = recording !== true;
+// All figures of a screen have one size, that of the longest number; it only grows during a test.
+function grow(text) {
+  const n = [...text].reduce((sum, one) => sum + (/\d/.test(one) ? 1 : 0.5), 0);
+  if (n <= digits) return;
+  digits = n;
+  document.querySelector(".figures").style.setProperty("--n", String(Math.max(n, 4)));
 }
 
 // 2.5·10⁻⁴: one form for all rates.
 function rate(value) {
   if (value === 0) return "0";
   const power = Math.floor(Math.log10(Math.abs(value)));
-  const digits = [...String(power)].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("");
-  return `${fixed(value / 10 ** power, 1)}·10${digits}`;
+  const above = [...String(power)].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("");
+  return `${fixed(value / 10 ** power, 1)}·10${above}`;
 }
 
 // A value whose area lost a block stands for a part of it.
 const withPart = (text, part) => (part ? `${text} ${t(part)}` : text);
 
-function showStrains(value) {
-  const unit = strainUnit(), axial = value.axial, sigma = withSigma(axial?.value, axial?.sigma, unit)[1];
-  const name = value.side ? `${axial?.name ?? ""}, ${t(value.side)}` : axial?.name;
-  put($("axialname"), withPart(withPart(name ?? "", axial?.assumed), value.part));
-  showFigure("axial", value.figures.axial, (one) => withSigma(one, axial?.sigma, unit)[0], sigma ? `± ${sigma} ${unit.name}` : "");
-  const gauges = (value.gauges ?? []).map((one, k) => ({ ...one, k })), list = $("others");
-  while (list.children.length > gauges.length) list.lastChild.remove();
-  while (list.children.length < gauges.length) list.append(el("li", {}, el("i", { class: "key" }), el("span"), el("b")));
+function showGauges(value) {
+  const gauges = (value.gauges ?? []).map((one, k) => ({ k: one.colour ?? k, ...one })), list = $("others");
+  list.hidden = !gauges.length;
+  fill(list, gauges.map(({ name, k }) => [name, k]), ([name, k]) => el("li", {}, key(k), el("span", { class: "name", text: name }), el("b", { class: "num" })));
   gauges.forEach((one, i) => {
-    const [key, name, number] = list.children[i].children;
-    key.style.background = colourOf(one.k);
-    put(name, one.name);
+    const number = list.children[i].lastChild;
     put(number, one.reason ? t("lost") : one.value == null ? "–" : withPart(strainText(one.value, one.sigma), one.part));
     number.title = one.reason ? t(one.reason) : "";
+    number.classList.toggle("bad", Boolean(one.reason));
   });
 }
 
@@ -131,36 +171,77 @@ function showSides(sides) {
   }
   for (const one of sides?.figures ?? []) rows.push([`${one.name}, ${t(one.side)}`, one.text]);
   $("sides").hidden = !rows.length;
-  fill($("sides"), rows, ([name, text]) => el("li", {}, el("span", { text: name }), el("b", { text })));
+  fill($("sides"), rows, ([name, text]) => el("li", {}, el("span", { class: "name", text: name }), el("b", { class: "num", text })));
 }
 
-const CELLS = ["ZOIs", "frames/s", "latency", "recorded", "skipped", "lost", "kernel", "disk"];
-const BOARD = { kernel: "without a force" };  // in its place where there are any
-function showStrip(value) {
-  const l = value.ledger ?? {}, lost = (l.lost ?? 0) + (l.unrecorded ?? 0), ms = (s) => (s == null ? "–" : `${fixed(s * 1e3)} ms`);
-  const values = [
-    value.zois == null ? "–" : `${value.valid} / ${value.zois}`, fixed(value.fps, 0), ms(value.late_s),
-    String(l.recorded ?? "–"), String(l.skipped ?? "–"), String(lost), l.without_force ? String(l.without_force) : ms(value.kernel_s), value.disk_min == null ? "–" : disk(value.disk_min),
-  ];
-  const box = $("strip");
-  const cells = CELLS.map((name) => (l.without_force && BOARD[name]) || name);
-  fill(box, cells, (name) => el("div", {}, el("dt", { t: name }), el("dd")));
-  values.forEach((text, i) => put(box.children[i].lastChild, text));
-  box.children[5].lastChild.classList.toggle("bad", lost > 0);
-  box.children[6].lastChild.classList.toggle("bad", l.without_force > 0);
-  box.children[0].lastChild.classList.toggle("bad", Boolean(value.part));
+// The other one of two cameras has its card, and its map where it is chosen; the figures too once the first has ended.
+export function showSecond(value) {
+  secondGoesOn = value.state !== "ended";
+  if (firstEnded && secondGoesOn) show({ ...value, sides: state.sides && { ...state.sides, strains: [] } });
+  showMapOf(value, true);
+}
+
+function showMapOf(value, isSecond) {
+  const shown = received("run", value, isSecond);
+  if (shown?.picture) showMap(shown.picture, shown.side);
+}
+
+// -- the state bar -------------------------------------------------------------------------------------
+
+// Always written: REC or NOT RECORDING.
+function showRecording(recording, isEnded) {
+  const isOn = recording === true;
+  $("state").classList.toggle("unrecorded", !isOn && !isEnded);
+  put($("rec"), t(isOn ? RECORDING.on : RECORDING.off));
+  $("rec").parentElement.className = isOn ? "rec on" : "rec off";
+  const [begin, end] = ["start", "stop"].map((line) => document.querySelector(`[data-part="run"] [data-line=${line}]`));
+  begin.hidden = recording !== false;
+  end.hidden = recording === false;
+  begin.disabled = recording !== false;
+  end.disabled = !isOn;
+}
+
+// Red and the cause: alarms, errors that are not over, figures that are old or unknown, until that is over. Amber near
+// a limit, and where an alarm was silenced beyond it.
+function showState(value) {
+  const troubles = (value.troubles ?? []).map((one) => t(one)), { force, axial } = value.figures;
+  const near = Object.keys(LABELLED).find((name) => value.figures[name]?.limit?.near || value.figures[name]?.limit?.beyond);
+  const kind = troubles.length ? "alarm" : value.state === "paused" ? "paused" : near ? "near" : value.state === "measuring" ? "measuring" : "";
+  for (const one of ["alarm", "paused", "near", "measuring"]) $("state").classList.toggle(one, one === kind);
+  putIcon($("lamp"), { alarm: "error", paused: "pause", near: "warn" }[kind] ?? "play");
+  const cause = force?.state === "old" ? "silent" : axial?.state === "old" && value.state === "measuring" ? "blind" : value.state;
+  put($("word"), t(WORDS[cause] ?? cause));
+  const limit = near && value.figures[near].limit;
+  put($("alarm"), troubles[0] ?? (near ? `${t(LABELLED[near])}: ${fixed(100 * limit.share)} % ${t("of the limit")}` : ""));
+  put($("alarmmore"), troubles.slice(1).join(" · ") || (near && limit.ends && !troubles.length ? t("At the limit the test ends by itself.") : ""));
+  $("silence").hidden = !troubles.length;
+}
+
+// Small and grey; each turns amber on its own when it counts.
+const CELLS = ["frames/s", "recorded", "lost", "skipped", "delay", "disk", "ZOIs", "without a force"];
+const DELAY_S = 0.5, DISK_MIN = 30;
+function showMachine(value) {
+  const l = value.ledger ?? {}, lost = (l.lost ?? 0) + (l.unrecorded ?? 0);
+  const facts = {
+    "frames/s": [fixed(value.fps), false], recorded: [fixed(l.recorded), false], lost: [fixed(lost), lost > 0],
+    skipped: l.skipped ? [fixed(l.skipped), true] : null, delay: value.late_s == null ? null : [`${fixed(value.late_s * 1e3)} ms`, value.late_s > DELAY_S],
+    disk: value.disk_min == null ? null : [disk(value.disk_min), value.disk_min < DISK_MIN],
+    ZOIs: value.zois == null ? null : [`${value.valid} / ${value.zois}`, Boolean(value.part)],
+    "without a force": l.without_force ? [fixed(l.without_force), true] : null,
+  };
+  const shown = CELLS.filter((name) => facts[name]);
+  fill($("strip"), shown, (name) => el("span", {}, el("b"), " ", el("span", { t: name })));
+  shown.forEach((name, i) => {
+    put($("strip").children[i].firstChild, facts[name][0]);
+    $("strip").children[i].classList.toggle("matters", facts[name][1]);
+  });
 }
 
 const disk = (minutes) => (minutes > 600 ? `${fixed(minutes / 60)} h` : `${fixed(minutes)} min`);
 
 function showEvents(list) {
+  const newest = list.at(-1);
+  put($("lastevent"), newest ? `${time(newest.s)} ${t(newest.text)}` : "");
+  put($("eventcount"), fixed(list.length));
   fill($("events"), list.toReversed(), (one) => el("li", {}, el("time", { text: time(one.s) }), el("span", { text: t(one.text), class: one.level })));
 }
-
-// Alarms, errors that are not over, and figures that are old or unknown: until that is over.
-function showAlarm(value) {
-  const words = (value.troubles ?? []).map((one) => t(one)).join(" · ");
-  $("state").classList.toggle("alarm", Boolean(words));
-  put($("alarm"), words);
-}
-

@@ -49,7 +49,7 @@ function showCards(stage) {
 }
 
 function card(stage, side) {
-  const picture = el("img", { alt: "" }), button = el("button", { type: "button" }, picture, el("b", { t: side }), el("span"));
+  const picture = el("img", { alt: "" }), button = el("button", { type: "button", class: "button" }, picture, el("b", { t: side }), el("span"));
   button.dataset.view = side;
   picture.onload = picture.onerror = () => { delete picture.dataset.busy; };
   button.addEventListener("click", () => choose(stage, side));

@@ -256,10 +256,10 @@ def test_thinning_keeps_the_spikes_and_the_gaps() -> None:
     y[31_234], y[40_000:40_010] = 7.0, np.nan
     figure = Plot("f", "t", "x", "y", (PlotLine("", np.arange(50_000.0), y),), y_range=(0.0, 7.0))
     svg = draw(figure)
-    path = re.search(r'class="curve c0" d="([^"]+)"', svg)
+    path = re.search(r'class="curve c1 d1" d="([^"]+)"', svg)
     assert path is not None
     heights = [float(v) for v in re.findall(r"[ML][\d.]+ ([\d.]+)", path[1])]
-    assert min(heights) == pytest.approx(26.0)  # the top of the axes
+    assert min(heights) == pytest.approx(44.0 + 224 / 8)  # the top of the axes
     assert path[1].count("M") == 2
     assert len(heights) < 2 * MAX_POINTS
 

@@ -24,54 +24,69 @@ def numbers(text: str) -> list[float]:
 
 
 def test_a_line_is_drawn_from_left_to_right_and_upwards() -> None:
-    """The axes are 492 px wide and 238 high, from (74, 26) to (566, 264)."""
+    """The axes are 498 px wide and 224 high, from (64, 44) to (562, 268)."""
     line = PlotLine(
         "a", np.array([0.0, 5.0, 10.0]), np.array([0.0, 10.0, 20.0]), np.array([1.0, 2.0, 1.0]), 2
     )
     svg = draw(Plot("f", "t", "x", "y", (line,), (Mark(5.0, 10.0, "a", "1 N"), Mark(9.5, 20.0, "b", "2 N")),
                     (0.0, 10.0), (0.0, 20.0)))  # fmt: skip
-    path = re.search(r'class="curve c2" d="(M74[^"]+)"', svg)
-    assert path is not None and numbers(path[1]) == [74, 264, 320, 145, 566, 26]
-    band = re.search(r'class="band f2" points="([^"]+)"', svg)
+    path = re.search(r'class="curve c3 d3" d="(M64[^"]+)"', svg)
+    assert path is not None and numbers(path[1]) == [64, 268, 313, 156, 562, 44]
+    band = re.search(r'class="band f3" points="([^"]+)"', svg)
     assert band is not None
     # Forth along the lower edge, back along the upper one.
     assert numbers(band[1]) == pytest.approx(
-        [74, 275.9, 320, 168.8, 566, 37.9, 566, 14.1, 320, 121.2, 74, 252.1], abs=0.06
+        [64, 279.2, 313, 178.4, 562, 55.2, 562, 32.8, 313, 133.6, 64, 256.8], abs=0.06
     )
-    circles = re.findall(r'<circle class="f3" cx="([\d.]+)" cy="([\d.]+)"', svg)
-    assert circles == [("320.0", "145.0"), ("541.4", "26.0")]
-    assert '<text class="word" x="328.0" y="163.0" text-anchor="start">a = 1 N<' in svg
-    assert '<text class="word" x="533.4" y="44.0" text-anchor="end">b = 2 N<' in svg
-    assert '<text class="word" x="172.4" y="280.0" text-anchor="middle">2<' in svg
-    assert '<text class="word" x="68.0" y="149.0" text-anchor="end">10<' in svg
+    circles = re.findall(r'<circle class="dot" cx="([\d.]+)" cy="([\d.]+)"', svg)
+    assert circles == [("313.0", "156.0"), ("537.1", "44.0")]
+    assert '<text class="word ink" x="321.0" y="174.0" text-anchor="start">a = 1 N<' in svg
+    assert '<text class="word ink" x="529.1" y="62.0" text-anchor="end">b = 2 N<' in svg
+    assert '<text class="word" x="188.5" y="284.0" text-anchor="middle">2.5<' in svg
+    assert '<text class="word" x="58.0" y="160.0" text-anchor="end">10<' in svg
+    assert '<text class="word ink" x="4.0" y="14.0" text-anchor="start">y<' in svg, "never turned"
 
 
-def test_axes_leave_room_around_data_and_bands() -> None:
+@pytest.mark.parametrize(
+    ("low", "high", "ends", "marks"),
+    [
+        (0.0, 1.0, ("0", "1"), 5),
+        (0.3, 18.9, ("0", "20"), 5),
+        (-7.7, 20.3, ("−10", "30"), 5),
+        (-0.002, 283.0, ("0", "300"), 4),
+        (3.2, 3.9, ("3.2", "4"), 5),
+        (-1400.0, -3.0, ("−1 500", "0"), 4),
+    ],
+)
+def test_axes_end_at_round_numbers(low: float, high: float, ends: tuple[str, str], marks: int) -> None:
+    svg = draw(Plot("f", "t", "x", "y", (PlotLine("", np.arange(2.0), np.array([low, high])),)))
+    found = re.findall(r'x="58.0" y="([\d.]+)" text-anchor="end">([^<]+)<', svg)
+    assert (found[0], found[-1]) == (("272.0", ends[0].replace(" ", "\u202f")), ("48.0", ends[1])), found
+    assert len(found) == marks
+
+
+def test_axes_hold_data_and_bands() -> None:
     def down(y: list[float], sigma: list[float] | None = None, dashed: float = 0.0) -> list[float]:
         band = None if sigma is None else np.array(sigma)
         lines = [PlotLine("", np.arange(float(len(y))), np.array(y), band)]
         if dashed:
             lines.append(PlotLine("", np.array([0.0, 1.0]), np.array([0.0, dashed]), dashed=True))
-        found = re.search(r'class="curve c0" d="([^"]+)"', draw(Plot("f", "t", "x", "y", tuple(lines))))
+        found = re.search(r'class="curve c1 d1" d="([^"]+)"', draw(Plot("f", "t", "x", "y", tuple(lines))))
         assert found is not None
         return numbers(found[1])[1::2]
 
-    # 3 % of the span on either side, within 238 px.
-    edge = 238 * 0.03 / 1.06
-    assert down([0.0, 1.0]) == pytest.approx([264 - edge, 26 + edge], abs=0.06)
+    assert down([0.0, 1.0]) == pytest.approx([268, 44], abs=0.06)
     assert down([0.0, 1.0], dashed=50.0) == down([0.0, 1.0]), "a construction does not widen the axes"
     wide = down([0.0, 1.0], [0.5, 1.0])
-    assert wide == pytest.approx(
-        [264 - edge - (238 - 2 * edge) / 5, 26 + edge + (238 - 2 * edge) * 2 / 5], abs=0.06
-    )
-    assert down([4.0, 4.0]) == pytest.approx([145, 145]), "a constant lies in the middle"
-    assert down([0.0, 0.0]) == pytest.approx([145, 145])
+    assert wide == pytest.approx([268 - 224 / 3, 268 - 224 * 2 / 3], abs=0.06), "from -1 to 2"
+    assert down([4.0, 4.0]) == pytest.approx([156, 156]), "a constant lies in the middle"
+    assert down([0.0, 0.0]) == pytest.approx([156, 156])
 
 
 def test_a_gap_interrupts_the_line() -> None:
     y = np.array([0.0, 1.0, np.nan, 3.0, 4.0])
     svg = draw(Plot("f", "t", "x", "y", (PlotLine("", np.arange(5.0), y),), (), (0, 4), (0, 4)))
-    found = re.search(r'class="curve c0" d="([^"]+)"', svg)
+    found = re.search(r'class="curve c1 d1" d="([^"]+)"', svg)
     assert found is not None and re.sub(r"[\d. ]", "", found[1]) == "MLML"
 
 
@@ -79,16 +94,16 @@ def test_the_legend_names_each_line_in_its_colour() -> None:
     lines = tuple(PlotLine(name, np.arange(2.0), np.arange(2.0), colour=k, dashed=k == 1)
                   for k, name in enumerate(("ab", "c<d", "")))  # fmt: skip
     svg = draw(Plot("f", "t", "x", "y", lines))
-    assert '<path class="curve c0" d="M74 12h22"/>' in svg and ">ab</text>" in svg
-    assert '<path class="curve c1 dashed" d="M129 12h22"/>' in svg and ">c&lt;d</text>" in svg
-    assert svg.count(" 12h22") == 2
-    assert "c1" in draw(Plot("f", "t", "x", "y", (replace(lines[0], colour=7),)))
+    assert '<path class="curve c1 d1" d="M64 30h24"/>' in svg and ">ab</text>" in svg
+    assert '<path class="curve c2 dashed" d="M121 30h24"/>' in svg and ">c&lt;d</text>" in svg
+    assert svg.count(" 30h24") == 2
+    assert "c2 d2" in draw(Plot("f", "t", "x", "y", (replace(lines[0], colour=7),)))
 
 
 def test_only_long_lines_are_thinned() -> None:
     for n, drawn in ((1600, 1600), (1601, None)):
         svg = draw(Plot("f", "t", "x", "y", (PlotLine("", np.arange(n * 1.0), np.arange(n * 1.0)),)))
-        found = re.search(r'class="curve c0" d="([^"]+)"', svg)
+        found = re.search(r'class="curve c1 d1" d="([^"]+)"', svg)
         assert found is not None
         points = len(re.findall("[ML]", found[1]))
         assert points == drawn if drawn else points <= 1602

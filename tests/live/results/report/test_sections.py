@@ -21,7 +21,7 @@ from acquire.frame import CameraInfo
 from analysis.evaluate import Figure, NoiseFloor
 from live.pipeline.screen import Screen
 from live.results.finished.finished_test import FinishedTest
-from live.results.maps.colours import diverging_table
+from live.results.maps.colours import diverging_table, sequential_table
 from live.results.maps.scale import ColourScale
 from live.results.report import record, report
 from live.results.report.evaluation import EvaluatedCurve
@@ -132,7 +132,7 @@ def test_the_head_of_the_report(run: RunFolder) -> None:
     curve = EvaluatedCurve.of(run)
     extent = report._extent(run, replace(curve, axial=np.array([0.0, -0.03, 0.01, math.nan])))
     assert extent["ZOIs with a value, last"] == "33 of 34"
-    assert extent[f"largest {curve.figures.strain}"] == "-3 %"
+    assert extent[f"largest {curve.figures.strain}"] == "−3 %"
     head = plain(report._head(run, curve, FinishedTest.of_folder(run)))
     assert f"Test of 2030-01-02T03:04:05+00:00: {N} measurements in 9.5 s." in head
     assert "not closed" not in head
@@ -234,10 +234,10 @@ def test_each_map_lies_beside_the_picture_of_its_instant(run: RunFolder) -> None
     text = maps(run, "eyy", rows, pictures, 320)
     drawn = pictures_in(text)
     assert [one.shape for one in drawn] == [(240, 320, 3)] * 4
-    # Grey beside colours; red at the end, and blue nowhere.
-    grey, _, _, strained = (one.astype(int) for one in drawn)
+    # Grey beside colours: violet at first, yellow at the end.
+    grey, still, _, strained = (one.astype(int) for one in drawn)
     assert np.ptp(grey[120, 160]) < 8
-    assert strained[120, 160, 2] - strained[120, 160, 0] > 80
+    assert still[120, 160, 0] - still[120, 160, 1] > 40 and strained[120, 160, 1] - strained[120, 160, 0] > 40
     assert re.findall(r'alt="([^"]+)"', text) == [
         "picture, first",
         "eyy, first",
@@ -253,14 +253,18 @@ def test_each_map_lies_beside_the_picture_of_its_instant(run: RunFolder) -> None
 
 
 def test_the_bar_of_a_map_has_its_colours_and_numbers() -> None:
-    bar = _bar("eyy", ColourScale(-2.0, 2.0, "%", 100.0))
+    bar = _bar("eyy", ColourScale(-2.0, 2.0, "%", 100.0, True))
     boxes = re.findall(r'<rect x="([\d.]+)"[^>]*fill="rgb\((\d+),(\d+),(\d+)\)"', bar)
-    assert len(boxes) == 16 and boxes[0][0] == "10.0" and boxes[-1][0] == "460.0"
+    assert len(boxes) == 48 and boxes[0][0] == "10.0" and boxes[-1][0] == "480.0"
     table = diverging_table()
     assert [int(v) for v in boxes[0][1:]] == table[0].tolist()
     assert [int(v) for v in boxes[-1][1:]] == table[-1].tolist()
     words = {text: float(x) for x, text in re.findall(r'x="([\d.]+)" y="34">([^<]+)<', bar)}
-    assert words["−2"] == 10.0 and words["0"] == 250.0 and words["2"] == 490.0
+    assert words["−2"] == 10.0 and words["0"] == 250.0 and words["+2"] == 490.0
+    assert 'd="M250 4v14"' in bar, "zero is marked"
+    plain_bar = _bar("eyy", ColourScale(0.0, 2.0, "%", 100.0))
+    assert f'fill="rgb{tuple(sequential_table()[0].tolist())}"'.replace(" ", "") in plain_bar
+    assert "M250 4v14" not in plain_bar and ">2</text>" in plain_bar
     assert 'aria-label="colours of eyy from -2 to 2 %"' in bar
 
 

@@ -16,7 +16,7 @@ import pytest
 from acquire.events import Event, EventKind
 from analysis.field import StrainField
 from live.pipeline.snapshot import Snapshot
-from live.results.maps.colours import diverging_table
+from live.results.maps.colours import diverging_table, sequential_table
 from live.ui.rerun.drawing.curve import CurveDrawing, force_axis, rounded, strain_axis, stress_axis
 from live.ui.rerun.drawing.layout import BAR_HEIGHT, BAR_LABEL, BAR_TOP, blueprint
 from live.ui.rerun.drawing.scene import ViewScene
@@ -81,19 +81,37 @@ def field(**more: Any) -> StrainField:
 
 def test_maps_lie_on_their_zois_and_gauges_on_the_picture() -> None:
     """The picture of the viewer begins at 0 and ours at -0.5; a cell is a step wide."""
-    scene, sink, _ = made(gauges=["axial"], outlines={"axial": (((10.0, 20.0), (30.0, 40.0)),)})
+    scene, sink, _ = made(
+        gauges=["axial"], outlines={"axial": (((10.0, 20.0), (30.0, 40.0)),)}, colours={"axial": 7}
+    )
     scene.begin()
     for name in ("exx", "status"):
         assert sink.last(f"specimen/map/{name}", "translation") == [[15.5 + 0.5 - 8, 15.5 + 0.5 - 8, 0]]
         assert sink.last(f"specimen/map/{name}", "scale") == [[16, 16, 1]]
     assert sink.last("specimen/gauges", "strips") == [[[10.5, 20.5], [30.5, 40.5]]]
+    assert sink.last("specimen/gauges/rim", "strips") == [[[10.5, 20.5], [30.5, 40.5]]]
+    # The colours of the light page over the picture, those of the dark one in plots: the second of six.
+    assert sink.last("specimen/gauges", "colors") == [0xBD4A00FF] and sink.last("gauges/axial", "colors") == [
+        0xF59453FF
+    ]
+    assert sink.last("specimen/gauges/rim", "colors") == [0xFFFFFFFF]
     assert sink.last("specimen/gauges/names", "positions") == [[10.5, 20.5]]
     assert sink.last("specimen/gauges/names", "labels") == ["axial"]
     assert sink.last("gauges/axial", "names") == ["axial"]
     assert sink.last("specimen/zoi/boxes", "half_sizes")[0] == [16, 16]
-    bar = sink.image("bar/exx/ramp")[..., ::-1]
-    assert (bar[0, 0] == diverging_table()[-1]).all() and (bar[-1, 0] == diverging_table()[0]).all()
     assert sink.times == [0.0]
+
+
+def test_a_bar_has_the_colours_of_its_map_and_a_line_at_zero() -> None:
+    scene, sink, _ = made(strain_range=2e-3)
+    scene.field(START, field())
+    for name, table in (("eyy", diverging_table()), ("sigma", sequential_table())):
+        bar = sink.image(f"bar/{name}/ramp")[..., ::-1]
+        assert (bar[0, 0] == table[-1]).all() and (bar[-1, 0] == table[0]).all()
+        assert (bar[127:129] == 0).all() == (name == "eyy")
+    drawn = len(sink.logged["bar/eyy/ramp"])
+    scene.field(START + 3, field())
+    assert len(sink.logged["bar/eyy/ramp"]) == drawn, "drawn only where it changes"
 
 
 def test_rows_count_from_the_start_each_strain_with_its_sigma() -> None:
@@ -145,7 +163,7 @@ def test_the_ticks_of_a_bar_stand_at_their_values() -> None:
     scene, sink, _ = made(strain_range=2e-3)
     scene.field(START, field())
     assert sink.last("bar/eyy/ticks", "labels") == [
-        "2\u202f000", "1\u202f000", "0", "−1\u202f000", "−2\u202f000", "µm/m",
+        "+2\u202f000", "+1\u202f000", "0", "−1\u202f000", "−2\u202f000", "µm/m",
     ]  # fmt: skip
     places, unit = np.array(sink.last("bar/eyy/ticks", "positions")), math.sqrt(128 * 96)
     assert places[:5, 0] == pytest.approx(128 + BAR_LABEL * unit, rel=1e-5)

@@ -12,7 +12,7 @@ import pytest
 
 from live.pipeline.snapshot import Snapshot
 from live.pipeline.timed.figure import TimedFigure
-from live.ui.rerun.drawing.large_figures import HEIGHT, WIDTH, _cells, paint
+from live.ui.rerun.drawing.large_figures import GREY, HEIGHT, WHITE, WIDTH, _cells, paint
 from live.ui.rerun.messages import figures_message, figures_of
 from live.ui.rerun.wire import Kind, Parcel, WireError
 from tests.live.made_up import figures
@@ -78,3 +78,16 @@ def test_forces_are_in_kilonewtons_from_ten_on(force: float, head: str, shown: s
     assert found[:2] == (head, shown)
     assert state[:2] == ("STATE", "REC") and strain[:2] == ("STRAIN +- 4 um/m", "-12 345")
     assert stress[:2] == ("STRESS MPa", "30.9")
+
+
+def test_an_old_figure_is_grey_and_thin_with_its_age() -> None:
+    old = replace(NOW, figures=NOW.figures | {"force": TimedFigure.at(30.0, 6.0, 1200.0)})
+    _, strain, force, _ = _cells(old)
+    assert force == ("FORCE N  24 s old", "1200.0", GREY) and strain[2] == WHITE
+    white, grey = (
+        (paint(replace(NOW, figures=NOW.figures | {"force": one}))[40:125, 900:1270].min(axis=2) > 160).sum()
+        for one in (TimedFigure.at(6.0, 6.0, 1200.0), TimedFigure.at(30.0, 6.0, 1200.0))
+    )
+    assert 0 < grey < 0.75 * white, "thin"
+    assert paint(NOW)[0, 0].tolist() == [36, 29, 23]
+    assert paint(old)[0, 0].tolist() == [30, 38, 179], "a figure that is old is a trouble"

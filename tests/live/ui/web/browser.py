@@ -132,10 +132,15 @@ class Page:
         self.until(lambda: not self.page.locator("body.pausing").count(), "the pause is over")
         self.page.keyboard.press(key)
 
+    def armed(self) -> bool:
+        """Whether a button waits for its second press."""
+        return bool(self.page.locator(".button.armed").count())
+
     def confirm(self) -> None:
-        """Answer a question with yes, as soon as that is possible."""
-        self.until(lambda: bool(self.page.is_visible("#yes") and self.page.is_enabled("#yes")), "a question")
-        self.page.click("#yes")
+        """Press what was armed again, as soon as that counts."""
+        self.until(self.armed, "a button is armed")
+        self.page.wait_for_timeout(600)
+        self.page.click(".button.armed")
 
     def on_screen(self, points: list[tuple[float, float]]) -> list[tuple[float, float]]:
         """Positions of the picture, px, as positions of the mouse."""

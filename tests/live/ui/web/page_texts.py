@@ -30,7 +30,7 @@ def of_the_page() -> set[str]:
             for one in pair
         }
         for table in re.findall(
-            r"const (?:HINTS|LABELS|WORDS|BOARD|words|SIZES|RECORDING) = \{(.*?)\};", text, re.S
+            r"const (?:HINTS|LABELS|LABELLED|WORDS|BOARD|words|SIZES|RECORDING) = \{(.*?)\};", text, re.S
         ):
             found |= set(re.findall(r': "(.+?)"', table))
         for cells in re.findall(r"(?:const CELLS = |head: )\[(.*?)\]", text, re.S):

@@ -325,11 +325,11 @@ def test_the_region_is_seen_when_its_automatic_gauges_are_placed(tmp_path: Path)
     draft = ConfigDraft(load_config(rig, {}), rig, {})
     seen_at_changes: list[DrawnRegion | None] = []
 
-    def spied(changes: Mapping[str, Any]) -> None:
+    def spied(*changes: Mapping[str, Any]) -> None:
         seen_at_changes.append(region.drawn)
-        ConfigDraft.change_all(draft, changes)
+        ConfigDraft.replace_gauges(draft, *changes)
 
-    draft.change_all = spied  # type: ignore[method-assign]
+    draft.replace_gauges = spied  # type: ignore[assignment]
     region = SpecimenRegion(draft, None, lambda: None)
     region.begin(CameraInfo("sim:", "sim", 256, 192, 8, True, "host"), np.zeros((1, 192, 256), np.float32))
     assert seen_at_changes == [None] and list(draft.config.gauges) == ["extension", "width", "area"]

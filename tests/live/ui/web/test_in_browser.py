@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import webbrowser
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -95,6 +96,7 @@ def test_a_browser_comes_to_the_page_by_the_file_that_it_is_given(
 
 def set_up(page: Page, folder: Path) -> None:
     page.until(lambda: "specimen" in page.text("region"), "the specimen is found")
+    page.page.keyboard.press("1")
     page.drag((60.0, 50.0), (420.0, 330.0))
     page.until(lambda: "as drawn" in page.text("region"), "the rectangle is taken")
     page.page.keyboard.press("4")
@@ -111,7 +113,7 @@ def set_up(page: Page, folder: Path) -> None:
     page.until(lambda: gauges.count() == 3, "the third gauge")
     page.page.fill("#gauges li:nth-child(3) input", "middle")
     page.page.press("#gauges li:nth-child(3) input", "Enter")
-    page.page.click("#tab-specimen")
+    page.page.click("#step-specimen > summary")
     for key, value in (("specimen.width_mm", "20"), ("specimen.thickness_mm", "2")):
         page.page.fill(f'[data-set="{key}"]', value)
         page.page.press(f'[data-set="{key}"]', "Tab")
@@ -162,8 +164,8 @@ def run(page: Page, program: Program) -> None:
     page.page.evaluate(WATCH_LAYOUT)
     assert_a_page_without_the_token_is_refused(page, program)
     page.page.keyboard.press("t")
-    page.until(lambda: page.page.is_visible("#ask") or "tared" in page.text("answer"), "asked, or tared")
-    if page.page.is_visible("#ask"):  # in mid-test, unless the noise is just zero
+    page.until(lambda: page.armed() or "tared" in page.text("answer"), "asked, or tared")
+    if page.armed():  # in mid-test, unless the noise is just zero
         page.confirm()
     done = ("N is zero now", "not tared: the load is not still")
     page.until(lambda: any(words in page.text("answer") for words in done), "what the load cell did")
@@ -172,6 +174,7 @@ def run(page: Page, program: Program) -> None:
     page.page.keyboard.press("Enter")
     page.until(lambda: "grip slipped" in page.text("events"), "the note is an event")
     page.page.keyboard.press("p")
+    page.confirm()
     page.until(lambda: page.page.get_attribute("#state", "data-word") == "paused", "paused")
     page.page.wait_for_timeout(350)  # sooner it is a bounce
     page.page.keyboard.press("p")
@@ -198,10 +201,12 @@ def assert_a_page_without_the_token_is_refused(page: Page, program: Program) -> 
 
 def after(page: Page, folder: Path) -> None:
     page.until(lambda: page.page.get_attribute("#report", "aria-disabled") == "false", "the report is made")
-    modulus = page.page.text_content("#results tr:nth-child(2) td")
-    value = float(modulus.split()[0])
-    assert modulus.endswith("GPa") and 66 < value < 74, modulus
-    assert "GPa" not in page.page.text_content("#results tr:nth-child(2) td + td"), "the interval beside it"
+    modulus, interval = (
+        page.page.inner_text(f"#tiles .tile:first-child {part}") for part in (".value", ".sigma")
+    )
+    number, unit = modulus.split()
+    assert unit == "GPa" and 66 < float(number) < 74, modulus
+    assert re.fullmatch(r"95 %\s*± [\d.]+", interval), "the interval below it"
     answer = page.page.context.request.get(page.page.url.rstrip("/") + "/report")
     assert answer.status == 200 and "sandbox" in answer.headers["content-security-policy"]
     assert "<html" in answer.text() and (folder / "runs" / "specimen-1" / "report.html").exists()
@@ -210,7 +215,7 @@ def after(page: Page, folder: Path) -> None:
     page.until(lambda: page.page.input_value('[data-set="metadata.specimen"]') == "specimen-2", "counted up")
     page.until(lambda: "as drawn" in page.text("region"), "the same region")
     page.until(lambda: not page.page.locator("body.pausing").count(), "the pause is over")
-    page.page.click("#setup [data-line=quit]")
+    page.page.click("[data-part=setup] [data-line=quit]")
     page.confirm()
     page.until(lambda: page.stage() == "gone", "it has ended")
 
@@ -277,7 +282,7 @@ def test_another_site_gets_nothing(browser: Any, start: Callable[..., Program]) 
     page.page.wait_for_timeout(500)
     assert page.stage() == "setup" and program.process.poll() is None
     page.until(lambda: not page.page.locator("body.pausing").count(), "the pause is over")
-    page.page.click("#setup [data-line=quit]")
+    page.page.click("[data-part=setup] [data-line=quit]")
     page.confirm()
     page.until(lambda: page.stage() == "gone", "its own page ends it")
     assert program.end() == 0

@@ -8,7 +8,7 @@ from tests.live.ui.web.browser import Page
 from tests.live.ui.web.conftest import Start, measuring
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
-FOCUSED = """selector => { const e = document.activeElement, style = getComputedStyle(e);
+FOCUSED = """selector => { const e = document.activeElement, style = getComputedStyle(e.closest(".box") ?? e);
     const seen = e === document.body || e.matches("main") || style.outlineStyle !== "none" || e.matches(".handle");
     return [e.matches(selector), seen, `${e.tagName} ${e.id} ${e.className}`]; }"""
 
@@ -45,6 +45,7 @@ def last_posted(page: Page, what: str) -> dict[str, object]:
 
 def draw(page: Page) -> None:
     """A rectangle and an extensometer; the cross begins in the middle of 256 x 192 px."""
+    page.press("1")
     tab_to(page, "#drawing")
     assert "Space" in page.text("hint")
     keys(page, ("Shift+ArrowLeft", 8), ("Shift+ArrowUp", 6))
@@ -69,17 +70,17 @@ def draw(page: Page) -> None:
 
 
 def fill_in(page: Page) -> None:
-    """Tabs by arrows, a text, and a load cell from the list, which opens when Enter is pressed and not before."""
-    tab_to(page, "#tab-picture")
-    page.page.keyboard.press("ArrowRight")
+    """Steps by Alt and a digit, a text, and a load cell from the list, which opens with Enter and not before."""
+    page.page.keyboard.press("Alt+2")
+    tab_to(page, "#step-specimen .fold > summary")
+    page.press("Enter")
     tab_to(page, '[data-set="metadata.operator"]')
     page.page.keyboard.type("A. Smith")
     page.page.keyboard.press("Tab")
     page.until(lambda: last_posted(page, "set")["value"] == "A. Smith", "the operator")
-    page.page.keyboard.press("Shift+Tab")
-    while not page.page.evaluate(FOCUSED, "[role=tab]")[0]:
+    while not page.page.evaluate(FOCUSED, "#step-camera > summary")[0]:
         page.page.keyboard.press("Shift+Tab")
-    keys(page, ("ArrowLeft", 2), ("Enter", 1))
+    page.press("Enter")
     page.until(
         lambda: page.page.locator("#loads option[value='none:']").count() == 1, "the list of load cells"
     )
@@ -95,9 +96,11 @@ def fill_in(page: Page) -> None:
     page.page.keyboard.press("Tab")
 
 
-def answer_yes(page: Page) -> None:
-    page.until(lambda: bool(page.page.is_visible("#yes") and page.page.is_enabled("#yes")), "a question")
-    page.press("y")
+def again(page: Page, key: str) -> None:
+    """The same key once more, when the button that it pressed is armed and it counts."""
+    page.until(page.armed, "a button is armed")
+    page.page.wait_for_timeout(300)
+    page.press(key)
 
 
 def test_the_whole_way_by_keyboard(start: Start) -> None:
@@ -110,7 +113,7 @@ def test_the_whole_way_by_keyboard(start: Start) -> None:
     page.until(lambda: page.text("verdict") in ("GO", "NO-GO"), "a verdict")
     page.press("s")
     if page.text("verdict") == "NO-GO":
-        answer_yes(page)
+        again(page, "s")
     measuring(page)
     assert page.page.evaluate("() => document.activeElement.id") == "run", "the focus follows the stage"
     page.until(lambda: page.text("axialsigma").startswith("±"), "figures")
@@ -127,14 +130,14 @@ def test_the_whole_way_by_keyboard(start: Start) -> None:
     page.page.keyboard.press("Enter")
     page.until(lambda: "by hand" in page.text("events"), "a note")
     page.press("x")
-    page.until(lambda: bool(page.page.is_visible("#ask")), "a question")
+    page.until(page.armed, "a button is armed")
     assert page.page.evaluate(moving) == 0, "no motion where less of it is asked for"
-    answer_yes(page)
+    again(page, "x")
     page.until(lambda: page.text("rec") == "NOT RECORDING", "stopped")
     page.press("e")
     page.until(lambda: page.text("rec") == "REC", "recorded again")
     page.press("q")
-    answer_yes(page)
+    again(page, "q")
     page.until(lambda: page.stage() == "after", "it ends")
     page.until(lambda: page.page.get_attribute("#report", "aria-disabled") == "false", "the report is made")
     tab_to(page, "#report")
@@ -143,8 +146,8 @@ def test_the_whole_way_by_keyboard(start: Start) -> None:
     report.value.close()
     page.press("n")
     page.until(lambda: page.stage() == "setup", "the next specimen")
-    tab_to(page, "#setup [data-line=quit]")
+    tab_to(page, "[data-part=setup] [data-line=quit]")
     page.press("Enter")
-    answer_yes(page)
+    again(page, "Enter")
     page.until(lambda: page.stage() == "gone", "it has ended")
     assert not page.errors

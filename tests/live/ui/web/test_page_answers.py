@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from acquire.errors import DataError
+from acquire.errors import DataError, DeviceError
 from live.commands import page as page_command
 from live.commands.exit_codes import EXIT_INTERRUPTED, LOSS
 from live.commands.run import finish
@@ -233,6 +233,23 @@ def test_one_test_after_the_other_with_its_report(monkeypatch: pytest.MonkeyPatc
     (tmp_path / "report.html").unlink()
     served(monkeypatch, last, tmp_path, [0], False)
     assert last.reports == [(None, "why not")] and len(last.messages) == 1
+
+
+def test_without_a_camera_the_page_opens_with_what_there_is(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    draft, said = ConfigDraft(load_config(None, {}), tmp_path / "rig.toml", {}), Said()
+
+    def nothing(given: dict[str, object], screen: Screen) -> None:
+        raise DeviceError("no camera can be used (none is plugged in)")
+
+    monkeypatch.setattr(page_command, "find_devices", nothing)
+    page_command.choose_devices(draft, {}, said)
+    assert not draft.config.camera.address and "or choose one on the page" in said.lines[0]
+    found = SimpleNamespace(camera="sim:", load="none:")
+    monkeypatch.setattr(page_command, "find_devices", lambda given, screen: found)
+    page_command.choose_devices(draft, {}, said)
+    assert (draft.config.camera.address, draft.config.load.address) == ("sim:", "none:")
 
 
 def test_an_interrupted_test_ends_the_page(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -101,7 +101,9 @@ def test_set_up_changed_saved_and_started(at: PageSession, tmp_path: Path) -> No
     assert at.change(do="gauge", kind="line", points=[[50.04, 40], [50, 120]]) == "ok"
     assert at.change(do="gauge", name="axial", points=[[60, 40], [60, 130]]) == "ok", "moved by its handles"
     assert at.change(do="gauge", name="long", was="axial") == "ok"
-    assert session.draft.config.gauges["long"] == {"kind": "line", "start": (60, 40), "end": (60, 130)}
+    assert session.draft.config.gauges["long"] == {
+        "kind": "line", "start": (60, 40), "end": (60, 130), "colour": 3,
+    }  # fmt: skip
     drawn = session.state()["gauges"]["long"]
     assert drawn["handles"] == ((60, 40), (60, 130)) and drawn["outline"][0] == [(60, 40), (60, 130)]
     for wrong in (
@@ -272,7 +274,7 @@ def test_recorded_pictures_are_checked_too(tmp_path: Path, count: int) -> None:
         assert lines["load cell"]["value"].startswith("none") and not lines["load cell"]["measured"]
         assert lines["drift"]["measured"] is (count >= 8)
         draft.change_all({"measure.gauges": "given"})
-        session.region.set_gauges({"gauges.axial": {"kind": "zoi", "at": [-900, 20]}})
+        session.region.set_gauges({"axial": {"kind": "zoi", "at": [-900, 20]}})
         session.check.begin()
         until(lambda: session.state()["go"] is False and not session.state()["checking"])
         assert any("no ZOI is there" in line["value"] for line in session.state()["lines"]), "and why"

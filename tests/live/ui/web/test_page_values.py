@@ -19,6 +19,7 @@ from live.config.loading import Config, load_config
 from live.config.sections import SpecimenConfig
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
+from live.results.maps.colours import diverging_table, sequential_table
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.map_view import MapView
 from live.ui.web.page_consumer import PageConsumer
@@ -211,6 +212,32 @@ def test_the_map_moves_with_the_specimen() -> None:
     assert np.mean(rows) == pytest.approx(grid.y[2] - 10, abs=1.5)
 
 
+@pytest.mark.parametrize(
+    ("span", "strains", "is_diverging", "ends"),
+    [
+        ("automatic", (1e-3, 3e-3), False, (8e-4, 3.2e-3)),
+        ("automatic", (-1e-3, 3e-3), True, (-4e-3, 4e-3)),
+        ("symmetric", (1e-3, 3e-3), True, (-4e-3, 4e-3)),
+        ("fixed", (1e-3, 3e-3), True, (-0.01, 0.01)),
+    ],
+)
+def test_a_map_brings_the_colours_of_its_bar(
+    span: str, strains: tuple[float, float], is_diverging: bool, ends: tuple[float, float]
+) -> None:
+    grid = make_grid()
+    eyy = np.linspace(*strains, grid.shape[0])[:, None] * np.ones(grid.shape)
+    view = MapView(load_config(None, {"specimen.axis": "y"}))
+    assert view.choose("eyy", span, 0.01) == ""
+    _, shown = view.draw(replace(pictured(), field=StrainField.from_values(grid, {"dv_dy": eyy}, 1e-6)))
+    table = diverging_table() if is_diverging else sequential_table()
+    assert shown["diverging"] is is_diverging and len(shown["ramp"]) == 11
+    assert [shown["ramp"][0], shown["ramp"][-1]] == [f"#{bytes(table[k]).hex()}" for k in (0, -1)]
+    assert (shown["low"], shown["high"]) == pytest.approx(ends, rel=0.05)
+    view.choose("sigma", span, 0.01)
+    _, shown = view.draw(replace(pictured(), field=StrainField.from_values(grid, {"dv_dy": eyy}, 1e-6)))
+    assert not shown["diverging"] and shown["low"] == 0
+
+
 def test_the_lines_over_the_curve_are_in_si_units() -> None:
     specimen = SpecimenConfig(width_mm=WIDTH_MM, thickness_mm=THICKNESS_MM, axis="y")
     state = RunState.new(1.0, specimen=specimen)
@@ -232,4 +259,4 @@ def test_the_lines_over_the_curve_are_in_si_units() -> None:
     assert highest["words"]["name"] == "Rm"
     assert highest["words"]["value"] == pytest.approx(force_of(PULLED[-1]) / 20e-6, rel=1e-6)
     (e,) = (one for one in result["figures"] if one["name"] == "E")
-    assert e["text"].endswith(" GPa") and float(e["text"].split()[0]) == pytest.approx(70.0, rel=5e-3)
+    assert e["text"].kind == "stress" and e["text"].value == pytest.approx(70e9, rel=5e-3)

@@ -40,7 +40,7 @@ def test_a_recording_shows_force_strain_and_curve_of_one_instant(
     ]
     assert main(["run", *recorded, *OPTIONS[:-2]]) == 0
     page = start(load="none:")
-    page.page.click("#tab-devices")
+    page.page.click("#step-camera > summary")
     for select in ("cameras", "loads"):
         choose(page, select, "session:runs/bar/session.h5")
     page.page.keyboard.press("c")

@@ -15,9 +15,11 @@ import pytest
 
 from acquire.errors import ConfigError, DataError
 from acquire.frame import CameraInfo, Frame, frozen
+from live.config.gauges import with_colours
 from live.config.loading import load_config
 from live.setup.pictures import read_mask
 from live.ui.web.broadcaster import Broadcaster
+from live.ui.web.map_view import gauge_shapes
 from live.ui.web.setup.config_draft import second_draft
 from live.ui.web.setup.draft_changes import CHANGES
 from live.ui.web.setup.drawn_region import DrawnRegion
@@ -117,19 +119,26 @@ def session(tmp_path: Path) -> Iterator[SetupSession]:
 
 def test_settings_of_the_camera_are_in_its_address(session: SetupSession) -> None:
     for name, request in (
-        ("camera", {"key": "gain", "value": 7}), ("option", {"key": "fps", "value": " 12 "}),
+        ("camera", {"key": "gain", "value": 7}), ("option", {"key": "fps", "value": 12.5}),
         ("option", {"key": "fps", "value": ""}), ("option", {"key": "format", "value": "Y12"}),
         ("address", {"value": "sim:hole"}),
     ):  # fmt: skip
         CHANGES[name](session, request)
     opened: Any = session.preview
-    assert opened.opened == ["sim:?fps=5&gain=7", "sim:?fps=12&gain=2", "sim:?gain=2", "sim:?fps=5&gain=2&format=Y12",
+    assert opened.opened == ["sim:?fps=5&gain=7", "sim:?fps=12.5&gain=2", "sim:?gain=2", "sim:?fps=5&gain=2&format=Y12",
                              "sim:hole"]  # fmt: skip
     for name, request, words in (
         ("camera", {"key": "fps", "value": 3}, "one of gain"),
         ("option", {"key": "gain", "value": "3"}, "format and fps"),
         ("option", {"key": "fps", "value": "1" * 41}, "format and fps"),
-        ("option", {"key": "fps", "value": 3}, "format and fps"),
+        ("option", {"key": "format", "value": None}, "format and fps"),
+        ("option", {"key": "fps", "value": "20,5"}, "a rate in 1/s is a number from 0.01 to 100000"),
+        ("option", {"key": "fps", "value": 0}, "a rate in 1/s is a number"),
+        ("option", {"key": "fps", "value": True}, "a rate in 1/s is a number"),
+        ("set", {"key": "specimen.width_mm", "value": "20,5"}, "specimen.width_mm"),
+        ("set", {"key": "specimen.width_mm", "value": "20"}, "specimen.width_mm"),
+        ("set", {"key": "specimen.width_mm", "value": -1}, "specimen.width_mm"),
+        ("scale", {"points": [[1, 2], [50, 2]], "mm": "10"}, "a distance is a number"),
         ("overlay", {"name": "x", "on": True}, "the overlays are saturated, quality"),
         ("draw", {"strokes": []}, "strokes are a list"), ("draw", {"strokes": [{}] * 501}, "strokes are a list"),
         ("draw", {"strokes": ["a"]}, "a stroke has"), ("scale", {"points": [[1, 2]], "mm": 3}, "two points"),
@@ -220,24 +229,69 @@ def test_what_is_not_measured_is_darkened(tmp_path: Path) -> None:
 def test_one_undo_for_region_and_gauges(tmp_path: Path) -> None:
     region = region_of_box(tmp_path)
     gauge = {"kind": "zoi", "at": [60, 60]}
-    region.set_gauges({"gauges.a": gauge})
+    region.set_gauges({"a": gauge})
     region.draw([{"tool": "rectangle", "points": [[0, 0], [49, 39]]}])
-    region.set_gauges({"gauges.a": None, "gauges.b": gauge})
+    assert region.can == ["undo"]
+    region.set_gauges({"b": gauge})
     assert region.known.box == (0, 0, 50, 40) and set(region._draft.config.gauges) == {"b"}
     region.undo()
     assert region.known.box == (0, 0, 50, 40) and set(region._draft.config.gauges) == {"a"}
     edition = region.edition
     region.undo()
     assert region.known.box == (20, 30, 100, 90) and region.edition == edition + 1
-    region.undo()
-    assert not region._draft.config.gauges
+    assert region.can == ["undo", "redo"]
+    region.redo()
+    assert region.known.box == (0, 0, 50, 40) and region.edition == edition + 2
+    region.redo()
+    assert set(region._draft.config.gauges) == {"b"} and region.can == ["undo"]
+    with pytest.raises(ConfigError, match="nothing to make again"):
+        region.redo()
+    for _ in range(3):
+        region.undo()
+    assert not region._draft.config.gauges and region.can == ["redo"]
     with pytest.raises(ConfigError, match="nothing to undo"):
         region.undo()
+    region.redo()
     for k in range(15):
+        assert k == 0 or region.can == ["undo"], "a new edit ends what could be made again"
         region.draw([{"tool": "rectangle", "points": [[0, 0], [10 + k, 9]]}])
     for _ in range(12):
         region.undo()
     assert region.known.box == (0, 0, 13, 10), "the first three cannot be undone"
+
+
+def test_a_gauge_keeps_place_and_colour_when_it_is_renamed_and_saved(session: SetupSession) -> None:
+    session.region.drawn = DrawnRegion(np.ones((192, 256), bool), "all")
+    for name, x in (("a", 40), ("b", 90), ("c", 140)):
+        CHANGES["gauge"](session, {"name": name, "gauge": {"kind": "zoi", "at": [x, 60]}})
+    CHANGES["gauge"](session, {"name": "a", "gauge": None})
+    CHANGES["gauge"](session, {"name": "first", "was": "b"})
+    CHANGES["gauge"](session, {"kind": "zoi", "points": [[200, 60]]})
+
+    def seen() -> list[tuple[str, int]]:
+        return [(name, shape["colour"]) for name, shape in gauge_shapes(session.draft.config).items()]
+
+    now = [("first", 1), ("c", 2), ("point", 0)]
+    assert seen() == now, "the colour that is free is taken again"
+    CHANGES["gauge"](session, {"name": "first", "points": [[95, 60]]})
+    assert seen() == now and session.draft.config.gauges["first"]["at"] == (95, 60)
+    CHANGES["undo"](session, {})
+    CHANGES["undo"](session, {})
+    CHANGES["undo"](session, {})
+    assert seen() == [("b", 1), ("c", 2)]
+    CHANGES["redo"](session, {})
+    assert seen() == now[:2]
+    session.region.save()
+    CHANGES["gauge"](session, {"name": "again", "was": "first"})
+    session.region.save()
+    saved = load_config(session.draft.path, {}).gauges
+    assert [(name, table["colour"]) for name, table in saved.items()] == [("again", 1), ("c", 2)]
+    assert session.draft.changes == {}
+
+
+def test_gauges_of_a_file_without_colours_have_those_of_their_places() -> None:
+    tables = {"a": {"kind": "zoi"}, "b": {"kind": "zoi", "colour": 0}, "c": {"kind": "zoi"}}
+    assert [one["colour"] for one in with_colours(tables).values()] == [1, 0, 2]
 
 
 def test_a_region_holds_for_pictures_of_its_size(tmp_path: Path) -> None:

@@ -20,19 +20,16 @@ from live.words.language import said
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeKernel
 from tests.live.ui.web.browser import Page, Program
 from tests.live.ui.web.conftest import CAMERA, OPTIONS, Start, another, measuring, started
-from tests.live.ui.web.legibility import COLOURS, contrast, fits, readable
+from tests.live.ui.web.legibility import LETTERS, LINES, contrast, fits, readable
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
 
-ASKED = """() => [document.getElementById("ask").open, document.body.classList.contains("pausing")]"""
-# Asked and answered at once: no timer runs in between.
-TOO_EARLY = """() => { document.querySelector("#setup [data-line=quit]").click();
-    const buttons = ["yes", "no"].map(id => document.getElementById(id)), disabled = buttons.map(one => one.disabled);
-    for (const one of buttons) one.click();
-    for (const key of ["y", "Enter"]) document.getElementById("ask").dispatchEvent(
-        new KeyboardEvent("keydown", { key, bubbles: true }));
-    return disabled; }"""
+ASKED = """() => [document.querySelector(".armed") !== null, document.body.classList.contains("pausing")]"""
+# Armed and pressed again at once: no timer runs in between.
+TOO_EARLY = """() => { const button = document.querySelector("[data-part=setup] [data-line=quit]");
+    for (let k = 0; k < 4; k++) button.click();
+    return [button.className, button.textContent]; }"""
 
 
 def held(page: Page, key: str, seconds: float) -> None:
@@ -47,33 +44,33 @@ def test_a_finger_that_rests_or_bounces_does_nothing(browser: Any, start: Start)
     page = start()
     page.until(lambda: not page.page.locator("body.pausing").count(), "the pause is over")
     held(page, "s", 1.5)
-    assert page.stage() == "setup" and page.page.is_visible("#ask"), "held: asked, and no more"
-    page.page.click("#no")
+    assert page.stage() == "setup" and page.armed(), "held: armed, and no more"
+    page.page.keyboard.press("Escape")
+    assert not page.armed(), "Escape disarms"
     page.page.dblclick("#start")
     page.page.wait_for_timeout(700)
-    assert page.stage() == "setup" and page.page.is_visible("#ask"), "a double click is not a confirmation"
-    page.page.click("#yes")
+    assert page.stage() == "setup" and page.armed(), "a double click is not a confirmation"
+    page.page.click("#start")
     page.until(lambda: page.stage() == "run", "it runs")
     page.page.keyboard.press("q")
-    page.page.click("#run .main")
+    page.page.click("[data-part=run] .main")
     asked, pausing = page.page.evaluate(ASKED)
     assert not (asked and pausing), "the commands pause for a second"
-    if asked:  # the machine took longer than the pause
-        page.page.click("#no")
+    page.page.keyboard.press("Escape")
     page.until(lambda: page.page.get_attribute("#state", "data-word") == "measuring", "it measures")
     held(page, "q", 0.8)
-    assert page.stage() == "run" and page.page.is_visible("#ask"), "held: asked, and no more"
+    assert page.stage() == "run" and page.armed(), "held: armed, and no more"
     other = Page(browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US").new_page())
     other.goto(page.address)
     other.until(lambda: other.stage() == "run", "another page")
     other.press("q")
     other.page.wait_for_timeout(900)
     assert page.stage() == other.stage() == "run", "two pages do not confirm one another"
-    page.page.click("#yes")
+    page.until(lambda: not page.armed(), "four seconds disarm")
+    page.press("q")
+    page.confirm()
     page.until(lambda: page.stage() == "after", "it ends")
-    other.until(
-        lambda: other.stage() == "after" and not other.page.is_visible("#ask"), "the question is gone"
-    )
+    other.until(lambda: other.stage() == "after" and not other.armed(), "no button is armed any more")
     held(page, "s", 1.5)
     assert page.stage() == "after", "the keys of start, record and next differ"
     page.press("n")
@@ -85,28 +82,26 @@ def test_a_finger_that_rests_or_bounces_does_nothing(browser: Any, start: Start)
 def test_a_confirmation_takes_half_a_second(start: Start) -> None:
     page = start()
     page.page.wait_for_timeout(1100)
-    assert page.page.evaluate(TOO_EARLY) == [True, True], "yes and no are disabled"
-    assert page.stage() == "setup" and page.page.is_visible("#ask"), "too early"
-    trigger, confirm = page.page.locator("#setup [data-line=quit]"), page.page.locator("#yes")
-    a, b = trigger.bounding_box(), confirm.bounding_box()
-    assert a["x"] + a["width"] < b["x"] or a["y"] > b["y"] + b["height"], "at another place"
-    page.until(lambda: page.page.is_enabled("#yes"), "it can be answered")
-    page.page.click("#yes")
+    classes, words = page.page.evaluate(TOO_EARLY)
+    assert "armed" in classes and "Press again: End phasedic" in words
+    assert page.stage() == "setup" and page.armed(), "too early"
+    assert page.text("answer").startswith("End phasedic? No test is running."), "said why"
+    page.confirm()
     page.until(lambda: page.stage() == "gone", "it has ended")
 
 
 def test_the_load_cell_in_the_set_up(start: Start) -> None:
     page = start()
-    page.until(lambda: "N" in page.text("setupforce"), "the force is live")
-    assert re.fullmatch(r"[+−]\d+(\.\d+)? N", page.text("setupforce"))
-    page.page.click("#tab-devices")
+    page.until(lambda: any(map(str.isdigit, page.text("setupforce"))), "the force is live")
+    assert re.fullmatch(r"[+−]?\d+(\.\d+)?N", page.page.text_content("#setupforcetile .value"))
+    page.page.click("#step-camera > summary")
     page.until(lambda: "1.0" in page.text("forcenoise") or "0.9" in page.text("forcenoise"), "its noise")
-    page.page.click("#panel-devices [data-do=tare]")
+    page.page.click("#step-camera [data-do=tare]")
     page.until(lambda: "zero" in page.text("zero") or "still" in page.text("answer"), "tared, or why not")
     page.page.keyboard.press("c")
     page.until(lambda: page.text("verdict") in ("GO", "NO-GO"), "a verdict")
-    assert "load cell" in page.text("lines")
-    page.page.click("#tab-devices")
+    assert "load cell" in page.text("verdicts")
+    page.page.click("#step-camera > summary")
     page.page.fill("#loadaddress", "/dev/nothing?protocol=ascii")
     page.page.press("#loadaddress", "Enter")
     page.until(lambda: "there is no such port" in page.text("loadtrouble"), "the reason")
@@ -116,7 +111,7 @@ def test_the_load_cell_in_the_set_up(start: Start) -> None:
     button = page.page.locator("#start")
     assert "Start without GO" in str(button.text_content()) and "doubtful" in button.get_attribute("class")
     page.press("s")
-    assert "load cell" in page.text("because")
+    assert "load cell" in page.text("answer")
     page.confirm()
     page.until(lambda: page.page.is_visible("#failed"), "a failed start leads back")
     assert page.stage() == "setup" and "there is no such port" in page.text("whyfailed")
@@ -128,7 +123,7 @@ def test_the_load_cell_in_the_set_up(start: Start) -> None:
 
 def test_devices_by_hand(start: Start) -> None:
     page = start(load="none:")
-    page.page.click("#tab-devices")
+    page.page.click("#step-camera > summary")
     page.until(lambda: page.page.locator("#cameras option[value='sim:hole']").count() == 1, "the list")
     page.page.fill("#rate", "7")
     page.page.press("#rate", "Tab")
@@ -145,8 +140,9 @@ def test_devices_by_hand(start: Start) -> None:
         page.page.wait_for_timeout(350)  # sooner another Enter is a bounce
     assert page.text("setupforce") == "none"
     page.page.select_option("#loads", "sim:")
-    page.until(lambda: " N" in page.text("setupforce"), "a load cell from the list")
-    page.page.click("#tab-specimen")
+    page.until(lambda: any(map(str.isdigit, page.text("setupforce"))), "a load cell from the list")
+    page.page.click("#step-specimen > summary")
+    page.page.click("#step-specimen .fold > summary")
     for key, value in (("material", "S235"), ("operator", "A. Smith"), ("note", "second batch")):
         page.page.fill(f'[data-set="metadata.{key}"]', value)
         page.page.press(f'[data-set="metadata.{key}"]', "Tab")
@@ -160,7 +156,7 @@ def test_gauges(start: Start) -> None:
     page.page.keyboard.press("g")
     page.until(lambda: page.page.locator("#gauges li").count() == 3, "placed where there are none")
     page.press("g")
-    assert "replaced" in page.text("because"), "asked before they are replaced"
+    assert page.armed() and "replaced" in page.text("answer"), "asked before they are replaced"
     page.page.keyboard.press("Escape")
     page.page.click("[data-tool=circle]")
     page.drag((120.0, 90.0), (150.0, 90.0))
@@ -179,14 +175,13 @@ def test_gauges(start: Start) -> None:
             && a.y < b.y + b.height * .8 && b.y < a.y + a.height * .8)); }"""
     assert not page.page.evaluate(overlap), "names lie on one another"
     colours = """() => new Set([...document.querySelectorAll("#gauges .key")].slice(0, 12)
-        .map(e => e.style.background)).size"""
+        .map(e => getComputedStyle(e).stroke + getComputedStyle(e).strokeDasharray)).size"""
     assert page.page.evaluate(colours) == 12
-    scrolls = "() => { const e = document.getElementById('gauges'); return e.scrollHeight > e.clientHeight; }"
-    assert page.page.evaluate(scrolls) and page.page.is_visible("#board"), (
-        "the list scrolls, what follows stays"
-    )
+    scrolls = "() => { const e = document.querySelector('.steps'); return e.scrollHeight > e.clientHeight; }"
+    assert page.page.evaluate(scrolls), "a long list scrolls, what follows stays"
+    page.page.locator("#board").scroll_into_view_if_needed()
     started(page)
-    page.until(lambda: page.page.locator("#names li").count() == 14, "a legend beside the curve")
+    page.until(lambda: page.page.locator("#others li .key").count() == 14, "the keys of the curves")
     assert not page.errors
 
 
@@ -205,19 +200,22 @@ def test_a_run(start: Start) -> None:
     number = page.text("axialsigma").removeprefix("± ").removesuffix(" µm/m")
     assert len(number.replace(".", "").lstrip("0")) == 2, "two digits"
     page.until(
-        lambda: "mm" in page.text("elongation") and "1/s" in page.text("strainrate"), "elongation, rate"
+        lambda: page.text("elongation") != "–" and "·10" in page.text("strainrate"), "elongation, rate"
     )
     page.page.select_option("#strainunit", "%")
     page.until(lambda: page.text("axialsigma").endswith("%"), "one unit for figures")
-    page.until(lambda: page.text("high").endswith("%") and "%" in page.text("others"), "map and gauges too")
+    legend = page.page.locator("#maplegend")
+    page.until(lambda: legend.locator(".title").inner_text().endswith("%"), "the map too")
+    page.until(lambda: "%" in page.text("others"), "gauges too")
     page.page.select_option("#strainunit", "µm/m")
     page.page.select_option("#range", "symmetric")
-    page.until(lambda: page.text("low") == "−" + page.text("high").split()[0], "symmetric")
+    marks = legend.locator(".marks:not(.up) span")
+    page.until(lambda: marks.nth(0).text_content() == f"−{marks.nth(2).text_content()}", "symmetric")
     page.page.select_option("#range", "fixed")
     page.page.fill("#limit", "5000")
     page.page.press("#limit", "Tab")
-    page.until(lambda: page.text("high") == "5000 µm/m", "fixed")
-    assert page.page.locator("#histogram rect").count() == 24
+    page.until(lambda: marks.nth(2).text_content() == "5000", "fixed")
+    assert legend.locator(".histogram.up rect").count() == 24
     box = page.page.locator("#gaugemap").bounding_box()
     middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.page.mouse.move(*middle)
@@ -228,7 +226,7 @@ def test_a_run(start: Start) -> None:
     page.page.mouse.wheel(0, -200)
     assert "scale" in page.page.evaluate("() => document.querySelector('#run .zoomed').style.transform")
     page.page.select_option("#component", "status")
-    page.until(lambda: "measured" in page.text("statuses"), "a legend of the statuses")
+    page.until(lambda: "measured" in legend.locator(".statuses").inner_text(), "a legend of the statuses")
     curve = page.page.locator("#curve1 .u-over").bounding_box()
     page.page.mouse.move(curve["x"] + curve["width"] / 2, curve["y"] + curve["height"] / 2)
     page.until(lambda: "MPa" in str(page.page.text_content("#run .curves .at")), "the curve is read out")
@@ -242,16 +240,14 @@ def test_after_a_test(start: Start) -> None:
     started(page)
     page.until(lambda: page.stage() == "after", "it is over")
     page.until(lambda: page.page.get_attribute("#report", "aria-disabled") == "false", "the report is made")
-    rows = page.page.locator("#results tr")
-    words = [str(rows.nth(k).text_content()) for k in range(rows.count())]
-    assert any(re.match(r"Rm[\d.]+ MPa± [\d.]+", text) for text in words), words
-    known, unknown = page.page.locator("#results tr:not(.unknown)"), page.page.locator("#results tr.unknown")
-    heights = [
-        [found.nth(k).bounding_box()["height"] for k in range(found.count())] for found in (known, unknown)
-    ]
-    assert max(heights[0]) < 34, "a figure and its interval are one line"
-    assert max(heights[1], default=0) < 45, "why there is none, two at most"
-    assert page.page.locator("#gaugeresults tr").count() == 4 and "µm/m" in page.text("gaugeresults")
+    tiles = page.page.locator("#tiles .tile")
+    words = [str(tiles.nth(k).text_content()) for k in range(tiles.count())]
+    assert len(words) == 4 and any(re.match(r"Rm[\d.]+MPa95 %± [\d.]+", text) for text in words), words
+    rows = page.page.locator("#results .row:not(.words):not(:has(.small))")
+    heights = [rows.nth(k).bounding_box()["height"] for k in range(rows.count())]
+    assert max(heights, default=0) < 34, "a figure and its interval are one line"
+    assert page.page.locator("#gaugeresults li").count() == 3 and "µm/m" in page.text("gaugeresults")
+    assert page.text("believed"), "whether they can be believed"
     assert "adds up" in page.text("ledger")
     page.until(
         lambda: page.page.evaluate("() => document.getElementById('peakmap').naturalWidth") > 0, "a map"
@@ -264,7 +260,7 @@ def test_after_a_test(start: Start) -> None:
     report.value.close()
     page.press("m")
     page.until(lambda: page.stage() == "setup", "the same specimen again")
-    page.page.click("#tab-specimen")
+    page.page.click("#step-specimen > summary")
     page.until(lambda: page.page.input_value('[data-set="metadata.specimen"]') == "specimen-1", "its name")
     assert not page.errors
 
@@ -278,12 +274,12 @@ def test_the_whole_way_in_three_languages(browser: Any, start: Start) -> None:
     pages = [page, *(another(browser, page.address, locale) for locale in LOCALES[1:])]
     page.page.keyboard.press("g")
     page.until(lambda: page.page.locator("#gauges li").count() == 3, "gauges")
-    for tab in ("devices", "picture", "specimen", "check"):
+    for tab in ("camera", "specimen", "gauges", "check"):
         if tab == "check":
             page.page.keyboard.press("c")
             page.until(lambda: page.text("verdict") in ("GO", "NO-GO"), "a verdict")
         for one in pages:
-            one.page.click(f"#tab-{tab}")
+            one.page.click(f"#step-{tab} > summary")
             fits(one, tab)
         readable(page, tab)
     page.page.keyboard.press("s")
@@ -294,16 +290,18 @@ def test_the_whole_way_in_three_languages(browser: Any, start: Start) -> None:
         one.until(lambda one=one: one.text("axialsigma").startswith("±"), "figures")  # type: ignore[misc]
         fits(one, "run")
         one.page.set_viewport_size({"width": 390, "height": 800})
-        assert all(one.page.is_visible(what) for what in ("#force", "#curve1", "#run .main"))
+        assert all(one.page.is_visible(what) for what in ("#force", "#curve1", "[data-part=run] .main"))
         one.page.set_viewport_size({"width": 1280, "height": 800})
     readable(page, "run")
     page.press("x")
-    page.until(lambda: bool(page.page.is_enabled("#yes")), "a question")
-    readable(page, "question")
+    page.until(page.armed, "a button is armed")
+    readable(page, "armed")
+    if not page.armed():  # four seconds are over
+        page.press("x")
     page.confirm()
-    page.until(lambda: page.page.get_attribute("#rec", "class") == "off", "not recorded")
+    page.until(lambda: page.page.get_attribute("#state .rec", "class") == "rec off", "not recorded")
     page.press("e")
-    page.until(lambda: page.page.get_attribute("#rec", "class") == "on", "recorded")
+    page.until(lambda: page.page.get_attribute("#state .rec", "class") == "rec on", "recorded")
     page.page.select_option("#component", "status")
     page.press("q")
     page.confirm()
@@ -349,7 +347,7 @@ def test_remarks_and_words_of_a_result_fit(browser: Any, start: Start) -> None:
         }
         one.page.evaluate(SHOW_RESULT, {**made, "report": True})
         fits(one, "after")
-        assert one.page.inner_text("#results tr:nth-child(2) td").startswith("71 GPa ")
+        assert one.page.inner_text("#results li:first-child b").startswith("71 GPa ")
         assert not one.errors
 
 
@@ -373,15 +371,16 @@ def test_messages_of_devices_and_the_colours_of_gauges(start: Start) -> None:
     sent = [one.to_json() if isinstance(one, Message) else one for one in texts]
     german = [said(one, "de") for one in texts]
     assert page.page.evaluate(TRANSLATED, sent) == german and not set(german) & set(texts)
-    page.page.click("#tab-devices")
+    page.page.click("#step-camera > summary")
     page.page.fill("#cameraaddress", "files:/no/such/folder")
     page.page.press("#cameraaddress", "Enter")
     page.until(lambda: "dort ist kein Bild" in page.text("answer"), "the refusal in German")
-    colours = page.page.evaluate(COLOURS)
-    panels = {"light": [255, 255, 255], "dark": [0x1A, 0x1D, 0x22]}
-    for line, letters in colours:
+    for letters in page.page.evaluate(LETTERS):
         assert contrast(letters, [255, 255, 255]) >= 4.5, letters
-        assert min(contrast(line, panel) for panel in panels.values()) >= 3, line
+    for _ in ("light", "dark"):
+        panel, *lines = page.page.evaluate(LINES)
+        assert len(lines) == 6 and min(contrast(line, panel) for line in lines) >= 3, lines
+        page.page.click("#theme")
     assert page.page.evaluate("() => [...untranslated]") == []
 
 
@@ -393,7 +392,7 @@ def test_the_front_fails_and_the_back_goes_on(browser: Any, tmp_path: Path) -> N
         page = Page(browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US").new_page())
         page.goto(program.address)
         page.until(lambda: page.page.locator("#runviews .bad").count() == 1, "the front has failed")
-        page.until(lambda: page.text("axialname").endswith(", back"), "the figures of the back")
+        page.until(lambda: page.text("axialof").endswith(", back"), "the figures of the back")
         assert page.text("word") == "measuring" and "mean" not in page.text("sides")
         page.press("q")
         page.confirm()
@@ -433,8 +432,14 @@ def test_front_and_back_of_a_test_with_two_cameras(browser: Any, tmp_path: Path)
         page.until(lambda: page.stage() == "after", "the result")
         page.until(lambda: "Rm, both" in page.page.inner_text("#after"), "the figures of both")
         page.until(
-            lambda: page.page.is_visible("#peakmap") and page.page.is_visible("#peakmap2"), "both maps"
+            lambda: (
+                page.page.is_visible("#peakmap")
+                and "side=front" in page.page.get_attribute("#peakmap", "src")
+            ),
+            "the map",
         )
+        page.page.click("#peakside button:nth-child(2)")
+        page.until(lambda: "side=back" in page.page.get_attribute("#peakmap", "src"), "the map of the back")
         assert not page.errors
         folders = {path.parent.name for path in tmp_path.glob("runs/*/*/strain.h5")}
         assert folders == {"front", "back"}

@@ -1,0 +1,331 @@
+"""Each figure of each stage by its value, in a browser, from made-up states; and each wrong figure is found."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from live.config.loading import load_config
+from live.ui.web.page_controller import PageController
+from live.ui.web.setup.config_draft import ConfigDraft
+from tests.live.ui.web.browser import ROOT, Page
+from tests.live.ui.web.made_up import (
+    MAP,
+    STAGE,
+    WHAT,
+    figure,
+    number,
+    opened,
+    quantity,
+    run_state,
+    show,
+    show_after,
+    show_run,
+    show_setup,
+    tile,
+)
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+STATIC = ROOT / "live" / "ui" / "web" / "static"
+
+
+def unit_of_strains(page: Page, unit: str) -> None:
+    page.page.evaluate("""unit => { const select = document.getElementById("strainunit");
+        select.value = unit; select.dispatchEvent(new Event("change")); }""", unit)  # fmt: skip
+
+
+def near(value: float, wanted: float) -> bool:
+    """As shown: at least four digits of it."""
+    return value == pytest.approx(wanted, rel=3e-4)
+
+
+def check_tiles(page: Page) -> None:
+    show_run(page)
+    for unit in ("µm/m", "%"):
+        unit_of_strains(page, unit)
+        assert page.text("axialunit") == unit
+        assert near(tile(page, "force"), 8035.3) and near(tile(page, "stress"), 267.84e6)
+        assert near(tile(page, "axial"), 19.988e-2)
+        sigma = page.text("axialsigma").removeprefix("± ")
+        assert quantity(sigma) == pytest.approx(2e-5)
+        assert near(quantity(page.page.inner_text("#others b").split(" ±")[0] + f" {unit}"), -7.703e-2)
+    assert near(quantity(page.text("forceof").removeprefix("highest ")), 8044.7)
+    assert "30.00 mm²" in page.text("stressof")
+    assert near(number(page.text("elongation")), 6.33) and page.text("strainrate") == "3.1·10⁻³"
+
+
+def check_machine(page: Page) -> None:
+    show_run(page)
+    facts = {
+        text.split(" ", 1)[1]: text.split(" ", 1)[0]
+        for text in page.page.locator("#strip > span").all_inner_texts()
+        if not text.startswith(("44", "16"))
+    }
+    assert facts["lost"] == "5", "what was not recorded is lost too"
+    assert (facts["frames/s"], facts["recorded"]) == ("10", "876")
+    assert "matters" in page.page.get_attribute("#strip > span:has-text('lost')", "class")
+    assert page.page.locator("#strip .matters").count() == 1, "quiet until it counts"
+    shown = page.page.inner_text("#strip")
+    assert "44 ms" in shown and "16 h" in shown
+
+
+def read_out(page: Page, curve: str) -> list[str]:
+    """What is read at the last point of a curve."""
+    page.until(lambda: page.page.locator(f"#{curve} canvas").count() == 1, "the curve")
+    page.page.focus(f"#{curve}")
+    page.page.keyboard.press("ArrowRight")
+    at = page.page.locator(f"figure:has(#{curve}) .at")
+    page.until(lambda: bool(at.inner_text()), "it is read out")
+    return str(at.inner_text()).rsplit(": ", 1)[1].split(" · ")
+
+
+def check_curves(page: Page) -> None:
+    for unit, factor in (("µm/m", 1e-6), ("%", 1e-2)):
+        show_run(page)
+        unit_of_strains(page, unit)
+        strain, stress = read_out(page, "curve1")
+        assert near(number(strain) * factor, 19.988e-2) and near(quantity(stress), 267.84e6)
+        seconds, gauge = read_out(page, "curve2")
+        assert near(number(seconds), 2.0) and near(quantity(gauge), 19.994e-2)
+    assert "%" in page.page.inner_text("figure:has(#curve1) .axis")
+
+
+def marks(page: Page, legend: str) -> list[float]:
+    """The marks of a colour bar from low to high; those beside an upright bar say the same."""
+    beside = page.page.locator(f"#{legend} .marks.up span").all_text_contents()
+    along = page.page.locator(f"#{legend} .marks:not(.up) span").all_text_contents()
+    assert along == beside[::-1]
+    return [number(text) for text in along]
+
+
+def check_maps(page: Page) -> None:
+    show_run(page)
+    for legend in ("maplegend", "peaklegend"):
+        if legend == "peaklegend":
+            show_after(page)
+        for unit, factor in (("%", 1e-2), ("µm/m", 1e-6)):
+            unit_of_strains(page, unit)
+            assert page.page.locator(f"#{legend} .title").text_content().endswith(unit)
+            low, middle, high = (mark * factor for mark in marks(page, legend))
+            assert near(low, 0.185) and near(middle, 0.2) and near(high, 0.215)
+            bars = page.page.locator(f"#{legend} .histogram:not(.up) rect")
+            assert [float(bars.nth(k).get_attribute("height")) for k in (0, 23)] == [0, 10]
+
+
+def check_setup(page: Page) -> None:
+    show_setup(page)
+    assert near(number(page.text("setupforce")), -12.3) and quantity(page.text("forcenoise")[2:]) == 0.5
+    assert near(number(page.text("sharpness")), 0.36) and page.text("sharpof").startswith("90 %")
+    assert page.text("saturated") == "1.23 %"
+    assert near(number(page.text("sigma")) * 1e-6, 75e-6) and page.text("sigmaunit") == "µm/m"
+    assert "30.00 mm²" in page.text("section") and "20 × 1.5 mm" in page.text("specimensum")
+    scale = re.search(r"([\d.]+) px/mm ± ([\d.]+) %", page.text("scale"))
+    assert scale and near(float(scale[1]), 24.0)
+    assert float(scale[2]) == pytest.approx(100 * 2e-5 * 24.0, abs=0.006), "of mm/px, as a share"
+    cells = page.page.locator("#table td").all_text_contents()
+    assert near(number(cells[1]), 80 / 24) or cells[1] == "3.33", "VSG in mm: px over px/mm"
+    assert [number(cell) for cell in cells[2:]] == [150, 75]
+    show_setup(page, scale={"px_per_mm": None, "sigma": None})
+    assert page.page.locator("#table td").all_text_contents()[1] == "80", "VSG in px"
+
+
+def check_after(page: Page) -> None:
+    show_after(page)
+    tiles = page.page.locator("#tiles .tile")
+    values = [tiles.nth(k).locator(".value").inner_text().split("\n") for k in range(2)]
+    assert [[one.strip() for one in value if one.strip()] for value in values] == [
+        ["69.905", "GPa"],
+        ["268.16", "MPa"],
+    ]
+    assert "0.057" in tiles.nth(0).inner_text() and "18.90 %" in page.text("results")
+    unit_of_strains(page, "%")
+    assert near(quantity(str(page.page.text_content("#gaugeresults b")).split(" ±")[0] + " %"), -7.703e-2)
+    assert page.text("believed") == "E, Rm can be believed." and "01:25" in page.text("peakwords")
+    strain, stress = read_out(page, "curve3")
+    assert near(number(strain) * 1e-2, 19.988e-2) and near(quantity(stress), 267.84e6)
+
+
+CHECKS = [check_tiles, check_machine, check_curves, check_maps, check_setup, check_after]
+
+
+@pytest.mark.parametrize("check", CHECKS)
+def test_figures_by_value(browser: Any, check: Callable[[Page], None]) -> None:
+    with opened(browser) as page:
+        check(page)
+        assert not page.errors
+
+
+FAULTS = {
+    "strain in % ten times too small": ("numbers.js", r'\["%", 1e-2, 1e-2, 4\]', '["%", 1e-1, 1e-2, 4]', check_tiles),
+    "kPa under MPa": ("run.js", r"factor: 1e-6", "factor: 1e-3", check_tiles),
+    "stress ten times too large": ("curves.js", r"\? 1e-6 : 1\)", "? 1e-5 : 1)", check_curves),
+    "the ends of the scale swapped": (
+        "legend.js", r"put\(marks.children\[k\], at\(share\)\)", "put(marks.children[k], at(1 - share))", check_maps,
+    ),
+    "VSG in mm multiplied": ("check.js", r"one\.vsg / mm", "one.vsg * mm", check_setup),
+    "the uncertainty of the scale": (
+        "drawing.js", r"s\.sigma \* s\.px_per_mm", "s.sigma / s.px_per_mm", check_setup,
+    ),
+    "frames not recorded are not lost": ("run.js", r" \+ \(l\.unrecorded \?\? 0\)", "", check_machine),
+    "force ten times too large": ("run.js", r"N = \{ factor: 1,", "N = { factor: 10,", check_tiles),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_wrong_figure_is_found(browser: Any, fault: str) -> None:
+    name, old, new, check = FAULTS[fault]
+    wrong, count = re.subn(old, new, (STATIC / name).read_text("utf-8"))
+    assert count >= 1, "the fault fits the script"
+    answer = {"body": wrong, "content_type": "text/javascript; charset=utf-8"}
+
+    def change(page: Any) -> None:
+        page.route(f"**/static/{name}", lambda route: route.fulfill(**answer))
+
+    with opened(browser, change) as page, pytest.raises(AssertionError):
+        check(page)
+
+
+def test_a_figure_that_is_not_live_is_not_shown_as_one(browser: Any) -> None:
+    with opened(browser) as page:
+        old = figure(None, state="old", last=7796.9, age_s=24.0)
+        stress = figure(None, state="unknown", last=None, age_s=None, why="")
+        figures = run_state()["figures"] | {"force": old, "stress": stress}
+        show_run(page, figures=figures, troubles=["load cell: no force for 24 s"])
+        assert "stale" in page.page.get_attribute("#forcetile", "class")
+        assert near(tile(page, "force"), 7796.9) and page.text("forcesigma") == "last value at 01:04"
+        assert page.page.inner_text("#forcetile .age") == "24 s old" and page.text("stress") == "–"
+        assert page.text("word") == "Load cell silent" and page.page.is_visible("#silence")
+        assert "alarm" in page.page.get_attribute("#state", "class")
+        assert "stale" not in page.page.get_attribute("#axialtile", "class"), "the strain is live"
+        figures = run_state()["figures"] | {"force": figure(None, state="overload", last=9.0, age_s=0.0)}
+        show_run(page, figures=figures)
+        assert page.text("force") == "OVERLOAD" and "bad" in page.page.get_attribute("#forcetile", "class")
+        show_run(page)
+        # At once: the page itself knows that there is a link.
+        lost = """async () => { const { linkLost } = await import("/static/run.js"); linkLost(6);
+            const found = [...document.querySelectorAll(".figures .age")].map(one => one.innerText);
+            const force = document.getElementById("force").textContent; linkLost(0);
+            return [found, force, document.querySelectorAll(".figures .tile.stale").length]; }"""
+        ages, force, stale = page.page.evaluate(lost)
+        assert ages == ["6 s old"] * 3 and near(number(force), 8035.3) and stale == 0, (
+            "without a link all are old"
+        )
+
+
+def test_a_limit_is_in_tile_bar_and_curve(browser: Any) -> None:
+    limit = {"value": 0.22, "share": 0.9085, "near": True, "beyond": False, "ends": True}
+    with opened(browser) as page:
+        figures = run_state()["figures"] | {"axial": figure(19.988e-2, 2e-5, limit=limit)}
+        show_run(page, figures=figures)
+        unit_of_strains(page, "%")
+        assert page.page.inner_text("#axialtile .to span") == "91 % of the limit, 22 %"
+        assert page.page.get_attribute("#axialtile .fill", "width") == "90.85%"
+        assert "look" in page.page.get_attribute("#axialtile", "class") and "near" in page.page.get_attribute(
+            "#state", "class"
+        )
+        assert "91 % of the limit" in page.text("alarm") and "ends by itself" in page.text("alarmmore")
+        figures["axial"]["limit"] = limit | {"share": 1.02, "near": False, "beyond": True}
+        show(page, "run", "showRun", run_state(figures=figures))
+        assert "bad" in page.page.get_attribute("#axialtile", "class")
+        drawn = "async () => { const c = document.querySelector('#curve1 canvas'); return c?.toDataURL().length; }"
+        page.until(lambda: page.page.locator("#curve1 canvas").count() == 1, "the curve")
+        page.page.wait_for_timeout(100)
+        with_limit = page.page.evaluate(drawn)
+        show_run(page)
+        page.until(lambda: page.page.evaluate(drawn) != with_limit, "the limit is in the curve")
+
+
+def test_the_specimen_before_and_the_one_in_hand(browser: Any) -> None:
+    before = {"specimen": "bar-5", "stress": True, "strain": [0.0, 0.1, 0.2], "load": [0.0, 2e8, 2.6e8]}
+    with opened(browser) as page:
+        show_run(page, STAGE | {"before": before})
+        page.until(lambda: "bar-5, the one before" in page.text("whose"), "its curve has a name")
+        show_run(page, STAGE | {"before": before | {"stress": False}})
+        page.until(lambda: page.text("whose") == "", "forces are not drawn behind stresses")
+        show_setup(page, specimen=WHAT | {"axis": "auto", "gauge_length_mm": None, "area_mm2": None})
+        assert "no section" in page.text("section")
+
+
+def test_the_opacity_of_the_map_stays_with_the_browser(browser: Any) -> None:
+    with opened(browser) as page:
+        show_run(page)
+        opacity = "() => getComputedStyle(document.getElementById('map')).opacity"
+        assert page.page.evaluate(opacity) == "0.74"
+        page.page.fill("#opacity", "0")
+        assert page.page.evaluate(opacity) == "0" and page.page.evaluate("() => localStorage.opacity") == "0"
+        page.page.reload()
+        page.page.wait_for_selector("#language")
+        page.until(lambda: page.page.evaluate(opacity) == "0", "kept")
+
+
+@pytest.mark.parametrize(
+    ("locale", "wanted"), [("de-DE", "Spannung über Dehnung"), ("fr-FR", "Contrainte en fonction")]
+)
+def test_figures_in_other_languages(browser: Any, locale: str, wanted: str) -> None:
+    with opened(browser, locale=locale) as page:
+        show_run(page)
+        assert near(tile(page, "force"), 8035.3) and near(tile(page, "axial"), 19.988e-2)
+        page.until(lambda: wanted in page.page.inner_text("figure:has(#curve1)"), "the title of the curve")
+        show_after(page)
+        assert page.page.evaluate("() => [...untranslated]") == []
+
+
+def test_two_cameras_after_a_test(browser: Any) -> None:
+    peak = MAP | {"picture": "/picture?side=back&after=1", "low": 0.1, "s": 85.0}
+    second = {"side": "back", "atpeak": "at the highest force", "peak": peak}
+    with opened(browser) as page:
+        show_after(page, side="front", second=second)
+        unit_of_strains(page, "%")
+        assert marks(page, "peaklegend")[0] == pytest.approx(18.5)
+        page.page.click("#peakside button:nth-child(2)")
+        assert marks(page, "peaklegend")[0] == pytest.approx(10.0)
+        assert "side=back" in page.page.get_attribute("#peakmap", "src")
+
+
+def test_without_a_camera_the_list_of_devices_is_there(browser: Any, tmp_path: Path) -> None:
+    draft = ConfigDraft(load_config(None, {}), tmp_path / "rig.toml", {})
+    with PageController(draft, port=0) as controller:
+        thread = threading.Thread(target=controller.set_up, daemon=True)
+        thread.start()
+        page = Page(browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US").new_page())
+        page.goto(controller.address)
+        page.until(lambda: page.page.is_visible("#cameras"), "the step of the camera is open")
+        listed = page.page.locator("#cameras option[value='sim:hole']")
+        page.until(lambda: listed.count() == 1, "what there is")
+        assert page.page.is_visible("#nocamera") and "no camera is chosen" in page.text("trouble")
+        page.page.click("#step-specimen > summary")
+        page.page.fill('[data-set="specimen.width_mm"]', "20,5")
+        page.page.press('[data-set="specimen.width_mm"]', "Tab")
+        page.until(lambda: draft.config.specimen.width_mm == 20.5, "the rest can be set up")
+        assert not page.errors
+        controller.quit()
+        thread.join()
+        page.page.context.close()
+
+
+def test_what_fails_stays_to_be_seen(browser: Any) -> None:
+    """A check that says NO-GO, and a camera with a fault: their steps, and a verdict with what to do."""
+    line = {
+        "what": "load cell",
+        "value": "silent",
+        "good": False,
+        "advice": "look at its cable",
+        "measured": True,
+    }
+    with opened(browser) as page:
+        for step in ("gauges", "check", "camera"):
+            show_setup(page, go=False, lines=[line], trouble="no picture for 3 s")
+            page.page.click(f"#step-{step} > summary")
+            steps = page.page.locator(".step > summary:visible")
+            assert steps.count() == 4 and page.text("verdict") == "NO-GO"
+        assert page.text("reason") == "load cell: silent" and "doubtful" in page.page.get_attribute(
+            "#start", "class"
+        )
+        page.page.click("#step-check > summary")
+        assert page.page.inner_text("#verdicts .verdict.bad p") == "load cell: silent. look at its cable"
+        assert page.page.inner_text("#step-camera .chip") == "look"
