@@ -182,7 +182,7 @@ def _answers(run: RunFolder, curve: EvaluatedCurve, test: FinishedTest) -> list[
     return [
         paragraph(f"{checks_line(found)}."),
         *(band(text, "look") for text in doubts(found)),
-        tiles(_figures(curve)) if test.figures.E.known else paragraph(why, "open"),
+        tiles(_tensile_tiles(curve)) if test.figures.E.known else paragraph(why, "open"),
         *(paragraph(text, "open") for text in missing_lines(test, again)),
     ]
 
@@ -195,7 +195,7 @@ def tensile(curve: EvaluatedCurve) -> dict[str, str]:
     return found | strain
 
 
-def _figures(curve: EvaluatedCurve) -> dict[str, Shown]:
+def _tensile_tiles(curve: EvaluatedCurve) -> dict[str, Shown]:
     """``tensile`` in parts."""
     rows = headline(curve.figures, stresses=curve.is_stress)
     found: dict[str, Shown] = {row.name: (row.printed, row.remark) for row in rows if row.figure.known}
