@@ -12,12 +12,12 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any, Self
 
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 
 FIELD = re.compile(r"\{\{|\}\}|\{(\w+)(?::([^{}]*))?\}")
 """A named field of a template, with its format, or a doubled brace, which is one of the text."""
 SAY, WITH = "say", "with"  # keys of a message as JSON
-QUANTITY = Quantity("strain", 0.0).to_json().keys()
+QUANTITY = Amount("strain", 0.0).to_json().keys()
 
 
 def filled(template: str, values: Mapping[str, Any], shown: Callable[[Any, str], str]) -> str:
@@ -98,7 +98,7 @@ def _made(template: str, values: Mapping[str, Any]) -> Message:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, Message | Quantity):
+    if isinstance(value, Message | Amount):
         return value.to_json()
     if hasattr(value, "item"):
         value = value.item()
@@ -111,11 +111,11 @@ def from_json(value: Any) -> Any:
         return Message(value[SAY], **{key: from_json(one) for key, one in value[WITH].items()})
     if isinstance(value, dict) and "kind" in value and value.keys() == QUANTITY:
         known: dict[str, Any] = {key: math.nan if one is None else one for key, one in value.items()}
-        return Quantity(**known)
+        return Amount(**known)
     return value
 
 
-def joined(between: str, parts: Iterable[str | Quantity]) -> Message:
+def joined(between: str, parts: Iterable[str | Amount]) -> Message:
     """The parts that are not empty, one after the other, each still to be translated."""
     kept = [part for part in parts if part]
     names = [f"part{k}" for k in range(len(kept))]

@@ -22,7 +22,7 @@ _COMMA = ("de", "fr")
 
 
 @dataclass(frozen=True, slots=True)
-class Unit:
+class ShownUnit:
     """A unit of a kind of quantity.
 
     Attributes
@@ -43,12 +43,12 @@ class Unit:
 
 
 UNITS = {
-    "": (Unit("", 1.0, 0.0, 3),),
-    "share": (Unit("%", 1e-2, 0.0, 2),),
-    "strain": (Unit("µm/m", 1e-6, 0.0, 0), Unit("%", 1e-2, 1e-2, 4)),
-    "force": (Unit("N", 1.0, 0.0, 1), Unit("kN", 1e3, 1e4, 3)),
-    "stress": (Unit("MPa", 1e6, 0.0, 1), Unit("GPa", 1e9, 1e10, 2)),
-    "time": (Unit("s", 1.0, 0.0, 1), Unit("min", 60.0, 120.0, 1)),
+    "": (ShownUnit("", 1.0, 0.0, 3),),
+    "share": (ShownUnit("%", 1e-2, 0.0, 2),),
+    "strain": (ShownUnit("µm/m", 1e-6, 0.0, 0), ShownUnit("%", 1e-2, 1e-2, 4)),
+    "force": (ShownUnit("N", 1.0, 0.0, 1), ShownUnit("kN", 1e3, 1e4, 3)),
+    "stress": (ShownUnit("MPa", 1e6, 0.0, 1), ShownUnit("GPa", 1e9, 1e10, 2)),
+    "time": (ShownUnit("s", 1.0, 0.0, 1), ShownUnit("min", 60.0, 120.0, 1)),
 }
 
 
@@ -65,7 +65,7 @@ class Printed(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class Amount:
     """A value in SI units with its uncertainty, and how it is shown.
 
     Attributes
@@ -107,7 +107,7 @@ class Quantity:
         return str(self.printed())
 
 
-def unit_of(kind: str, size: float, name: str = "") -> Unit:
+def unit_of(kind: str, size: float, name: str = "") -> ShownUnit:
     """The unit of this name, else the one for a magnitude in SI units."""
     units = UNITS[kind]
     named = [unit for unit in units if unit.name == name]

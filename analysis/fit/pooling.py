@@ -218,9 +218,8 @@ def _straight(out: Floats, white: Floats) -> tuple[NDArray[np.bool_], float]:
 
 def _at(contrast: Floats, middle: Floats, values: Floats) -> Floats:
     """What holds for groups of middle contrasts, at each contrast."""
-    out = np.full(len(contrast), values[0])
-    if values.min() < values.max():
-        interpolate(contrast, middle, values, out)
+    out = np.empty(len(contrast))
+    interpolate(*(np.ascontiguousarray(one, np.float64) for one in (contrast, middle, values)), out)
     return out
 
 

@@ -122,10 +122,12 @@ def warm_up(part: str = ALL, kinds: Sequence[str] = PICTURE_KINDS, *, phase: boo
 
 def _everything(kinds: Sequence[str], phase: bool) -> None:
     """Measure small pictures in every way that a test can."""
+    from analysis.fit.pooling import interpolate
     from analysis.kernel.images import NoiseModel
     from analysis.kernel.phase_kernel import PhaseKernel
     from analysis.kernel.settings import KernelSettings
 
+    interpolate(np.ones(1), np.arange(2.0), np.ones(2), np.ones(1))  # not reached with so few ZOIs
     image, grid = _small()
     ways = [KernelSettings(), KernelSettings(order=2)]
     clipped = image > np.percentile(image, 99)

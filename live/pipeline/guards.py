@@ -9,7 +9,7 @@ import numpy as np
 
 from acquire.events import Event, EventKind, EventSink, Level
 from acquire.text import Message
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 from analysis.field import Blur
 from analysis.field.picture_error import LIMIT, PictureError
 from analysis.optics import alike, keystones
@@ -109,7 +109,7 @@ class StrainGuard:
                 "{off}; measure with --strain engineering",
                 math.degrees(turned),
                 strained,
-                Quantity("strain", (turned**2 + strained**2) / 2),
+                Amount("strain", (turned**2 + strained**2) / 2),
             )
             data = {"rotation": turned, "strain": strained}
             self._on_event(Event(step.t, EventKind.MEASUREMENT, "strain", text, "warning", data))
@@ -161,7 +161,7 @@ class DilatationGuard:
             "the strains along and across do not fit nu = {nu:g}: {false} in both is as from "
             "motion{far} {way} the camera, and no strain; E is off too (docs/optics.md)",
             nu,
-            Quantity("strain", false),
+            Amount("strain", false),
             far,
             way,
         )
@@ -196,7 +196,7 @@ class TiltGuard:
                 text = Message(
                     "exx and eyy are alike, {false}: as from motion by {size:.1e} of the stand-off or from "
                     "temperature, not from a load along one axis (docs/optics.md)",
-                    Quantity("strain", false),
+                    Amount("strain", false),
                     abs(false),
                 )
                 self._emit(step, text, false)
@@ -218,7 +218,7 @@ class TiltGuard:
             text = Message(
                 "strain rises by {rise} {way}, in x and y alike: as from a tilt{angle}, or from a shift "
                 "behind a lens that is not corrected (docs/optics.md)",
-                Quantity("strain", found.rise),
+                Amount("strain", found.rise),
                 way,
                 angle,
             )
@@ -280,14 +280,14 @@ def picture_words(field: StrainField) -> str:
         return Message(
             "the picture shows {shown}: strain of a ZOI is uncertain by {sigma}",
             shown,
-            Quantity("strain", sigma),
+            Amount("strain", sigma),
         )
     usual = sigma / error.factor
     return Message(
         "the picture shows {shown}: strain of a ZOI is uncertain by {sigma} in place of {usual}",
         shown,
-        Quantity("strain", sigma),
-        Quantity("strain", usual),
+        Amount("strain", sigma),
+        Amount("strain", usual),
     )
 
 
@@ -335,8 +335,8 @@ def _blur_words(blur: Blur, field: StrainField) -> str:
         "the picture is {text} since the reference: look at focus, distance and exposure; strain of a ZOI is "
         "uncertain by {sigma} in place of {usual}",
         blur.text,
-        Quantity("strain", sigma),
-        Quantity("strain", sigma / error.factor),
+        Amount("strain", sigma),
+        Amount("strain", sigma / error.factor),
     )
 
 

@@ -18,7 +18,7 @@ from acquire.frame import Burst, Frame
 from acquire.system import available_MiB
 from acquire.text import Message
 from acquire.text.message import about
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 from analysis.field import Status, StrainField
 from analysis.quality.steadiness import strain_drifts
 
@@ -177,7 +177,7 @@ class ReferenceMotion:
     @property
     def amount(self) -> str:
         """Its px, after the strain where that has changed."""
-        return f"{Quantity('strain', self.strain)}, " * self.pulled + f"{self.px:.3f}"
+        return f"{Amount('strain', self.strain)}, " * self.pulled + f"{self.px:.3f}"
 
 
 def motion_between(

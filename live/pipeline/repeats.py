@@ -14,7 +14,7 @@ _COUNTED = {
     EventKind.ALARM, EventKind.LOST, EventKind.DEVICE, EventKind.RECORDER, EventKind.MEASUREMENT, EventKind.VIEW,
 }  # fmt: skip
 """Not commands, references and the operator's words, each of which stands for itself."""
-_NUMBER = re.compile(r"\d[\d.,]*")
+_NUMBER = re.compile(r"(?<![\w.])\d[\d.,\u202f]*(?!\w)")  # not that of a name: a3.png and a4.png are two
 
 Likeness = tuple[str, ...]
 

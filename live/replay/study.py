@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Burst
 from acquire.text import Message
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 from analysis.evaluate import MIN_STILL_INSTANTS, evenly, noise_floor, still_phase
 from analysis.picture.pattern import gauge_length, l10_strain
 from live.config.loading import Config
@@ -309,7 +309,7 @@ def recommended(found: Sequence[StudyResult]) -> Advice:
     best = min(keep, key=lambda one: one.noise)
     why = (
         f"{_least_noise(len(keep))} at least {KEPT_SHARE:.0%} of the largest strain"
-        f" ({Quantity('strain', top.seen)}, with {top.setting.words})"
+        f" ({Amount('strain', top.seen)}, with {top.setting.words})"
     )
     larger = [one for one in significant if one.noise < best.noise]
     if larger:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from acquire.load_cell import LoadLog
-from acquire.text.quantity import Printed, Quantity, unit_of, with_sigma
+from acquire.text.quantity import Amount, Printed, unit_of, with_sigma
 from analysis.evaluate import (
     AT_LEAST,
     CONFIDENCE,
@@ -104,11 +104,11 @@ class TensileRow:
         return shown._replace(value=f"{AT_LEAST} {shown.value}") if self.figure.is_bound else shown
 
     @property
-    def quantity(self) -> Quantity:
+    def quantity(self) -> Amount:
         """The number and the larger half of its interval, in SI units."""
         kind = _KINDS[self.unit]
         one = unit_of(kind, 0.0, self.unit).one
-        return Quantity(kind, self.figure.value * one, self.half * one, 2)
+        return Amount(kind, self.figure.value * one, self.half * one, 2)
 
     @property
     def text(self) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from acquire.load_cell import LoadLog
 from acquire.text.printable import brief, share_text
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
@@ -88,7 +88,7 @@ def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     largest = strains[np.argmax(np.abs(strains))]
     part = share_text(last.least_share)
     means = "  ".join(
-        f"{name} {Quantity('strain', getattr(last, name), getattr(last, f'sigma_{name}'))}"
+        f"{name} {Amount('strain', getattr(last, name), getattr(last, f'sigma_{name}'))}"
         for name in ("exx", "eyy", "exy")
     )
     means = f"none, {last.apart}" if last.apart else means
@@ -96,7 +96,7 @@ def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     lines = [
         valid_line(history),
         f"last strain of the region: {means}{f' {part}' if part else ''};"
-        f" largest of any ZOI {Quantity('strain', largest)}",
+        f" largest of any ZOI {Amount('strain', largest)}",
         noise_line(history),
     ]
     lines += sharpness_line(history.column("blur").tolist(), history.column("sigma_blur").tolist())

@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.text import Message
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 from live.config.channels import OF_LOAD, is_joint
 from live.config.loading import Config
 from live.config.sections import AlarmConfig
@@ -160,7 +160,7 @@ def in_words(channel: str, value: float, limit: float) -> str:
     if plain in _STRAINS or plain.startswith("gauge_"):
         kind, one, label = "strain", 1.0, channel.replace("_", " ")
     if kind:
-        value_of, limit_of = Quantity(kind, value * one), Quantity(kind, limit * one)
+        value_of, limit_of = Amount(kind, value * one), Amount(kind, limit * one)
         return Message("{channel} {value}, limit {limit}", label, value_of, limit_of)
     return Message("{label} {value:.6g} {UNITS}", label, value, _UNITS[suffix]).rstrip() + Message(
         ", limit {limit:.6g}", limit

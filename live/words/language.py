@@ -16,7 +16,7 @@ from typing import Any
 
 from acquire.text import Message
 from acquire.text.message import filled
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 
 log = logging.getLogger(__name__)
 
@@ -93,7 +93,7 @@ def said(text: str, language: str) -> str:
     def shown(value: Any, spec: str) -> str:
         if isinstance(value, str):
             return format(said(value, language), spec)
-        if isinstance(value, Quantity):
+        if isinstance(value, Amount):
             return str(value.printed(language))
         number = format(value, spec)
         return number.replace(".", ",") if isinstance(value, float) else number

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from acquire.text import Message
 from acquire.text.message import from_json
-from acquire.text.quantity import GAP, IN_ASCII, LIVE_DIGITS, UNITS, Quantity, number, unit_of, with_sigma
+from acquire.text.quantity import GAP, IN_ASCII, LIVE_DIGITS, UNITS, Amount, number, unit_of, with_sigma
 from live.words.language import said
 
 CASES: list[dict[str, Any]] = json.loads(
@@ -21,10 +21,10 @@ CASES: list[dict[str, Any]] = json.loads(
 )
 
 
-def quantity_of(case: dict[str, Any]) -> Quantity:
+def quantity_of(case: dict[str, Any]) -> Amount:
     """The quantity of a case; null is not known."""
     numbers = {key: math.nan if case.get(key) is None else float(case[key]) for key in ("value", "sigma")}
-    return Quantity(case["kind"], **numbers, digits=case.get("digits", 1), unit=case.get("unit", ""))
+    return Amount(case["kind"], **numbers, digits=case.get("digits", 1), unit=case.get("unit", ""))
 
 
 @pytest.mark.parametrize("case", CASES, ids=[str(case["en"]) for case in CASES])
@@ -34,7 +34,7 @@ def test_a_quantity_is_printed_as_in_the_table(case: dict[str, Any]) -> None:
 
 
 def test_without_such_letters_it_is_printed_in_ascii() -> None:
-    assert str(Quantity("strain", -0.0047043, 4.7e-7)).translate(IN_ASCII) == "-4704.3 +- 0.5 um/m"
+    assert str(Amount("strain", -0.0047043, 4.7e-7)).translate(IN_ASCII) == "-4704.3 +- 0.5 um/m"
     assert all(str(quantity_of(case)).translate(IN_ASCII).isascii() for case in CASES)
 
 
@@ -57,9 +57,9 @@ def test_a_live_figure_has_few_digits_and_tells_its_sigma(kind: str, value: floa
 
 
 def test_a_quantity_in_a_message_is_data_on_the_wire_and_words_in_a_language() -> None:
-    message = Message("strain drifts by {drift} from left to right", Quantity("strain", -0.001234, math.nan))
+    message = Message("strain drifts by {drift} from left to right", Amount("strain", -0.001234, math.nan))
     assert message == "strain drifts by −1\u202f234 µm/m from left to right"
     back = from_json(json.loads(json.dumps(message.to_json()), object_hook=from_json))
-    assert back == message and isinstance(back.values["drift"], Quantity)
-    known = Message("{name} {value}", "a.b", Quantity("stress", 70e9, 0.1e9, 2))
+    assert back == message and isinstance(back.values["drift"], Amount)
+    known = Message("{name} {value}", "a.b", Amount("stress", 70e9, 0.1e9, 2))
     assert said(known, "de") == "a.b 70,00 ± 0,10 GPa"

@@ -42,7 +42,7 @@ def ended(error: BaseException | None, monkeypatch: pytest.MonkeyPatch) -> int:
         (OSError(errno.ENOSPC, "No space left", "a.h5"), 4,
          "phasedic: a.h5: No space left; check the path, the permissions and the room on the disk\n"),
         (OSError(errno.ENAMETOOLONG, "File name too long", b"a" * 300), 2,
-         f"phasedic: {'a' * 200}File name too long; give another name\n"),
+         f"phasedic: {'a' * 200}: File name too long; give another name\n"),
         (OSError(errno.EINVAL, "Invalid argument"), 2, "phasedic: Invalid argument; give another name\n"),
         (OSError(errno.ELOOP, "Too many links", "a"), 2, "phasedic: a: Too many links; give another name\n"),
         (OSError("odd"), 4, "phasedic: odd; check the path, the permissions and the room on the disk\n"),

@@ -90,7 +90,7 @@ def test_the_status_line_shows_gauges() -> None:
     found = make_measurement(0).time_step
     gauges = {"axial": GaugeValue(1.234e-3, 3e-6), "hole": GaugeValue(float("nan"), float("nan"), "lost")}
     words = gauge_texts(replace(found, gauges=gauges))
-    assert words == ["axial +1,234 ± 3.0", "hole lost"]
+    assert words == ["axial 1\u202f234 ± 3 µm/m", "hole lost"]
 
 
 @pytest.mark.parametrize(

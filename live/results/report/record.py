@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.event_log import counted_text
 from live.pipeline.repeats import Repeats
@@ -48,9 +48,7 @@ def gauges(run: RunFolder) -> Html:
         e = unit_for(_largest(gauge.value))
         known = np.isfinite(gauge.value)
         last = (
-            str(Quantity("strain", gauge.value[-1], gauge.sigma[-1], unit=e.name))
-            if known[-1]
-            else "not known"
+            str(Amount("strain", gauge.value[-1], gauge.sigma[-1], unit=e.name)) if known[-1] else "not known"
         )
         words = "; ".join(f"{key} {_plain(value)}" for key, value in gauge.described.items())
         largest = f"{_largest(gauge.value) * e.factor:.4g} {e.name}" if known.any() else "not known"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from acquire.text import Message
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 from analysis.quality.steadiness import Steadiness, mains_of, strain_drifts
 from live.setup.check.check_line import CheckLine, not_measured
 from live.setup.check.check_list import CheckFigures
@@ -38,7 +38,7 @@ def motion_lines(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
         Message(
             "{drift_px:.4f} px and {drift} in {seconds:.3g} s",
             s.drift_px,
-            Quantity("strain", strain.drift),
+            Amount("strain", strain.drift),
             s.u.seconds,
         ),
         s.drift_px <= max_px and not pulled,
@@ -64,18 +64,18 @@ def _common(s: PictureStillness) -> Iterator[CheckLine]:
     if s.dilatation:
         words = Message(
             "exx and eyy drift alike, {dilatation}: it changes by {size:.1e} of the stand-off",
-            Quantity("strain", s.dilatation),
+            Amount("strain", s.dilatation),
             abs(s.dilatation),
         )
         warm = "warm up the camera, clamp grips and tripod, or hang plates (docs/optics.md)"
         yield CheckLine("distance", words, abs(s.dilatation) < MAX_DILATATION, warm)
     across, down = s.keystone
     if across:
-        drift = Quantity("strain", across)
+        drift = Amount("strain", across)
         words = Message("strain drifts by {across} from left to right, in x and y alike", drift)
         yield CheckLine("tilt", words, abs(across) < MAX_DILATATION, steady)
     if down:
-        drift = Quantity("strain", down)
+        drift = Amount("strain", down)
         words = Message("strain drifts by {down} from top to bottom, in x and y alike", drift)
         yield CheckLine("tilt", words, abs(down) < MAX_DILATATION, steady)
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from acquire.text import Message
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 from analysis.quality.pattern import SPECKLE_RADIUS_PX
 from analysis.quality.steadiness import aliased, mains_of
 from live.setup.check.check_line import CheckLine, not_measured
@@ -282,14 +282,14 @@ def _floor(f: CheckFigures, target: float | None) -> CheckLine:
         words = Message("a larger region, smaller ZOIs, or a pattern")
         return CheckLine(what, Message("not measured: too few ZOIs of {zoi} px", f.zoi), False, words)
     known = typical if noise is None else noise.known
-    found = Message("{known} predicted", Quantity("strain", known))
+    found = Message("{known} predicted", Amount("strain", known))
     if f.stack.few:
         found += Message(", noise {noise_source}", _noise_source(f))
     elif noise is not None:
         found = Message(
             "{known} measured, {predicted} predicted",
-            Quantity("strain", noise.known),
-            Quantity("strain", noise.predicted),
+            Amount("strain", noise.known),
+            Amount("strain", noise.predicted),
         )
     value = Message("{found} (one ZOI of {zoi} px, burst of {burst})", found, f.zoi, f.burst)
     if noise is not None and noise.measured > MAX_OVER_PREDICTED * noise.predicted:

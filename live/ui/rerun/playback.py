@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Level
 from acquire.frame import Frame, frozen
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 from analysis.evaluate import evaluate_test
 from live.config.gauges import gauge_colours, outlines
 from live.config.loading import from_dict
@@ -281,7 +281,7 @@ def _status(run: RunFolder) -> str:
     figures = evaluate_test(run.curve, tensile_options(run.specimen))
     lines = figure_lines(figures, run.specimen, run.gauge_length_mm)
     lines += [
-        f"gauge **{name}** {Quantity('strain', gauge.value[-1], gauge.sigma[-1])} at the end"
+        f"gauge **{name}** {Amount('strain', gauge.value[-1], gauge.sigma[-1])} at the end"
         for name, gauge in run.gauges.items()
     ]
     lines += response_lines(run.strain)

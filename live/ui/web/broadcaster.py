@@ -8,7 +8,7 @@ import threading
 from typing import Any
 
 from acquire.text import Message
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 
 MAX_PAGES = 8
 """Pages that may be open at one time."""
@@ -16,7 +16,7 @@ MAX_PAGES = 8
 
 def plain(value: Any) -> Any:
     """A value as JSON can hold it; NaN and infinity become None, messages and quantities stay data."""
-    if isinstance(value, Message | Quantity):
+    if isinstance(value, Message | Amount):
         return plain(value.to_json())
     if isinstance(value, float):
         return value if math.isfinite(value) else None

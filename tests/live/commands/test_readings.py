@@ -27,6 +27,7 @@ from live.pipeline.screen import Screen
 from live.replay.study import StudySetting
 from live.results.run_folder import open_run
 from tests.live.made_run import make_run
+from tests.live.made_up import in_ascii
 
 
 class Said(Screen):
@@ -140,7 +141,10 @@ def test_the_strains_of_both_sides_at_the_end() -> None:
                    np.array([1e-6, 2e-6, math.nan]))  # fmt: skip
     nothing = replace(one, mean=np.full(3, math.nan))
     head, line = side_lines(SimpleNamespace(courses={"axial": one, "lost": nothing}))  # type: ignore[arg-type]
-    assert line.split() == ["axial", "+2,000", "±", "2.0", "-100", "±", "2.0"] and "front minus mean" in head
+    assert (
+        in_ascii(line).split() == ["axial", "2000", "+-", "2", "um/m", "-100", "+-", "2", "um/m"]
+        and "front minus mean" in head
+    )
 
 
 def test_a_map_over_a_later_picture_is_misplaced_by_the_motion(

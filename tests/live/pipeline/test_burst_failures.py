@@ -86,7 +86,7 @@ def test_the_log_has_a_limit_and_a_folder_that_is_gone_is_no_matter(tmp_path: Pa
     for number in range(MAX_TRACEBACKS + 5):
         failures(number, bursts(1)[0], ValueError("x"))
     assert (tmp_path / LOG).read_text("utf-8").count("ValueError: x") == MAX_TRACEBACKS
-    assert len(state.event_log.events("error")) == MAX_TRACEBACKS + 5
+    assert state.event_log.count("error") == MAX_TRACEBACKS + 5
     BurstFailures(state, tmp_path / "gone")(0, bursts(1)[0], ValueError("x"))
 
 

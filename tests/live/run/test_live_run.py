@@ -65,7 +65,7 @@ def run(recording: Any = None, *, live: bool = True, seconds: float | None = Non
         config=load_config(None, {} if seconds is None else {"output.seconds": seconds}),
         bursts=(4, 2),
         folder=Path("run"),
-        plan=SimpleNamespace(grid=None),
+        plan=SimpleNamespace(grid=SimpleNamespace(size=32, step=16)),
         start=None,
     )
     for k in range(measured):

@@ -89,9 +89,9 @@ UNSEEN = "the reference burst cannot be measured (fast motion, glare, no focus?)
         ((0.3, 0.2, 0.1, 0.0), 2,
          [("warning", AGAIN.format(0.3)), ("warning", AGAIN.format(0.2)), ("warning", MOVED.format(0.1))]),
         ((ReferenceMotion(0.01, 7e-5, 1e-6), 0.01), 0,
-         [("warning", MOVED.replace("{:.3f}", "+70 µm/m, 0.010"))]),
+         [("warning", MOVED.replace("{:.3f}", "70 µm/m, 0.010"))]),
         ((ReferenceMotion(0.06, -7e-5, 1e-6), 0.01), 1,
-         [("warning", AGAIN.replace("{:.3f}", "-70 µm/m, 0.060"))]),
+         [("warning", AGAIN.replace("{:.3f}", "−70 µm/m, 0.060"))]),
         ((0.3,), 0, [("warning", AGAIN.format(0.3)), ("warning", MOVED.format(0.3))]),
         ((math.nan, math.nan, math.nan, math.nan, 0.01), 4,
          [("warning", f"{UNSEEN}; taking another")] * 2

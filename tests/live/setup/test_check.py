@@ -489,7 +489,9 @@ def test_the_noise_is_said_in_microstrain_as_measured_and_as_predicted(whole: Ch
     def said(figures: CheckFigures) -> str:
         return next(line.value for line in check_lines(figures) if line.what == "strain noise")
 
-    assert said(with_floor(whole, 100e-6, 120e-6)).startswith("120 µm/m measured, 100 predicted (one ZOI of ")
+    assert said(with_floor(whole, 100e-6, 120e-6)).startswith(
+        "120 µm/m measured, 100 µm/m predicted (one ZOI of "
+    )
     few = replace(whole, stack=replace(whole.stack, frames=whole.stack.frames[:1]))
     assert said(with_floor(few, 100e-6, math.nan)).startswith("100 µm/m predicted, noise ")
 

@@ -172,19 +172,19 @@ def test_the_weakest_gradients_give_the_noise_of_a_place() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "what", "good", "shown"),
     [
-        ("keystone", (4.9e-5, 0.0), "tilt", True, "strain drifts by +49 µm/m from left to right"),
-        ("keystone", (-5.1e-5, 0.0), "tilt", False, "strain drifts by -51 µm/m from left to right"),
-        ("keystone", (0.0, -4.9e-5), "tilt", True, "strain drifts by -49 µm/m from top to bottom"),
-        ("keystone", (0.0, 5.1e-5), "tilt", False, "strain drifts by +51 µm/m from top to bottom"),
-        ("dilatation", -5.1e-5, "distance", False, "exx and eyy drift alike, -51 µm/m: it changes by 5.1e-05"),
-        ("drift_px", 0.0501, "drift", False, "0.0501 px and +0 µm/m in 4 s"),
-        ("drift_px", 0.05, "drift", True, "0.0500 px and +0 µm/m in 4 s"),
-        ("exx", Steadiness(-3e-5, 0, 0, None, 4.0, None), "drift", True, "0.0000 px and -30 µm/m in 4 s"),
-        ("eyy", Steadiness(4e-5, 0, 0, None, 4.0, None), "drift", True, "0.0000 px and +40 µm/m in 4 s"),
-        ("exx", Steadiness(-1.9e-5, 0, 0, None, 4.0, None, 1e-6), "drift", True, "0.0000 px and -19 µm/m in 4 s"),
-        ("exx", Steadiness(-2.1e-5, 0, 0, None, 4.0, None, 4e-6), "drift", False, "0.0000 px and -21 µm/m in 4 s"),
-        ("eyy", Steadiness(9.75e-4, 0, 0, None, 4.0, None, 2e-4), "drift", True, "0.0000 px and +975 µm/m in 4 s"),
-        ("eyy", Steadiness(9.75e-4, 0, 0, None, 4.0, None, 1.9e-4), "drift", False, "0.0000 px and +975 µm/m in 4 s"),
+        ("keystone", (4.9e-5, 0.0), "tilt", True, "strain drifts by 49 µm/m from left to right"),
+        ("keystone", (-5.1e-5, 0.0), "tilt", False, "strain drifts by −51 µm/m from left to right"),
+        ("keystone", (0.0, -4.9e-5), "tilt", True, "strain drifts by −49 µm/m from top to bottom"),
+        ("keystone", (0.0, 5.1e-5), "tilt", False, "strain drifts by 51 µm/m from top to bottom"),
+        ("dilatation", -5.1e-5, "distance", False, "exx and eyy drift alike, −51 µm/m: it changes by 5.1e-05"),
+        ("drift_px", 0.0501, "drift", False, "0.0501 px and 0 µm/m in 4 s"),
+        ("drift_px", 0.05, "drift", True, "0.0500 px and 0 µm/m in 4 s"),
+        ("exx", Steadiness(-3e-5, 0, 0, None, 4.0, None), "drift", True, "0.0000 px and −30 µm/m in 4 s"),
+        ("eyy", Steadiness(4e-5, 0, 0, None, 4.0, None), "drift", True, "0.0000 px and 40 µm/m in 4 s"),
+        ("exx", Steadiness(-1.9e-5, 0, 0, None, 4.0, None, 1e-6), "drift", True, "0.0000 px and −19 µm/m in 4 s"),
+        ("exx", Steadiness(-2.1e-5, 0, 0, None, 4.0, None, 4e-6), "drift", False, "0.0000 px and −21 µm/m in 4 s"),
+        ("eyy", Steadiness(9.75e-4, 0, 0, None, 4.0, None, 2e-4), "drift", True, "0.0000 px and 975 µm/m in 4 s"),
+        ("eyy", Steadiness(9.75e-4, 0, 0, None, 4.0, None, 1.9e-4), "drift", False, "0.0000 px and 975 µm/m in 4 s"),
         ("worse", Steadiness(0, 0.0501, 0, None, 4.0, None), "vibration", False, "0.0501 px rms"),
         ("worse", Steadiness(0, 0.05, 0, None, 4.0, None), "vibration", True, "0.0500 px rms"),
         ("worse_strain", Steadiness(0, 2e-5, 0, None, 4.0, None), "vibration", True,
@@ -251,13 +251,13 @@ def floor_of(predicted: float, measured: float) -> ZoiFloor:
             floor_of(1e-4, 1.5e-4),
             1.5e-4,
             True,
-            "150 µm/m measured, 100 predicted (one ZOI of 64 px, burst of 4)",
+            "150 µm/m measured, 100 µm/m predicted (one ZOI of 64 px, burst of 4)",
         ),
-        (floor_of(1e-4, 1.51e-4), 1e-3, False, "151 µm/m measured, 100 predicted"),
-        (floor_of(1e-4, math.nan), 1e-4, True, "100 µm/m measured, 100 predicted"),
-        (floor_of(2e-4, 1.2e-4), 1.1e-4, False, "120 µm/m measured, 200 predicted"),
-        (floor_of(1e-3, 1e-3), None, True, "1000 µm/m measured"),
-        (floor_of(1.01e-3, 1.01e-3), None, False, "1010 µm/m measured"),
+        (floor_of(1e-4, 1.51e-4), 1e-3, False, "151 µm/m measured, 100 µm/m predicted"),
+        (floor_of(1e-4, math.nan), 1e-4, True, "100 µm/m measured, 100 µm/m predicted"),
+        (floor_of(2e-4, 1.2e-4), 1.1e-4, False, "120 µm/m measured, 200 µm/m predicted"),
+        (floor_of(1e-3, 1e-3), None, True, "1\u202f000 µm/m measured"),
+        (floor_of(1.01e-3, 1.01e-3), None, False, "1\u202f010 µm/m measured"),
         (None, 1e-4, True, "100 µm/m predicted (one ZOI"),
         (None, 0.9e-4, False, "100 µm/m predicted (one ZOI"),
     ],
@@ -341,6 +341,6 @@ def test_a_strain_that_is_clear_is_told_before_a_larger_one_of_noise() -> None:
     line = found(motion_lines(made(still__exx=clear, still__eyy=noise), 0.05))["drift"]
     assert (
         not line.good
-        and "+30 µm/m" in line.value
+        and "30 µm/m" in line.value
         and line.advice.startswith("strain changes: stop the machine")
     )

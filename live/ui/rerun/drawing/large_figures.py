@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from acquire.text.printable import share_text
+from acquire.text.quantity import GAP, IN_ASCII, PLUS_MINUS, Amount
 from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
 from live.pipeline.timed.figure import BEYOND, LACKING, FigureState, TimedFigure
 
@@ -48,26 +48,26 @@ def paint(snapshot: Snapshot) -> NDArray[np.uint8]:
 
 
 def _cells(s: Snapshot) -> tuple[tuple[str, str, Colour], ...]:
-    axial, force, stress = s.figure(AXIAL), s.figure(FORCE), s.figure(STRESS)
-    sigma = "" if math.isnan(axial.sigma) else f"+- {axial.sigma * 1e6:.0f} "
-    large = abs(force.last) >= 1e4
     return (
         ("STATE", "PAUSED" if s.paused else s.state, _STATES.get(s.state, GREEN)),
-        _cell(f"STRAIN {sigma}um/m", axial, 1e6, "+,.0f"),
-        _cell("FORCE kN", force, 1e-3, ".3f") if large else _cell("FORCE N", force, 1.0, ".1f"),
-        _cell("STRESS MPa", stress, 1e-6, ".1f"),
+        _cell("STRAIN", "strain", s.figure(AXIAL)),
+        _cell("FORCE", "force", s.figure(FORCE)),
+        _cell("STRESS", "stress", s.figure(STRESS)),
     )
 
 
-def _cell(label: str, figure: TimedFigure, factor: float, form: str) -> tuple[str, str, Colour]:
+def _cell(name: str, kind: str, figure: TimedFigure) -> tuple[str, str, Colour]:
     """Label and value; without a value what is there instead: the last one in grey, with its age in the label."""
+    shown = Amount(kind, figure.last, figure.sigma).printed()
     if figure.known:
-        return label, format(figure.value * factor, form).replace(",", " "), WHITE
+        sigma = f"{PLUS_MINUS} {shown.sigma} " if shown.sigma else ""
+        return f"{name} {sigma}{shown.unit}", shown.value, WHITE
     if figure.state in BEYOND:
-        return label, figure.state.upper(), _BEYOND
+        return f"{name} {shown.unit}", figure.state.upper(), _BEYOND
     if figure.state in LACKING and figure.last == figure.last:
-        last = format(figure.last * factor, form).replace(",", " ")
-        return f"{label.split()[0]} {label.split()[-1]}  {figure.age:.0f} s old", last, GREY
+        last = Amount(kind, figure.last).printed()
+        return f"{name} {last.unit}  {figure.age:.0f} s old", last.value, GREY
+    label = f"{name} {shown.unit}"
     return label if figure.state is FigureState.NONE else f"{label}  {figure.state}", "-", GREY
 
 
@@ -97,7 +97,7 @@ def _write(
     """Write text of ``height`` px on a base line, smaller where it would be wider than ``width``."""
     cv2 = load_cv2()
     font, thick = cv2.FONT_HERSHEY_SIMPLEX, 1 if is_thin else max(2, height // 12)
-    text = text.replace("µ", "u").encode("ascii", "replace").decode()
+    text = text.replace(GAP, " ").translate(IN_ASCII).encode("ascii", "replace").decode()
     scale = cv2.getFontScaleFromHeight(font, height, thick)
     (wide, _), _ = cv2.getTextSize(text, font, scale, thick)
     if wide > width:

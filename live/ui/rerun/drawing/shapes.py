@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 from analysis.field import Status
 from live.results.maps.colours import MICROSTRAIN
 from live.ui.rerun.messages import STRAINS
@@ -202,7 +202,7 @@ def _label(row: int, column: int, status: int, values: dict[str, float]) -> str:
     if status != Status.OK:
         return f"{head}: {Status(status).name}"
     strains = "\n".join(
-        f"{n} {Quantity('strain', values[f'{n}_um_m'] * 1e-6, values[f'sigma_{n}_um_m'] * 1e-6)}"
+        f"{n} {Amount('strain', values[f'{n}_um_m'] * 1e-6, values[f'sigma_{n}_um_m'] * 1e-6)}"
         for n in STRAINS
     )
     return f"{head}\nu {values['u_px']:+.4f}  v {values['v_px']:+.4f} px\n{strains}"

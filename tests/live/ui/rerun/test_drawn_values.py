@@ -184,8 +184,8 @@ def test_each_zoi_of_a_finished_test_tells_its_values() -> None:
     assert found[2, 3] == "ZOI 2, 3: POOR_MATCH"
     head, moved, exx, eyy, exy = found[1, 2].splitlines()
     assert (head, moved) == ("ZOI 1, 2", "u +2.0000  v -1.0000 px")
-    assert exx.startswith("exx -300.0 ± 10.0 µm/m") and eyy.startswith("eyy +1000.0 ± 10.0 µm/m")
-    assert exy.startswith("exy +200.0 ± 7.1 µm/m")
+    assert exx.startswith("exx −300 ± 10 µm/m") and eyy.startswith("eyy 1\u202f000 ± 10 µm/m")
+    assert exy.startswith("exy 200 ± 7 µm/m")
     assert dots.positions.as_arrow_array().to_pylist()[0] == [setup.grid.x[1] + 0.5, setup.grid.y[0] + 0.5]
     kept = {
         str(one.component_descriptor()): one.as_arrow_array().to_pylist()

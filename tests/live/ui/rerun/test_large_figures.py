@@ -68,22 +68,22 @@ def test_any_figures_are_painted(more: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize(
     ("force", "head", "shown"),
-    [(9999.9, "FORCE N", "9999.9"), (-10000.0, "FORCE kN", "-10.000"), (12345.6, "FORCE kN", "12.346"),
+    [(9999.9, "FORCE N", "10\u202f000"), (-10000.0, "FORCE kN", "−10.000"), (12345.6, "FORCE kN", "12.346"),
      (math.nan, "FORCE N  unknown", "-")],
 )  # fmt: skip
 def test_forces_are_in_kilonewtons_from_ten_on(force: float, head: str, shown: str) -> None:
     state, strain, found, stress = _cells(
-        Snapshot(0.0, "REC, armed", figures=figures(axial=(-1.2345e-2, 4e-6), force=force, stress=30.86e6))
+        Snapshot(0.0, "REC", figures=figures(axial=(-1.2345e-2, 4e-6), force=force, stress=30.86e6))
     )
     assert found[:2] == (head, shown)
-    assert state[:2] == ("STATE", "REC") and strain[:2] == ("STRAIN +- 4 um/m", "-12 345")
+    assert state[:2] == ("STATE", "REC") and strain[:2] == ("STRAIN ± 0.0004 %", "−1.2345")
     assert stress[:2] == ("STRESS MPa", "30.9")
 
 
 def test_an_old_figure_is_grey_and_thin_with_its_age() -> None:
     old = replace(NOW, figures=NOW.figures | {"force": TimedFigure.at(30.0, 6.0, 1200.0)})
     _, strain, force, _ = _cells(old)
-    assert force == ("FORCE N  24 s old", "1200.0", GREY) and strain[2] == WHITE
+    assert force == ("FORCE N  24 s old", "1\u202f200.0", GREY) and strain[2] == WHITE
     white, grey = (
         (paint(replace(NOW, figures=NOW.figures | {"force": one}))[40:125, 900:1270].min(axis=2) > 160).sum()
         for one in (TimedFigure.at(6.0, 6.0, 1200.0), TimedFigure.at(30.0, 6.0, 1200.0))

@@ -13,6 +13,7 @@ import pytest
 
 from acquire.events import Event, EventKind
 from acquire.text.printable import printable
+from acquire.text.quantity import Amount
 from live.pipeline.screen import Screen
 from live.pipeline.snapshot import Snapshot
 from live.results.run_folder import open_run
@@ -213,10 +214,7 @@ def test_the_settings_and_the_words_of_a_finished_run(tmp_path: Path) -> None:
         words = playback._status(run)
         axial = run.gauges["axial"]
         assert words.startswith("**S1**, 96 instants, 33 of 34 ZOIs at the end\n\n")
-        assert (
-            f"gauge **axial** {1e6 * axial.value[-1]:+.0f} ± {1e6 * axial.sigma[-1]:.0f} µm/m at the end"
-            in words
-        )
+        assert f"gauge **axial** {Amount('strain', axial.value[-1], axial.sigma[-1])} at the end" in words
         means, *_, loads = playback._curves(run)
         assert rows_of(means)[3][3:5] == (run.strain.values["eyy"][3], run.strain.values["sigma_eyy"][3])
         assert [row[0] for row in rows_of(loads)][:3] == pytest.approx([0.0, 0.1, 0.2], abs=1e-9)

@@ -11,7 +11,7 @@ import pytest
 
 from acquire.events import Event, EventKind
 from acquire.text import Message
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 from live.pipeline.event_log import EventLog, sentence
 from live.pipeline.measurement import TimeStep
 from live.pipeline.run_state import FrameCounts
@@ -126,7 +126,7 @@ def test_the_status_line_is_in_the_language_of_the_terminal(monkeypatch: pytest.
 
 def test_an_ascii_terminal_gets_other_letters() -> None:
     stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
-    TerminalScreen(stream).print(f"{Quantity('strain', -2e-3, 0.6e-6)} of Prüfung")
+    TerminalScreen(stream).print(f"{Amount('strain', -2e-3, 0.6e-6)} of Prüfung")
     assert stream.buffer.getvalue() == b"-2000.0 +- 0.6 um/m of Pr\\xfcfung\n"
 
 

@@ -137,4 +137,4 @@ def test_the_end_is_that_of_the_last_burst() -> None:
     )
     back = without_values(whole, 1, 2)
     found_again = brief_lines(back, finished(back))
-    assert found_again[1].startswith("strain along y at the end: +3,000 \u00b1 ")
+    assert in_ascii(found_again[1]).startswith("strain along y at the end: 3000.0 +- ")

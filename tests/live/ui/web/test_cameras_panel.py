@@ -128,11 +128,11 @@ def test_the_result_has_the_newest_warnings() -> None:
     state = RunState.new(1.0, specimen=SPECIMEN)
     state.history.add(make_measurement(0).time_step)
     for k in range(25):
-        state.event_log.emit(EventKind.DEVICE, "a camera", f"warning {k}", "warning")
+        state.event_log.emit(EventKind.DEVICE, "a camera", f"warning{k}", "warning")
         state.event_log.emit(EventKind.NOTE, "operator", f"note {k}", "info")
     found = run_result(state, finished(state, SPECIMEN), Path("run"), "")["troubles"]
     assert len(found) == MAX_TROUBLES == 20
-    assert found[0].endswith("warning 5") and found[-1].endswith("warning 24")
+    assert found[0].endswith("warning5") and found[-1].endswith("warning24")
 
 
 def test_a_camera_that_has_ended_says_so_while_others_go_on() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from acquire.text import Message
 from acquire.text.message import about
-from acquire.text.quantity import Quantity
+from acquire.text.quantity import Amount
 from live.words.language import said
 from tests.acquire.test_quantity import CASES, quantity_of
 from tests.live.ui.web.conftest import Start
@@ -53,7 +53,7 @@ def test_a_message_is_the_same_on_the_page_and_in_a_terminal(start: Start, langu
         Message("no picture for {waited:.1f} s; still waiting (trigger, cable, light control?)", 2.13),
     )
     drift = Message(
-        "strain drifts by {drift} from left to right, in x and y alike", Quantity("strain", -0.0012)
+        "strain drifts by {drift} from left to right, in x and y alike", Amount("strain", -0.0012)
     )
     messages: list[Any] = [
         text,

@@ -16,6 +16,7 @@ import pytest
 
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
+from acquire.text import Message
 from analysis import StrainField
 from analysis.evaluate import GaugeValue
 from live.config.loading import Config, load_config
@@ -95,7 +96,7 @@ def test_the_state_of_a_run(config: Config) -> None:
     assert state["force_N"] == -400 and state["peak_N"] == 500 and state["stress_Pa"] == pytest.approx(-1e7)
     assert state["axial"] == {"name": "axial", "value": 0.001, "sigma": 2e-6, "assumed": ""}
     assert state["gauges"][1] == {"name": "b", "value": None, "sigma": None, "reason": "lost", "part": ""}
-    assert state["part"] == state["gauges"][0]["part"] == "of 83 % of the area"
+    assert state["part"] == state["gauges"][0]["part"] == Message("of {share} % of the area", 83).to_json()
     assert state["events"][0]["level"] == "error" and "\x1b" not in state["events"][0]["text"]
     for k in range(4555):
         consumer.event(Event(0.0, EventKind.ALARM, "alarm", f"force is {k} N", "warning"))
