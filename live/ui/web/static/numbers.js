@@ -11,7 +11,7 @@ const UNITS = {
   time: [["s", 1, 0, 1], ["min", 60, 120, 1]],
 };
 
-function unitOf(kind, size, name) {
+export function unitOf(kind, size, name) {
   const all = UNITS[kind], named = all.filter((one) => one[0] === name), fit = all.filter((one) => Math.abs(size) >= one[2]);
   const [unit, one, , decimals] = [named, fit, all.slice(0, 1)].find((some) => some.length).at(-1);
   return { name: unit, factor: 1 / one, digits: decimals };

@@ -3,7 +3,7 @@ import { $, el, fill, put } from "./base.js";
 import { clearCurves, showAges, updateCurves } from "./curves.js";
 import { key, putIcon } from "./icons.js";
 import { beginMap, showMap } from "./map.js";
-import { chooseStrainUnit, fixed, short, strainText, strainUnit, time, withSigma } from "./numbers.js";
+import { chooseStrainUnit, fixed, short, strainText, strainUnit, time, withSigma, quantityText, unitOf } from "./numbers.js";
 import { beginViews, noteFailed, received } from "./views.js";
 import { t } from "./words.js";
 
@@ -11,18 +11,19 @@ const WORDS = {
   opening: "opening", reference: "reference: keep still", measuring: "measuring", paused: "paused", ended: "closing the files",
   silent: "Load cell silent", blind: "No picture",
 };
+const DIGITS = 6; // of live figures, a sign, point or space counting half: so many are mostly needed
 const RECORDING = { on: "REC", off: "NOT RECORDING" };
 const LABELLED = { force: "Force", stress: "Stress", axial: "Strain along the load" };
-let state = null, stage = {}, firstEnded = false, secondGoesOn = false, silentS = 0, digits = 0;
+let state = null, stage = {}, firstEnded = false, secondGoesOn = false, silentS = 0, digits = DIGITS;
 
 $("strainunit").value = strainUnit().name;
 $("strainunit").addEventListener("change", (event) => { chooseStrainUnit(event.target.value); event.target.blur(); });
-for (const kind of ["unit", "language"]) addEventListener(kind, () => { if (state) { digits = 0; show(state); } });
+for (const kind of ["unit", "language"]) addEventListener(kind, () => { if (state) { regrow(); show(state); } });
 
 export function beginRun(value) {
   stage = value;
   secondGoesOn = false;
-  digits = 0;
+  regrow();
   clearCurves(value);
   beginMap(value);
   beginViews("run", (one) => { if (one.picture) showMap(one.picture, one.side); });
@@ -71,8 +72,8 @@ function show(value) {
 function showFigures(value) {
   const unit = strainUnit(), axial = value.axial, figures = value.figures;
   const name = value.side ? `${axial?.name ?? ""}, ${t(value.side)}` : axial?.name;
-  const N = { factor: 1, digits: 1, name: "N" }, MPa = { factor: 1e-6, digits: 2, name: "MPa" };
-  showTile("force", figures.force, N, value.peak_N == null ? "" : `${t("highest")} ${fixed(value.peak_N, 1)} N`);
+  const N = unitOf("force", value.peak_N ?? 0), MPa = unitOf("stress", 0); // that of a test, whatever the force is now
+  showTile("force", figures.force, N, value.peak_N == null ? "" : `${t("highest")} ${quantityText({ kind: "force", value: value.peak_N })}`);
   showTile("stress", figures.stress, MPa, stage.what?.area_mm2 ? `${t("over")} ${fixed(stage.what.area_mm2, 2)} mm²` : "");
   showTile("axial", figures.axial, unit, withPart(withPart(name ?? "", axial?.assumed), value.part));
   const isPictureOld = silentS || ["old", "unknown"].includes(figures.axial?.state);
@@ -128,12 +129,17 @@ function showLimit(place, limit, unit) {
   put(place.lastElementChild, `${fixed(100 * limit.share)} % ${t("of the limit")}, ${short(limit.value * unit.factor)} ${unit.name}`);
 }
 
-// All figures of a screen have one size, that of the longest number; it only grows during a test.
+// All figures of a screen have one size, that of the longest number; its digits only become more during a test.
+function regrow() {
+  digits = DIGITS;
+  document.querySelector(".figures").style.removeProperty("--n");
+}
+
 function grow(text) {
   const n = [...text].reduce((sum, one) => sum + (/\d/.test(one) ? 1 : 0.5), 0);
   if (n <= digits) return;
   digits = n;
-  document.querySelector(".figures").style.setProperty("--n", String(Math.max(n, 4)));
+  document.querySelector(".figures").style.setProperty("--n", String(n));
 }
 
 // 2.5·10⁻⁴: one form for all rates.
@@ -149,7 +155,7 @@ const withPart = (text, part) => (part ? `${text} ${t(part)}` : text);
 
 function showGauges(value) {
   const gauges = (value.gauges ?? []).map((one, k) => ({ k: one.colour ?? k, ...one })), list = $("others");
-  list.hidden = !gauges.length;
+  list.hidden = !gauges.length && value.state !== "reference"; // its place is kept until the first come
   fill(list, gauges.map(({ name, k }) => [name, k]), ([name, k]) => el("li", {}, key(k), el("span", { class: "name", text: name }), el("b", { class: "num" })));
   gauges.forEach((one, i) => {
     const number = list.children[i].lastChild;

@@ -126,6 +126,11 @@ class Page:
         """The stage that the page shows."""
         return str(self.page.get_attribute("body", "data-stage"))
 
+    def step(self, name: str) -> None:
+        """Open a step of the set-up."""
+        if self.page.get_attribute(f"#step-{name}", "open") is None:
+            self.page.click(f"#step-{name} > summary")
+
     def press(self, key: str) -> None:
         """Press a key when that is neither a bounce nor too soon after a change of the stage."""
         self.page.wait_for_timeout(350)

@@ -38,7 +38,7 @@ CASES: list[tuple[str, str, float | None]] = [
 READ = """async cases => { const { readNumber } = await import("/static/fields.js");
     return cases.map(([text, unit]) => readNumber(text, unit)).map((v) => Number.isNaN(v) ? "refused" : v); }"""
 WIDTH = '[data-set="specimen.width_mm"]'
-SAYS = f"() => document.querySelector('{WIDTH}').closest('label').querySelector('.says').textContent"
+SAYS = f"() => document.querySelector('{WIDTH}').closest('.field').querySelector('.says').textContent"
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def plain(browser: Any) -> Iterator[MadePage]:
 def page(browser: Any) -> Iterator[MadePage]:
     made = MadePage(browser)
     made.set_up()
-    made.page.click("#tab-specimen")
+    made.step("specimen")
     made.sent()
     yield made
     assert not made.errors
@@ -136,7 +136,7 @@ def test_every_field_for_a_number_is_of_one_kind(page: MadePage) -> None:
     )
     assert kinds == [["text", "decimal"]] * 6
     assert not page.page.locator("input[type=number]").count()
-    page.page.click("#tab-devices")
+    page.step("camera")
     page.page.fill("#rate", "12,5 Hz")
     page.page.press("#rate", "Enter")
     assert page.sent()[-1] == {"side": "", "do": "option", "key": "fps", "value": 12.5}
@@ -148,7 +148,7 @@ def test_every_field_for_a_number_is_of_one_kind(page: MadePage) -> None:
 def test_a_decimal_comma_in_german(browser: Any) -> None:
     made = MadePage(browser, "de-DE")
     made.set_up(specimen={**SPECIMEN, "width_mm": 20.5})
-    made.page.click("#tab-specimen")
+    made.step("specimen")
     assert made.page.input_value(WIDTH) == "20,5"
     made.sent()
     assert enter(made, "20,25")[0]["value"] == 20.25 and made.page.evaluate(SAYS) == ""
@@ -158,7 +158,7 @@ def test_a_decimal_comma_in_german(browser: Any) -> None:
 
 
 def test_the_forms_of_scale_and_board_read_numbers_and_can_be_left(page: MadePage) -> None:
-    page.page.keyboard.press("Escape")
+    page.step("gauges")
     page.page.click("#board")
     for name, text in (("columns", "8"), ("rows", "6,5"), ("square", "0.6 cm")):
         page.page.fill(f"#scale [name={name}]", text)

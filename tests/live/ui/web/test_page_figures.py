@@ -162,7 +162,7 @@ def test_figures_by_value(browser: Any, check: Callable[[Page], None]) -> None:
 
 FAULTS = {
     "strain in % ten times too small": ("numbers.js", r'\["%", 1e-2, 1e-2, 4\]', '["%", 1e-1, 1e-2, 4]', check_tiles),
-    "kPa under MPa": ("run.js", r"factor: 1e-6", "factor: 1e-3", check_tiles),
+    "kPa under MPa": ("numbers.js", r'\["MPa", 1e6', '["MPa", 1e3', check_tiles),
     "stress ten times too large": ("curves.js", r"\? 1e-6 : 1\)", "? 1e-5 : 1)", check_curves),
     "the ends of the scale swapped": (
         "legend.js", r"put\(marks.children\[k\], at\(share\)\)", "put(marks.children[k], at(1 - share))", check_maps,
@@ -172,7 +172,7 @@ FAULTS = {
         "drawing.js", r"s\.sigma \* s\.px_per_mm", "s.sigma / s.px_per_mm", check_setup,
     ),
     "frames not recorded are not lost": ("run.js", r" \+ \(l\.unrecorded \?\? 0\)", "", check_machine),
-    "force ten times too large": ("run.js", r"N = \{ factor: 1,", "N = { factor: 10,", check_tiles),
+    "force ten times too large": ("numbers.js", r'\["N", 1,', '["N", 0.1,', check_tiles),
 }  # fmt: skip
 
 

@@ -126,8 +126,8 @@ def test_undo_and_redo_by_buttons_and_keys(page: MadePage) -> None:
     for keys in ("Control+z", "Control+Shift+Z", "Control+y"):
         page.page.keyboard.press(keys)
     assert [one["do"] for one in page.sent()] == ["undo", "redo", "redo", "undo", "redo", "redo"]
-    page.page.click("#tab-specimen")
-    page.page.focus('[data-set="metadata.operator"]')
+    page.step("specimen")
+    page.page.focus('[data-set="metadata.material"]')
     page.page.keyboard.type("zyz")
     page.page.keyboard.press("Control+z")
     assert page.sent() == [], "typed"
@@ -158,7 +158,7 @@ def test_the_length_of_a_scale_is_typed_and_picks_no_tools(page: MadePage) -> No
 def test_escape_leaves_a_field_as_it_was(page: MadePage) -> None:
     page.page.fill("#gauges input", "another")
     page.page.press("#gauges input", "Escape")
-    page.page.click("#tab-specimen")
+    page.step("specimen")
     page.page.fill('[data-set="metadata.specimen"]', "bar-9")
     page.page.press('[data-set="metadata.specimen"]', "Escape")
     assert page.page.input_value("#gauges input") == "axial"
