@@ -27,9 +27,13 @@ from tests.live.ui.web.browser import Page, Program
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 WIDTH, HEIGHT = 480, 384
 CAMERA = f"sim:uniform?width={WIDTH}&height={HEIGHT}&fps=15&seconds=42&hold=16&end=1&buffers=64"
-WATCH_LAYOUT = """() => { window.moved = []; new PerformanceObserver(list => window.moved.push(...list.getEntries()
-    .filter(e => !e.hadRecentInput).map(e => [e.value, ...e.sources.map(s => [s.node?.id || s.node?.parentNode?.id,
-        ...[s.previousRect, s.currentRect].map(r => `${r.y} ${r.height}`)].join(" "))])))
+# The words of the state bar and the answer to a command may take the room they need: nothing else moves.
+WATCH_LAYOUT = """() => { window.moved = [];
+    const element = (one) => one.node?.nodeType === 1 ? one.node : one.node?.parentElement;
+    const told = (one) => [element(one)?.id || element(one)?.className,
+        ...[one.previousRect, one.currentRect].map(r => `${r.x} ${r.y} ${r.height}`)].join(" ");
+    new PerformanceObserver(list => window.moved.push(...list.getEntries().filter(e => !e.hadRecentInput
+        && e.sources.some(one => !element(one)?.closest("#state, .top"))).map(e => [e.value, ...e.sources.map(told)])))
     .observe({ type: "layout-shift" }); }"""
 
 
