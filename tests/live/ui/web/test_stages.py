@@ -215,14 +215,14 @@ def test_a_run(start: Start) -> None:
     page.page.select_option("#range", "fixed")
     page.page.fill("#limit", "5000")
     page.page.press("#limit", "Tab")
-    page.until(lambda: marks.nth(2).text_content() == "5000", "fixed")
+    page.until(lambda: marks.nth(2).text_content() == "5\u202f000", "fixed")
     assert legend.locator(".histogram.up rect").count() == 24
     box = page.page.locator("#gaugemap").bounding_box()
     middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.page.mouse.move(*middle)
     page.page.mouse.move(middle[0] + 3, middle[1])
     page.until(
-        lambda: re.search(r"px: [+−]\d+", page.text("readout")) is not None, "the value under the pointer"
+        lambda: re.search(r"px: −?\d+", page.text("readout")) is not None, "the value under the pointer"
     )
     page.page.mouse.wheel(0, -200)
     assert "scale" in page.page.evaluate("() => document.querySelector('#run .zoomed').style.transform")
