@@ -114,12 +114,17 @@ def unit_of(kind: str, size: float, name: str = "") -> ShownUnit:
     return (named or [unit for unit in units if abs(size) >= unit.since] or units[:1])[-1]
 
 
+def decimal_mark(language: str) -> str:
+    """Comma or point."""
+    return "," if language in _COMMA else "."
+
+
 def number(value: float, decimals: int = 0, language: str = "en") -> str:
     """A number to so many decimals, negative ones of tens; ``UNKNOWN`` where it is not finite."""
     if not math.isfinite(value):
         return UNKNOWN
     size = Decimal(abs(float(value))).quantize(Decimal(1).scaleb(-decimals), ROUND_HALF_UP)
-    text = f"{size:,f}".replace(",", GAP).replace(".", "," if language in _COMMA else ".")
+    text = f"{size:,f}".replace(",", GAP).replace(".", decimal_mark(language))
     return MINUS + text if value < 0 and size else text
 
 

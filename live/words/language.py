@@ -16,7 +16,7 @@ from typing import Any
 
 from acquire.text import Message
 from acquire.text.message import filled
-from acquire.text.quantity import Amount
+from acquire.text.quantity import Amount, decimal_mark
 
 log = logging.getLogger(__name__)
 
@@ -96,7 +96,7 @@ def said(text: str, language: str) -> str:
         if isinstance(value, Amount):
             return str(value.printed(language))
         number = format(value, spec)
-        return number.replace(".", ",") if isinstance(value, float) else number
+        return number.replace(".", decimal_mark(language)) if isinstance(value, float) else number
 
     try:
         return filled(words.get(text.template, text.template), text.values, shown)

@@ -34,9 +34,9 @@ class Unit:
 MICROSTRAIN, PERCENT = Unit("µm/m", 1e6), Unit("%", 100.0)
 
 
-def unit_for(largest: float) -> Unit:
-    """The unit for strains up to ``largest``."""
-    unit = unit_of("strain", largest)
+def unit_for(largest: float, kind: str = "strain") -> Unit:
+    """The unit for strains, or another kind of quantity, up to ``largest``, SI."""
+    unit = unit_of(kind, largest)
     return Unit(unit.name, 1 / unit.one)
 
 

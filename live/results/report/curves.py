@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from acquire.text.quantity import unit_of
 from analysis.evaluate import true_curve
 from live.results.maps.colours import Unit, unit_for
 from live.results.report.evaluation import EvaluatedCurve
@@ -26,8 +25,7 @@ def load_unit(curve: EvaluatedCurve) -> Unit:
 def force_unit(force: Array) -> Unit:
     """N or kN, from the largest."""
     largest = float(np.nanmax(np.abs(force))) if np.isfinite(force).any() else 0.0
-    unit = unit_of("force", largest)
-    return Unit(unit.name, 1 / unit.one)
+    return unit_for(largest, "force")
 
 
 def strain_unit(*strains: Array) -> Unit:

@@ -13,7 +13,15 @@ from acquire.hdf5 import storable
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
 from live.results.budget import CameraView, budget_cells
-from live.results.figures import axis_text, budget_of, figure_lines, film_line, headline, sharpness_line
+from live.results.figures import (
+    TensileRow,
+    axis_text,
+    budget_of,
+    figure_lines,
+    film_line,
+    headline,
+    sharpness_line,
+)
 from live.results.finished.answers import MeasuredAgain, checks_line, missing_lines
 from live.results.finished.figures_file import finished_in
 from live.results.finished.findings import doubts, findings
@@ -189,17 +197,22 @@ def _answers(run: RunFolder, curve: EvaluatedCurve, test: FinishedTest) -> list[
 
 def tensile(curve: EvaluatedCurve) -> dict[str, str]:
     """E, nu and the strengths by name, each with its uncertainty; without those that are not known."""
-    rows = headline(curve.figures, stresses=curve.is_stress)
-    found = {row.name: row.text for row in rows if row.figure.known}
-    strain = {f"strain of {rows[0].name}, nu": curve.figures.elastic_strain} if rows[0].figure.known else {}
-    return found | strain
+    return {row.name: row.text for row in _known(curve)} | _strain_of(curve)
 
 
 def _tensile_tiles(curve: EvaluatedCurve) -> dict[str, Shown]:
     """``tensile`` in parts."""
-    rows = headline(curve.figures, stresses=curve.is_stress)
-    found: dict[str, Shown] = {row.name: (row.printed, row.remark) for row in rows if row.figure.known}
-    return found | {name: text for name, text in tensile(curve).items() if name not in found}
+    return {row.name: (row.printed, row.remark) for row in _known(curve)} | _strain_of(curve)
+
+
+def _known(curve: EvaluatedCurve) -> list[TensileRow]:
+    return [row for row in headline(curve.figures, stresses=curve.is_stress) if row.figure.known]
+
+
+def _strain_of(curve: EvaluatedCurve) -> dict[str, str]:
+    """The strain that E and nu are of; nothing where E is not known."""
+    modulus = headline(curve.figures, stresses=curve.is_stress)[0]
+    return {f"strain of {modulus.name}, nu": curve.figures.elastic_strain} if modulus.figure.known else {}
 
 
 def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:

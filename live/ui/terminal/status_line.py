@@ -87,7 +87,7 @@ def _test(s: Snapshot) -> list[Item]:
     alarm = joined(" ", [Message("ALARM {text}", text) for text in s.alarms])
     force, stress = s.figure(FORCE), s.figure(STRESS)
     shown = figure_text(force, force_text(force.value), force_text(force.last))
-    over = joined("", [Amount("stress", stress.value)]) if stress.known else ""
+    over = _amount("stress", stress.value) if stress.known else ""
     peak = "" if math.isnan(s.peak_N) else Message("peak {force}", force_text(s.peak_N))
     load = [
         (0, shown if force.known or not shown else Message("force {shown}", shown)),
@@ -167,12 +167,17 @@ def figure_text(figure: TimedFigure, live: str, last: str = "") -> str:
 
 def force_text(value: float) -> str:
     """A force with its unit; empty where it is not known."""
-    return "" if math.isnan(value) else joined("", [Amount("force", value)])
+    return "" if math.isnan(value) else _amount("force", value)
 
 
 def strain_text(value: float, sigma: float = math.nan) -> str:
     """A strain, with its sigma where that is known."""
-    return joined("", [Amount("strain", value, sigma)])
+    return _amount("strain", value, sigma)
+
+
+def _amount(kind: str, value: float, sigma: float = math.nan) -> str:
+    """An amount alone as a text that can still be translated."""
+    return joined("", [Amount(kind, value, sigma)])
 
 
 def gauge_texts(i: TimeStep) -> list[str]:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.text.quantity import unit_of
 from live.results.maps.colours import nice_above, number, ticks, unit_for
 from live.ui.rerun.drawing.layout import CURVE_WIDTH
 from live.ui.rerun.drawing.shapes import DIM, GREY, ORANGE, polylines, text_labels
@@ -61,8 +60,8 @@ def stress_axis(values: NDArray[np.float64]) -> Axis:
 
 def force_axis(values: NDArray[np.float64]) -> Axis:
     """An axis for forces in N, shown in N or kN."""
-    unit = unit_of("force", float(np.abs(values).max(initial=0.0)))
-    return _axis(*_range(values, 1.0), 1 / unit.one, unit.name)
+    unit = unit_for(float(np.abs(values).max(initial=0.0)), "force")
+    return _axis(*_range(values, 1.0), unit.factor, unit.name)
 
 
 def _axis(low: float, high: float, factor: float, unit: str) -> Axis:

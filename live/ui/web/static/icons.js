@@ -15,5 +15,5 @@ export function putIcon(element, name) {
 }
 
 // The key of a gauge or curve: its colour and its dash, by the index that is stored with it.
-export const dashOf = (k) => `c${(k % 6) + 1} d${((k + Math.floor(k / 6)) % 6) + 1}`;
+const dashOf = (k) => `c${(k % 6) + 1} d${((k + Math.floor(k / 6)) % 6) + 1}`;
 export const key = (k) => make("svg", { class: `key ${dashOf(k)}`, viewBox: "0 0 24 12", "aria-hidden": "true" }, make("path", { d: "M1 6h22" }));

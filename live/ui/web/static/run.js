@@ -3,7 +3,7 @@ import { $, el, fill, put } from "./base.js";
 import { clearCurves, showAges, updateCurves } from "./curves.js";
 import { key, putIcon } from "./icons.js";
 import { beginMap, showMap } from "./map.js";
-import { chooseStrainUnit, fixed, short, strainText, strainUnit, time, withSigma, quantityText, unitOf } from "./numbers.js";
+import { chooseStrainUnit, fixed, quantityText, short, strainText, strainUnit, time, unitOf, withSigma } from "./numbers.js";
 import { beginViews, noteFailed, received } from "./views.js";
 import { t } from "./words.js";
 

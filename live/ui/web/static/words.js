@@ -1,9 +1,9 @@
 // The texts of the page and the messages of the program in the language of the operator. The entries of a language come
 // from live/words: English text or template -> its own. A message has a template (say) and values (with); the page fills
 // them in, as acquire/text/message.py does it in English. Names of files, devices and settings stay as they are.
-const FIELD = /\{\{|\}\}|\{(\w+)(?::([^{}]*))?\}/g;
 import { quantityText } from "./numbers.js";
 
+const FIELD = /\{\{|\}\}|\{(\w+)(?::([^{}]*))?\}/g;
 const tables = { en: {} };
 let chosen = "en", entries = {};
 
