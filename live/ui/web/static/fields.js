@@ -1,6 +1,7 @@
 // One kind of field for a number: a text with a decimal comma or point, groups of three, and a unit typed along. A text
 // that is no number changes nothing: the field says so, and what is kept. Arrows and the wheel change nothing either.
 import { el, put } from "./base.js";
+import { decimalMark } from "./numbers.js";
 import { t } from "./words.js";
 
 // Units that may be typed, by the unit of the field, and what they are of it.
@@ -39,8 +40,7 @@ function withPoint(digits) {
 }
 
 // A number as it is typed in the language of the page: no groups, no more digits than it has.
-export const typed = (value) => (value == null ? "" : String(Number(value.toPrecision(12))).replace(".", mark()));
-const mark = () => (document.documentElement.lang === "en" ? "." : ",");
+export const typed = (value) => (value == null ? "" : String(Number(value.toPrecision(12))).replace(".", decimalMark()));
 
 // Calls for Escape while an element, or what is in it, has the focus.
 export function onEscape(element, act) {
@@ -80,7 +80,7 @@ export function numberField(input, { unit = "", isWhole = false, isRequired = fa
     }
     if (Number.isNaN(value)) { refuse(WORDS[unitNow()] ?? WORDS.number, { text }); return undefined; }
     if (isWhole && !Number.isInteger(value)) { refuse(WORDS.whole, { text }); return undefined; }
-    const isPlain = /^[-+−]?[\d.,]+$/.test(text) && Number(text.replace(/[.,]/g, (one) => (one === mark() ? "." : "x")).replace("−", "-")) === value;
+    const isPlain = /^[-+−]?[\d.,]+$/.test(text) && Number(text.replace(/[.,]/g, (one) => (one === decimalMark() ? "." : "x")).replace("−", "-")) === value;
     input.value = typed(value);
     say(isPlain ? "" : "right", isPlain ? "" : t({ say: WORDS.read, with: { text, value: withUnit(value) } }));
     return value;

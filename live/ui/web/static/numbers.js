@@ -17,13 +17,14 @@ export function unitOf(kind, size, name) {
   return { name: unit, factor: 1 / one, digits: decimals };
 }
 
+export const decimalMark = () => (COMMA.includes(document.documentElement.lang) ? "," : ".");
+
 // To so many decimals, negative ones of tens; three digits a group, the decimal mark of the language.
 export function fixed(value, decimals = 0) {
   if (!Number.isFinite(value)) return DASH;
   const size = Math.abs(value), step = 10 ** -decimals;
   const [whole, part] = (decimals < 0 ? Math.round(size / step) * step : size).toFixed(Math.max(decimals, 0)).split(".");
-  const mark = COMMA.includes(document.documentElement.lang) ? "," : ".";
-  const text = whole.replace(/\B(?=(\d{3})+$)/g, GAP) + (part ? mark + part : "");
+  const text = whole.replace(/\B(?=(\d{3})+$)/g, GAP) + (part ? decimalMark() + part : "");
   return value < 0 && /[1-9]/.test(text) ? MINUS + text : text;
 }
 

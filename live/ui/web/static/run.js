@@ -155,7 +155,7 @@ const withPart = (text, part) => (part ? `${text} ${t(part)}` : text);
 
 function showGauges(value) {
   const gauges = (value.gauges ?? []).map((one, k) => ({ k: one.colour ?? k, ...one })), list = $("others");
-  list.hidden = !gauges.length && value.state !== "reference"; // its place is kept until the first come
+  list.hidden = !gauges.length && ["measuring", "paused"].includes(value.state); // its place is kept until they come
   fill(list, gauges.map(({ name, k }) => [name, k]), ([name, k]) => el("li", {}, key(k), el("span", { class: "name", text: name }), el("b", { class: "num" })));
   gauges.forEach((one, i) => {
     const number = list.children[i].lastChild;

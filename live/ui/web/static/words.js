@@ -1,7 +1,7 @@
 // The texts of the page and the messages of the program in the language of the operator. The entries of a language come
 // from live/words: English text or template -> its own. A message has a template (say) and values (with); the page fills
 // them in, as acquire/text/message.py does it in English. Names of files, devices and settings stay as they are.
-import { quantityText } from "./numbers.js";
+import { decimalMark, quantityText } from "./numbers.js";
 
 const FIELD = /\{\{|\}\}|\{(\w+)(?::([^{}]*))?\}/g;
 const tables = { en: {} };
@@ -32,8 +32,7 @@ function filled(template, values) {
 
 function shown(value, format) {
   if (typeof value !== "number") return typeof value === "boolean" ? String(value) : t(value);
-  const text = number(value, format);
-  return chosen === "en" ? text : text.replace(".", ",");
+  return number(value, format).replace(".", decimalMark());
 }
 
 // A number in a format of Python: sign, width, digits, and one of f, g, e, d, x, %.

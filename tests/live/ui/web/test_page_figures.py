@@ -329,3 +329,23 @@ def test_what_fails_stays_to_be_seen(browser: Any) -> None:
         page.page.click("#step-check > summary")
         assert page.page.inner_text("#verdicts .verdict.bad p") == "load cell: silent. look at its cable"
         assert page.page.inner_text("#step-camera .chip") == "look"
+
+
+def test_whatever_the_figures_become_they_stay_in_their_places(browser: Any) -> None:
+    live = run_state()["figures"]
+    old = figure(None, state="old", last=7796.9, age_s=24.0)
+    changes: list[dict[str, Any]] = [
+        {"figures": live | {"force": old}, "troubles": ["load cell: no force for 24 s"]},
+        {"figures": live | {"force": figure(None, state="overload", last=9.0, age_s=0.0)}},
+        {"figures": live | {"force": figure(0.4), "axial": figure(-1.2345e-3, sigma=1e-7)}},
+        {"state": "reference", "figures": {}, "gauges": []},
+        {"part": "of 83 % of the area", "strain_rate": None, "elongation_mm": None, "late_s": 1.2},
+    ]
+    with opened(browser) as page:
+        show_run(page)
+        boxes = "() => [...document.querySelectorAll('.figures > :not([hidden])')].map(one => one.offsetTop)"
+        usual = page.page.evaluate(boxes)
+        assert len(usual) == 5
+        for change in changes:
+            show_run(page, **change)
+            assert page.page.evaluate(boxes) == usual
