@@ -220,6 +220,7 @@ function showState(value) {
   const limit = near && value.figures[near].limit;
   put($("alarm"), troubles[0] ?? (near ? `${t(LABELLED[near])}: ${fixed(100 * limit.share)} % ${t("of the limit")}` : ""));
   put($("alarmmore"), troubles.slice(1).join(" · ") || (near && limit.ends && !troubles.length ? t("At the limit the test ends by itself.") : ""));
+  $("alarm").parentElement.title = troubles.join(" · "); // whole, where the bar has no room for it
   $("silence").hidden = !troubles.length;
 }
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from tests.live.ui.web.browser import Page
 
 SIZES = ((1920, 1080), (1280, 800), (1024, 768), (768, 1024), (390, 844), (640, 400))
+LOCALES = ("en-US", "de-DE", "fr-FR")
 CONTRAST = 4.5
 """WCAG 2.2, 1.4.3, of every text, large ones included."""
 

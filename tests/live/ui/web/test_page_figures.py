@@ -10,10 +10,12 @@ from typing import Any
 
 import pytest
 
+from acquire.text import Message
 from live.config.loading import load_config
 from live.ui.web.page_controller import PageController
 from live.ui.web.setup.config_draft import ConfigDraft
 from tests.live.ui.web.browser import ROOT, Page
+from tests.live.ui.web.legibility import LOCALES, SIZES, fits, readable
 from tests.live.ui.web.made_up import (
     MAP,
     STAGE,
@@ -349,3 +351,30 @@ def test_whatever_the_figures_become_they_stay_in_their_places(browser: Any) -> 
         for change in changes:
             show_run(page, **change)
             assert page.page.evaluate(boxes) == usual
+
+
+INSIDE = """() => { const bar = document.getElementById("strip").getBoundingClientRect();
+    return [...document.querySelectorAll("#strip .matters")].map(one => one.getBoundingClientRect())
+        .map(one => one.top >= bar.top - 1 && one.bottom <= bar.bottom + 1 && one.right <= bar.right + 1); }"""
+
+
+@pytest.mark.parametrize("locale", LOCALES)
+def test_a_fault_can_be_read_at_every_size(browser: Any, locale: str) -> None:
+    names = ("extension", "width", "area")
+    why = [Message("no value of {name} for {age:.0f} s", name, 24.4).to_json() for name in names]
+    live = run_state()
+    old = figure(None, state="old", last=1e-3, age_s=24.4)
+    ledger = live["ledger"] | {"skipped": 76, "lost": 3, "without_force": 5}
+    with opened(browser, locale=locale) as page:
+        page.until(lambda: page.page.get_attribute("html", "lang") == locale[:2], "its language")
+        for troubles in (why[:1], why):
+            fault = live["figures"] | {"axial": old}
+            show_run(page, figures=fault, troubles=troubles, ledger=ledger, late_s=1.2)
+            fits(page, "a fault")
+            readable(page, "a fault")
+            for width, height in SIZES:
+                page.page.set_viewport_size({"width": width, "height": height})
+                assert page.page.evaluate(INSIDE) == [True] * 4, (
+                    f"{width}: lost, skipped, delay, without a force"
+                )
+            assert page.page.get_attribute("#state .message", "title").count("24 s") == len(troubles), "whole"

@@ -21,7 +21,7 @@ from live.words.language import said
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeKernel
 from tests.live.ui.web.browser import Page, Program
 from tests.live.ui.web.conftest import CAMERA, OPTIONS, Start, another, measuring, started
-from tests.live.ui.web.legibility import LETTERS, LINES, contrast, fits, readable
+from tests.live.ui.web.legibility import LETTERS, LINES, LOCALES, contrast, fits, readable
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
@@ -264,9 +264,6 @@ def test_after_a_test(start: Start) -> None:
     page.page.click("#step-specimen > summary")
     page.until(lambda: page.page.input_value('[data-set="metadata.specimen"]') == "specimen-1", "its name")
     assert not page.errors
-
-
-LOCALES = ("en-US", "de-DE", "fr-FR")
 
 
 def test_the_whole_way_in_three_languages(browser: Any, start: Start) -> None:
