@@ -35,8 +35,6 @@ SHAPE = (1024, 1024)
 NOISE = 0.01
 FRAMES = 12
 STEP = {"u": 0.2, "v": -0.11, "du_dx": 1e-4, "dv_dy": -3e-5, "du_dy": 2e-5}
-FLOP_A_PIXEL = 185
-"""Of one iteration: two sets of six weights (78), 36 taps and 6 rows (77), moments and shapes (30)."""
 
 
 @lru_cache(maxsize=2)
@@ -120,8 +118,6 @@ def unsettled(size: int, frames: list[NDArray], found: StrainField, before: Stra
 
 def throughput(report: Report) -> None:
     frames, turned = sequence(), sequence(5.0)
-    peak, flow = machine.arithmetic(), machine.bandwidth()
-    report.values["arithmetic_flop_s"], report.values["bandwidth_B_s"] = peak, flow
     most = numba.get_num_threads()
     for size, order, threads, images in (
         (32, 1, most, frames), (32, 1, 1, frames), (32, 1, most, turned), (32, 2, most, frames),
@@ -132,14 +128,11 @@ def throughput(report: Report) -> None:
         kernel = PhaseKernel(images[0], grid, KernelSettings(order=order), SIGMA)
         seconds, now, before = track(kernel, images)
         numba.set_num_threads(most)
-        work = grid.n_active * float(now.iterations.mean()) * size**2 * FLOP_A_PIXEL
         report.add("Tracking a sequence", {
             "ZOI": size, "order": order, "threads": threads, "rotation deg": 5 if images is turned else 0,
             "ZOIs": grid.n_active, "ZOI/s": grid.n_active / seconds, "iterations": float(now.iterations.mean()),
             "valid %": 100 * now.n_valid / grid.n_active,
             "not settled %": unsettled(size, images, now, before) if order == 1 else "",
-            "share of memory bandwidth %": 100 * (20 * SHAPE[0] * SHAPE[1] + 1200 * grid.n_active) / seconds / flow,
-            "share of multiply-add peak %": 100 * work / seconds / (peak * threads / most),
             "error of mean u px": float(np.nanmean(now.u) - _true_u(now.grid, images is turned)),
         })  # fmt: skip
 
@@ -197,8 +190,9 @@ def other_engines(report: Report) -> None:
     for size, note in ((32, tracking), (57, f"{tracking}; equal l_10% (130 px) to the 33 px engines")):
         grid = zois(size, margin=32)
         kernel = PhaseKernel(frames[0], grid, None, SIGMA)
-        seconds, now, _ = track(kernel, frames)
-        _engine(report, f"phasedic, ZOI {size}", note, seconds, Points(*np.meshgrid(grid.x, grid.y), now.u))
+        seconds, now, before = track(kernel, frames)
+        cpu = machine.processor_s(lambda k=kernel, b=before: k.measure(frames[-1], start=b, noise=SIGMA), 9)
+        _engine(report, f"phasedic, ZOI {size}", note, (seconds, cpu), Points(*np.meshgrid(grid.x, grid.y), now.u))
     for peer in peers(frames[0], frames[-1], zois(33, margin=32)):
         _peer(report, peer)
     if missing():
@@ -210,24 +204,30 @@ def _peer(report: Report, peer: Peer) -> None:
     found: list[Points] = []
     try:
         seconds = machine.best(lambda: found.append(peer.run()), repeats=peer.repeats)
+        cpu = machine.processor_s(peer.run, peer.repeats)
     except Exception as error:
         if not peer.optional:
             raise
         said = " ".join(f"failed: {type(error).__name__}: {error}".split()).replace("|", "/")
         _engine(report, peer.name, said[:200])
         return
-    _engine(report, peer.name, peer.note, seconds, found[-1])
+    _engine(report, peer.name, peer.note, (seconds, cpu), found[-1])
 
 
 def _engine(
-    report: Report, name: str, note: str, seconds: float = np.nan, found: Points | None = None
+    report: Report,
+    name: str,
+    note: str,
+    seconds: tuple[float, float] = (np.nan, np.nan),
+    found: Points | None = None,
 ) -> None:
-    """One row; empty but for the note where nothing was found."""
-    row = {"engine": name, "points": 0, "points/s": "", "mean error px": "", "scatter px": "", "note": note}
+    """One row, ``seconds`` by the clock and of the processors; empty but for the note where nothing was found."""
+    empty = dict.fromkeys(("points/s", "points a processor second", "mean error px", "scatter px"), "")
+    row: dict[str, Any] = {"engine": name, "points": 0, **empty, "note": note}
     n = 0 if found is None else int(np.isfinite(found.u).sum())
     if found is not None and n:
         error = found.u - _true_map(found.x, found.y)
-        row |= {"points": n, "points/s": n / seconds}
+        row |= {"points": n, "points/s": n / seconds[0], "points a processor second": n / seconds[1]}
         row |= {"mean error px": float(np.nanmean(error)), "scatter px": float(np.nanstd(error))}
     report.add("Beside other engines, on the same pair", row)
 

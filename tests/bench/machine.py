@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numba
@@ -70,6 +71,14 @@ def best(function, *arguments, repeats: int = 5) -> float:
         function(*arguments)
         times.append(time.perf_counter() - start)
     return min(times)
+
+
+def processor_s(function: Callable[[], object], repeats: int = 5) -> float:
+    """Processor time of one call, s, all threads together: the mean of ``repeats``."""
+    start = time.process_time()
+    for _ in range(repeats):
+        function()
+    return (time.process_time() - start) / repeats
 
 
 def bandwidth() -> float:
