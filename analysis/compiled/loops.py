@@ -53,17 +53,12 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 def helper(function: Callable[..., Any]) -> Any:
     """A function called from compiled loops; small or inlined by the compiler as it sees fit."""
-    return _stamped(numba.njit(function, error_model="numpy", fastmath=FAST, cache=True, nogil=True))
+    return stamped(numba.njit(function, error_model="numpy", fastmath=FAST, cache=True, nogil=True))
 
 
 def parallel(function: Callable[..., Any]) -> Any:
-    """A loop over ZOIs or rows, shared among the threads; each item is done by one of them.
-
-    Make the body of the loop a function of its own: numba analyses the bodies of such loops twice (19 s of processor
-    time in place of 25 for the iteration).
-    """
-    options = {"error_model": "numpy", "fastmath": FAST, "cache": True, "nogil": True, "parallel": True}
-    return ExclusiveLoop(_stamped(numba.njit(function, **options)))
+    """A function that lets all threads do their shares of a loop (``shares.in_shares``)."""
+    return ExclusiveLoop(helper(function))
 
 
 class ExclusiveLoop:
@@ -88,7 +83,7 @@ class ExclusiveLoop:
             return self.dispatcher(*arguments)
 
 
-def _stamped(dispatcher: Any) -> Any:
+def stamped(dispatcher: Any) -> Any:
     """The same, compiled anew when any of the compiled modules has changed.
 
     numba itself compares only the file of the function, and would run the old code of its helpers.

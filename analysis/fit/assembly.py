@@ -6,10 +6,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper, inlined, parallel, read_only
+from analysis.compiled.shares import in_shares, part_of
 
 RUN = 1024
 """ZOIs whose covariances are scaled at a time."""
@@ -122,8 +122,16 @@ def weigh_blur(unit: Any, whole: Any, out: Any) -> None:
 @parallel
 def scale(unit: Any, colour: Any, from_reference: Any, whole: Any, out_reference: Any, out: Any) -> None:
     """The unit covariances (21, N) times ``colour`` (21,) and two variances (N,) each, written to the last two."""
+    in_shares(_scale_share, (unit, colour, from_reference, whole, out_reference, out))
+
+
+@helper
+def _scale_share(
+    unit: Any, colour: Any, from_reference: Any, whole: Any, out_reference: Any, out: Any, share: int
+) -> None:
     count = unit.shape[1]
-    for run in prange((count + RUN - 1) // RUN):
+    first, end = part_of((count + RUN - 1) // RUN, share)
+    for run in range(first, end):
         a = run * RUN
         b = min(a + RUN, count)
         for k in range(len(unit)):
@@ -160,8 +168,14 @@ def clipped_share(
 @parallel
 def clipped_shares(marked: Any, first: Any, weight: Any, out: Any) -> None:
     """See ``clipped_share``; ``marked`` (H, W) uint8, ``out`` (A,) written."""
+    in_shares(_clipped_share, (marked, first, weight, out))
+
+
+@helper
+def _clipped_share(marked: Any, first: Any, weight: Any, out: Any, share: int) -> None:
     size = weight.size
-    for z in prange(len(first)):
+    begin, end = part_of(len(first), share)
+    for z in range(begin, end):
         top = min(max(first[z, 0], 0), marked.shape[0] - size)
         left = min(max(first[z, 1], 0), marked.shape[1] - size)
         total = 0.0

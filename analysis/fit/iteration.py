@@ -13,10 +13,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import prange
 
 from analysis.compiled.loops import helper, inlined, parallel
-from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
+from analysis.compiled.shares import in_shares, part_of
+from analysis.compiled.threads import SHARES, next_piece
 from analysis.compiled.vectors import LANES, fetch_later, fetch_soon
 from analysis.fit.kernel_args import (
     CONVERGED,
@@ -239,10 +239,7 @@ def track(picture: PictureArgs, table: Any, fit: FitArgs, stop: StopArgs, out: O
     read from a tuple it lets the compiler sum in another order, and the last digit of float32 changes. ``todo`` (K,)
     are the places in ``out``; those whose iterations have begun go on.
     """
-    counters, calling = np.zeros(SHARES, np.int64), caller()
-    for share in prange(SHARES):
-        keep_apart(calling)
-        _track_share(picture, table, fit, stop, out, todo, counters, share)
+    in_shares(_track_share, (picture, table, fit, stop, out, todo, np.zeros(SHARES, np.int64)))
 
 
 @helper
@@ -263,7 +260,7 @@ def _track_share(
 def _track_some(
     picture: Any, table: Any, fit: Any, stop: Any, out: Any, todo: Any, start: int, end: int
 ) -> None:
-    """``track`` for some ZOIs; a function of its own, since numba takes long over the body of a parallel loop."""
+    """``track`` for some ZOIs."""
     p, state, iterations = out.p, out.state, out.iterations
     count = fit.inverse.shape[1]
     half = p.shape[1] // 2
@@ -369,11 +366,16 @@ def is_short(length: Any, lever: Any, length_left: Any, slope_left: Any, trust: 
 @parallel
 def warp_zois(picture: PictureArgs, table: Any, origins: Any, size: int, p: Any, out: Any) -> None:
     """The deformed image in every warped ZOI of order 1, (A, n, n) float32, written to ``out``."""
+    in_shares(_warp_share, (picture, table, origins, size, p, out))
+
+
+@helper
+def _warp_share(picture: Any, table: Any, origins: Any, size: int, p: Any, out: Any, share: int) -> None:
     line = (size + LANES - 1) // LANES * LANES
-    for z in prange(len(origins)):
-        rows = np.empty(line + LANES, np.float32)
-        ramp = np.arange(line).astype(np.float32)
-        _, _, where, how = new_plan(size)
+    rows, ramp = np.empty(line + LANES, np.float32), np.arange(line).astype(np.float32)
+    _, _, where, how = new_plan(size)
+    first, end = part_of(len(origins), share)
+    for z in range(first, end):
         for y in range(size):
             warp_cut_rows(
                 picture.c, picture.width + 2 * PAD, p[z], 1, origins[z, 1] + PAD, origins[z, 0] + PAD, y, 1, size,

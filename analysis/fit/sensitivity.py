@@ -13,11 +13,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper, parallel
-from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
+from analysis.compiled.shares import in_shares
+from analysis.compiled.threads import SHARES, next_piece
 from analysis.fit.kernel_args import BLURS, NUISANCES, NormalArgs, ReferenceImages, WindowRows
 from analysis.fit.moments import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, product_moments
 from analysis.fit.shapes import cross_moments
@@ -163,10 +163,7 @@ def prepare(
     table : (P, 3), units : (6,)
     out : NormalArgs, written
     """
-    counters, calling = np.zeros(SHARES, np.int64), caller()
-    for share in prange(SHARES):
-        keep_apart(calling)
-        _prepare_share(images, origins, size, rows, table, units, out, counters, share)
+    in_shares(_prepare_share, (images, origins, size, rows, table, units, out, np.zeros(SHARES, np.int64)))
 
 
 @helper
@@ -193,7 +190,7 @@ def _prepare_share(
 def _prepare_some(
     images: Any, origins: Any, first: int, size: int, rows: Any, table: Any, units: Any, out: Any
 ) -> None:
-    """``prepare`` for CHUNK ZOIs; a function of its own, since numba takes long over the body of a parallel loop."""
+    """``prepare`` for CHUNK ZOIs."""
     count = len(table)
     half = (count - NUISANCES) // 2
     order = 1 if half == 3 else 2

@@ -10,9 +10,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import prange
 
 from analysis.compiled.loops import helper, parallel
+from analysis.compiled.shares import in_shares, part_of
 
 f4 = np.float32
 
@@ -37,7 +37,15 @@ def match(
     reach : int, px
     out : (N, 2) float64, written
     """
-    for n in prange(len(firsts)):
+    in_shares(_match_share, (reference, padded, margin, firsts, size, guesses, reach, out))
+
+
+@helper
+def _match_share(
+    reference: Any, padded: Any, margin: int, firsts: Any, size: int, guesses: Any, reach: int, out: Any, share: int
+) -> None:  # fmt: skip
+    first, end = part_of(len(firsts), share)
+    for n in range(first, end):
         _match_block(reference, padded, margin, firsts[n], size, guesses[n], reach, out[n])
 
 

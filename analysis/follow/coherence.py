@@ -11,10 +11,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper, parallel
+from analysis.compiled.shares import in_shares, part_of
 
 ALLOWED_PX, ALLOWED_SIGMAS, ALLOWED_SPREADS = 0.05, 10.0, 6.0
 """How far a ZOI may lie from what its neighbours say: px, its own sigmas, and as many times what they lie off."""
@@ -58,7 +58,13 @@ def stand_out(p: Any, variance: Any, step: float, ok: Any, out: Any) -> None:
     out : (R, C) uint8, written
         ``ALONE``, or ``ROUGH`` where only some of the neighbours move as it does.
     """
-    for r in prange(ok.shape[0]):
+    in_shares(_stand_out_share, (p, variance, step, ok, out))
+
+
+@helper
+def _stand_out_share(p: Any, variance: Any, step: float, ok: Any, out: Any, share: int) -> None:
+    first, end = part_of(ok.shape[0], share)
+    for r in range(first, end):
         _stand_out_in_row(p, variance, step, ok, r, out[r])
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper, parallel, read_only
+from analysis.compiled.shares import in_shares, part_of
 
 f4 = np.float32
 Image = NDArray[np.float32]
@@ -87,7 +87,16 @@ def climb(
         Uphill from the best of them at most.
     out : (A, 2) int64 and score : (A,) float64, written; score -2 where nothing lies in the image
     """
-    for z in prange(len(origins)):
+    in_shares(_climb_share, (reference, deformed, offset, origins, size, candidates, moves, out, score))
+
+
+@helper
+def _climb_share(
+    reference: Any, deformed: Any, offset: Any, origins: Any, size: int, candidates: Any, moves: int, out: Any,
+    score: Any, share: int,
+) -> None:  # fmt: skip
+    first, end = part_of(len(origins), share)
+    for z in range(first, end):
         top, left = origins[z]
         best = -2.0
         x = candidates[z, 0, 0]

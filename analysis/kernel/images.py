@@ -96,10 +96,11 @@ class _PlainNoise(NoiseModel):
 
 def rounding_variance(image: NDArray[Any]) -> float:
     """Variance that rounding leaves in an image of whole grey levels a step apart, step^2/12, GL^2; else 0."""
-    sample = image.ravel()[:: max(1, image.size // ROUNDING_SAMPLE)].astype(np.float64)
-    if not np.array_equal(sample, np.rint(sample)):
+    sample = image.ravel()[:: max(1, image.size // ROUNDING_SAMPLE)]
+    if sample.dtype.kind == "f" and not np.array_equal(sample, np.rint(sample)):
         return 0.0
-    away = (sample - sample[0]).astype(np.int64)
+    levels = sample.astype(np.int64)
+    away = levels - levels[0]
     step = 1 if (away == 1).any() else np.gcd.reduce(away)
     return float(step) ** 2 / 12
 

@@ -6,12 +6,12 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from analysis.compiled.convolution import GROUP, REACH, ROWS, STRIP, filter_across, filter_along
 from analysis.compiled.loops import helper, parallel
-from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
+from analysis.compiled.shares import in_shares
+from analysis.compiled.threads import SHARES, next_piece
 from analysis.compiled.vectors import LANES
 from analysis.picture.splines import LINE, PAD, Box
 
@@ -56,10 +56,8 @@ def coefficients(
     stride = width + 2 * PAD
     for n in range(out.size - LANES, out.size):
         out[n] = 0
-    counters, totals, calling = np.zeros(SHARES, np.int64), np.zeros(SHARES), caller()
-    for share in prange(SHARES):
-        keep_apart(calling)
-        totals[share] = _filter_share(image, offset, taps, box, counters, share, out)
+    counters, totals = np.zeros(SHARES, np.int64), np.zeros(SHARES)
+    in_shares(_filter_share, (image, offset, taps, box, counters, totals, out))
     for y in range(PAD):
         if box.top == 0:
             _copy_row(out, _mirror(y - PAD, height) + PAD, stride, y)
@@ -69,12 +67,14 @@ def coefficients(
 
 
 @helper
-def _filter_share(image: Any, offset: Any, taps: Any, box: Any, counters: Any, share: int, out: Any) -> float:
-    """The parts of all rows that one thread takes, one after the other; the sum of the samples, which shows NaN."""
+def _filter_share(
+    image: Any, offset: Any, taps: Any, box: Any, counters: Any, totals: Any, out: Any, share: int
+) -> None:
+    """The parts of all rows that one thread takes, one after the other; the sum of the samples shows NaN."""
     parts = (box.bottom - box.top + PART - 1) // PART
     part = next_piece(counters, share, parts)
     if part < 0:  # as for most shares: nothing is left
-        return 0.0
+        return
     width = image.shape[1]
     line = np.zeros((width + GROUP - 1) // GROUP * GROUP + 2 * REACH, np.float32)
     # An odd number of cache lines a row, or the rows would displace each other.
@@ -90,7 +90,7 @@ def _filter_share(image: Any, offset: Any, taps: Any, box: Any, counters: Any, s
         ahead, read = _filter_part(image, offset, taps, box, top, bottom, ahead, buffers, out)
         total += read
         part = next_piece(counters, share, parts)
-    return total
+    totals[share] = total
 
 
 @helper
