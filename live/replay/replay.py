@@ -256,7 +256,7 @@ def _run(
     )
     code = 130 if stopping.is_set() else 5 if lossy else 0
     at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
-    test = finished(folder, config, run_state, code, at_reference)
+    test = finished(folder, config, run_state, code, at_reference, source.start.monotonic)
     if request.response:
         lines = [*response_of(folder, test.figures, request.response), *lines]
     return Replayed(folder, run_state, config, code, test, tuple(lines), left_out)

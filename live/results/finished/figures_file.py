@@ -73,14 +73,21 @@ class FiguresFile:
 
 
 def finished(
-    folder: Path, config: Config, run_state: RunState, exit_code: int, reference_N: float
+    folder: Path,
+    config: Config,
+    run_state: RunState,
+    exit_code: int,
+    reference_N: float,
+    start_t: float = 0.0,
 ) -> FinishedTest:
-    """Evaluate a run or replay that has just ended, and write its ``figures.json``; where that fails it is an event.
+    """Evaluate a run or replay that has just ended, and write its ``figures.json`` and ``cycles.csv``.
 
-    ``reference_N`` is the force at the reference, N; NaN where it is not known.
+    Where that fails it is an event. ``reference_N`` is the force at the reference, N; NaN where it is not known;
+    ``start_t`` the time, s, that times of the results count from.
     """
-    test = FinishedTest.of_run(run_state, config.specimen, config.gauges, reference_N)
+    test = FinishedTest.of_run(run_state, config.specimen, config.gauges, reference_N, start_t)
     try:
+        test.cycles.write(folder)
         FiguresFile.of(test, run_state.frame_counts.as_dict(), exit_code).write(folder)
     except PhasedicError as error:
         run_state.event_log.emit(EventKind.RECORDER, FILE, error.text, "warning")
@@ -119,6 +126,8 @@ def _figures(test: FinishedTest) -> Iterator[dict[str, Any]]:
             if _SI.get(row.unit) == "Pa":
                 yield _row(row.name, Figure.none(_NO_SECTION), "Pa")
     yield _row("lag", test.lag, "s")
+    for name, figure, unit in test.cycles.figures():
+        yield _row(name, figure, unit)
     for name, value in test.at_end.items():
         figure = Figure.about(value.value, value.sigma) if not value.reason else Figure.none(value.reason)
         film = test.specimen.film_error_percent
