@@ -1,8 +1,8 @@
-"""A programme of cycles between two forces, while the specimen loses stiffness: ``sim:?programme=cyclic&hz=2&r=0.1&n=50``.
+"""Cycles between two forces, while the specimen loses stiffness: ``sim:?programme=cyclic&hz=2&r=0.1&n=50&fall=0.1``.
 
-At rest, to the lowest force, n cycles of 1 - cos between the lowest and the highest, at rest at the lowest. The forces stay the
-same; from cycle to cycle the stiffness falls, in equal steps, from all of it in the first to 1 - ``fall`` in the last. The strain
-follows at once: the loop has no area.
+At rest, to the lowest force, n cycles of 1 - cos between the lowest and the highest, at rest at the lowest. The forces
+stay the same; from cycle to cycle the stiffness falls, in equal steps, from all of it in the first to 1 - ``fall`` in
+the last. The strain follows at once: the loop has no area.
 """
 
 from __future__ import annotations

@@ -142,7 +142,7 @@ def reversals(values: Floats, least: float) -> list[int]:
 
 
 def _turned(values: Floats, side: int, start: int, least: float) -> int:
-    """Where ``side`` (1 or -1) times ``values`` first falls by ``least`` from its highest since ``start``; 0: nowhere."""
+    """Where ``side`` (1, -1) times ``values`` first falls by ``least`` from its highest since ``start``; 0: nowhere."""
     top, size = -math.inf, 64
     while start < len(values):
         part = side * values[start : start + size]

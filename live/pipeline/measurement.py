@@ -210,7 +210,7 @@ def mean_width(duration: ArrayLike, n: ArrayLike) -> NDArray[np.float64]:
     That of an even mean with the same second moment: its share of a vibration is the same.
     """
     count = np.maximum(np.asarray(n, np.float64), 1)
-    return np.asarray(duration, np.float64) * np.sqrt((count + 1) / np.maximum(count - 1, 1))
+    return np.asarray(np.asarray(duration) * np.sqrt((count + 1) / np.maximum(count - 1, 1)), np.float64)
 
 
 def ordered_mean(values: np.ndarray) -> float:

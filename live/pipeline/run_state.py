@@ -9,11 +9,11 @@ from acquire.events import Event, EventKind
 from acquire.load_cell import LoadLog
 from acquire.text import Message
 from live.config.sections import SpecimenConfig
-from live.pipeline.cycles import CycleWatch
 from live.pipeline.event_log import EventLog, sentence
 from live.pipeline.history import History
 from live.pipeline.measurement import TimeStep, strains_along
 from live.pipeline.snapshot import FORCE, STRESS, Snapshot
+from live.pipeline.timed.cycles import CycleWatch
 from live.pipeline.timed.figure import FigureState, TimedFigure
 from live.pipeline.timed.health import Health, force_at, strains_at
 

@@ -15,25 +15,24 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.text import Message
 from analysis.evaluate.curve import noise
 from analysis.evaluate.cyclic.loop import BurstStrains, Loops, Waves
 from analysis.evaluate.lag import Track
 from analysis.evaluate.programme import reversals
 
 Floats = NDArray[np.float64]
-MIN_CYCLES = 3
+MIN_CYCLES = 4
 """Fewer are none."""
 _SURE, _LEAST = (
     12.0,
     0.1,
 )  # standard deviations of the noise, and share of the whole range: what a cycle exceeds
-_SHARE, _FACTOR = 0.8, 1.5  # of the cycles that must be like the one before, and how like
+_SHARE, _FACTOR = 0.8, 1.2  # of the cycles that must be like the one before, and how like
 _KEPT = 16_384  # readings, of a cycle that goes on
 _BLOCK = 32_768  # readings and bursts that are taken at once, of a test that is over
 _LACKING = 1 / 16  # of a cycle: what may lack at the end of the test
@@ -49,7 +48,7 @@ class Cycle(NamedTuple):
     number: int
     t: float
     duration: float
-    bursts: int
+    bursts: float
     peak_load: float
     valley_load: float
     mean_load: float
@@ -133,9 +132,10 @@ class CycleCounter:
         t, y = self._load.t, self._load.values
         least = max(_LEAST * (self._high - self._low), _SURE * sigma)
         turns = reversals(y, least) if least > 0 else []
-        peaks = [k for k, after in zip(turns, [*turns[1:], len(y) - 1], strict=True) if y[k] > y[k : after + 1].min()]
+        falls = len(turns) > 0 and y[turns[0]] > y[turns[0] : turns[1] + 1 if len(turns) > 1 else None].min()
+        peaks = turns[0 if falls else 1 :: 2]
         found = []
-        for before, k, after in zip([0, *peaks[:-1]], peaks, [*peaks[1:], len(y)], strict=True):
+        for before, k, after in zip([0, *peaks], peaks, [*peaks[1:], len(y)], strict=False):
             level = (y[k] + max(y[before : k + 1].min(), y[k:after].min())) / 2
             up, down = np.flatnonzero(y[before:k] < level), np.flatnonzero(y[k:after] < level)
             if len(up) and len(down):
@@ -144,24 +144,21 @@ class CycleCounter:
         return found
 
     def _counted(self, waves: Waves) -> Iterator[Cycle]:
-        nothing, whole = np.full(len(waves.n), np.nan), self._high - self._low
-        if self._loaded:
-            loops, load = Loops.of(waves, self._bursts), (waves.peak, waves.valley, waves.sigma_range)
-        else:
-            why = [one or Message("no force is known") for one in waves.why]
-            loops = Loops(waves.n, waves.peak, waves.valley, waves.sigma_range, *[nothing] * 6, why)
-            load = nothing, nothing, nothing
-        strain = loops.peak, loops.valley, loops.sigma_range
-        swings = [(high, low, (high + low) / 2, high - low, sigma) for high, low, sigma in (load, strain)]
-        figures = loops.modulus, loops.sigma_modulus, loops.area, loops.sigma_area, loops.phase, loops.sigma_phase
-        rows = np.array([waves.middle - waves.duration / 2, waves.duration, *swings[0], *swings[1], *figures]).T.tolist()
-        for row, bursts, size, why in zip(rows, loops.bursts.tolist(), waves.size.tolist(), loops.why, strict=True):
+        whole, load = self._high - self._low, np.array([waves.peak, waves.valley, waves.sigma_range])
+        loops = Loops.of(waves, self._bursts) if self._loaded else Loops.of_strain(waves)
+        swings = [
+            (high, low, (high + low) / 2, high - low, sigma)
+            for high, low, sigma in (load if self._loaded else np.full(load.shape, np.nan), loops.figures[:3])
+        ]
+        start = waves.middle - waves.duration / 2
+        rows = np.array([start, waves.duration, loops.bursts, *swings[0], *swings[1], *loops.figures[3:]]).T
+        for row, size, why in zip(rows.tolist(), waves.size.tolist(), loops.why, strict=True):
             if self._last is not None and self._last[1] < _LEAST * whole:
                 self.count, self._alike, self._last = 0, 0, None
             steps = () if self._last is None else (row[1] / self._last[0], size / self._last[1])
             self._alike += bool(steps) and all(1 / _FACTOR < step < _FACTOR for step in steps)
             self.count, self._last = self.count + 1, (row[1], size)
-            yield Cycle(self.count, *row[:2], bursts, *row[2:], why)
+            yield Cycle._make((self.count, *row, why))
 
     def _forget(self) -> None:
         """What lies before the middle of the last cycle, and every second one of many."""

@@ -35,9 +35,10 @@ from analysis.evaluate.lag import Track
 Floats = NDArray[np.float64]
 MIN_BURSTS, CURVED = 6, 12
 """Bursts in a cycle that its figures need, and with which its loop may bend."""
-MIN_READINGS = 8
+MIN_READINGS = 16
+"""Readings in a cycle: of a triangle they see at least nine tenths of the range, of a sine all."""
 _GRID = 128  # places of a cycle
-_U = (np.arange(_GRID) + 0.5) / _GRID - 0.5
+_U = np.arange(_GRID) / _GRID - 0.5
 _COSINE, _SINE = (2 / _GRID * wave(2 * np.pi * _U) for wave in (np.cos, np.sin))
 _LONGEST = 0.25  # of a cycle: a burst
 _SEEN = 0.7  # of the range of the load: what the bursts see of it
@@ -94,7 +95,11 @@ class Waves:
         self.n, inside = until - since, np.column_stack([since, until]).ravel()
         highest, lowest, gap = (
             side * one.reduceat(np.append(values, values[-1]), inside)[::2]
-            for side, one, values in ((1, np.maximum, y), (1, np.minimum, y), (1, np.maximum, np.diff(t, prepend=t[0])))
+            for side, one, values in (
+                (1, np.maximum, y),
+                (1, np.minimum, y),
+                (1, np.maximum, np.diff(t, prepend=t[0])),
+            )
         )
         self.size = highest - lowest
         self._origin, self._end = t[0], t[-1]
@@ -122,42 +127,44 @@ class Waves:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Loops:
-    """The strain of cycles against their load, (K,) each; NaN, and why, where it is not known.
+    """The strain of K cycles against their load.
 
     Attributes
     ----------
-    bursts : int
-    peak, valley, sigma_range : float
-        Of the strain, without the drift over the cycle.
-    modulus, sigma_modulus : float, Pa
-        In the unit of the load.
-    area, sigma_area : float, J/m^3
-        Energy that the cycle leaves in the volume; N where the load is a force.
-    phase, sigma_phase : float, rad
-        By which the strain comes later.
+    bursts : (K,) int
+    figures : (9, K) float64
+        NaN where they are not known: peak, valley and sigma of the range of the strain, without the drift over the
+        cycle; modulus and its sigma (Pa, the unit of the load); area and its sigma (J/m^3, N where the load is a
+        force): the energy that the cycle leaves in the volume; phase and its sigma (rad), by which the strain comes
+        later.
     why : list of str
+        Why they are not; empty where they are.
     """
 
     bursts: NDArray[np.intp]
-    peak: Floats
-    valley: Floats
-    sigma_range: Floats
-    modulus: Floats
-    sigma_modulus: Floats
-    area: Floats
-    sigma_area: Floats
-    phase: Floats
-    sigma_phase: Floats
+    figures: Floats
     why: list[str]
+
+    @classmethod
+    def of_strain(cls, waves: Waves) -> Loops:
+        """Where the strain itself is the channel: its ranges alone."""
+        figures = np.full((9, len(waves.n)), np.nan)
+        figures[:3] = waves.peak, waves.valley, waves.sigma_range
+        return cls(waves.n, figures, [one or Message("no force is known") for one in waves.why])
 
     @classmethod
     def of(cls, waves: Waves, bursts: BurstStrains) -> Loops:
         """Of the bursts in cycles of the load; their times increase."""
-        first, last = (np.searchsorted(bursts.t, waves.middle + side * waves.duration / 2) for side in (-1, 1))
+        first, last = (
+            np.searchsorted(bursts.t, waves.middle + side * waves.duration / 2) for side in (-1, 1)
+        )
         n, why = last - first, waves.why
         found = np.full((9, len(n)), np.nan)
         few = "{n} bursts in the cycle do not reach its peaks (aliasing); {least} are needed"
-        why = [one or (Message(few, k, MIN_BURSTS) if k < MIN_BURSTS else "") for one, k in zip(why, n, strict=True)]
+        why = [
+            one or (Message(few, k, MIN_BURSTS) if k < MIN_BURSTS else "")
+            for one, k in zip(why, n, strict=True)
+        ]
         of = np.flatnonzero([not one for one in why])
         if len(of):
             at = np.concatenate([np.arange(a, b) for a, b in zip(first[of], last[of], strict=True)])
@@ -165,7 +172,7 @@ class Loops:
             found[:, of] = np.where([not one for one in fits.why], fits.figures(), np.nan)
             for k, words in zip(of, fits.why, strict=True):
                 why[k] = words
-        return cls(n, *found, why)
+        return cls(n, found, why)
 
 
 class _Fits:
@@ -186,7 +193,9 @@ class _Fits:
         size, axes = np.linalg.eigh(normal)
         # A load of two levels has a square that is constant: what can be told all the same is told.
         told = size > 1e-9 * size[:, -1:]
-        self._inverse = (axes * np.where(told, 1 / np.where(told, size, 1), 0)[:, None]) @ axes.transpose(0, 2, 1)
+        self._inverse = (axes * np.where(told, 1 / np.where(told, size, 1), 0)[:, None]) @ axes.transpose(
+            0, 2, 1
+        )
         moments = np.add.reduceat(design * bursts.strain[:, None], start)
         self._found = np.einsum("kij,kj->ki", self._inverse, moments)
         rest = bursts.strain - np.einsum("ni,ni->n", design, self._found[each])
@@ -199,8 +208,10 @@ class _Fits:
     def why(self) -> list[str]:
         """Why there are no figures, for each; empty where there are."""
         strain, sigma = self._value(self._tips)
-        found = []
-        for longest, seen, clear in zip(self._longest, self._seen, abs(strain) >= _CLEAR * sigma, strict=True):
+        found: list[str] = []
+        for longest, seen, clear in zip(
+            self._longest, self._seen, abs(strain) >= _CLEAR * sigma, strict=True
+        ):
             if longest > _LONGEST:
                 found.append(Message("a burst lasts {share:.0%} of the cycle", longest))
             elif seen < _SEEN:

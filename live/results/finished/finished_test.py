@@ -83,7 +83,7 @@ class FinishedTest:
     ) -> FinishedTest:
         """A run or replay that has just ended.
 
-        ``gauges`` as configured, ``reference_N`` the force at the reference, ``start_t`` (s) where cycles count time from.
+        ``gauges`` as configured, ``reference_N`` the force at the reference, ``start_t`` (s) the zero of times.
         """
         history, loads = run_state.history, run_state.loads
         samples = Track(*loads.arrays())
