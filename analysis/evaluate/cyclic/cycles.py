@@ -35,6 +35,7 @@ _SURE, _LEAST = (
 _SHARE, _FACTOR = 0.8, 1.2  # of the cycles that must be like the one before, and how like
 _KEPT = 16_384  # readings, of a cycle that goes on
 _BLOCK = 32_768  # readings and bursts that are taken at once, of a test that is over
+_WAIT = 16  # of the readings that are kept, as a share of 1: so many new ones are looked at together
 _LACKING = 1 / 16  # of a cycle: what may lack at the end of the test
 
 
@@ -88,6 +89,7 @@ class CycleCounter:
         self._low, self._high, self._middle = math.inf, -math.inf, math.nan
         self._last: tuple[float, float] | None = None  # duration and range
         self._alike = self.count = 0
+        self._waiting: list[tuple[Track, BurstStrains]] = []
 
     @property
     def is_cyclic(self) -> bool:
@@ -100,15 +102,25 @@ class CycleCounter:
         ``ended``: nothing follows. Both have increasing times, and follow those before.
         """
         bursts = bursts.part(np.isfinite(bursts.strain))
-        self._bursts = self._bursts.then(bursts)
         load = (load if self._loaded else Track(bursts.t, bursts.strain)).known()
-        if len(load.t):
-            self._low, self._high = min(self._low, load.values.min()), max(self._high, load.values.max())
-        joined = (np.concatenate(pair) for pair in ((self._load.t, load.t), (self._load.values, load.values)))
-        self._load = Track(*joined)
+        self._waiting.append((load, bursts))
+        if not ended and sum(len(one.t) for one, _ in self._waiting) * _WAIT < len(self._load.t):
+            return []
+        self._take()
         found = self._complete(ended)
         self._forget()
         return found
+
+    def _take(self) -> None:
+        loads, bursts = zip(*self._waiting, strict=True)
+        self._waiting.clear()
+        self._bursts = BurstStrains(
+            *(np.concatenate(pair) for pair in zip(self._bursts, *bursts, strict=True))
+        )
+        t = np.concatenate([self._load.t, *(one.t for one in loads)])
+        self._load = Track(t, np.concatenate([self._load.values, *(one.values for one in loads)]))
+        self._low = min(self._low, self._load.values.min(initial=math.inf))
+        self._high = max(self._high, self._load.values.max(initial=-math.inf))
 
     def _complete(self, ended: bool) -> list[Cycle]:
         if not len(self._load.t) or not len(self._bursts.t):

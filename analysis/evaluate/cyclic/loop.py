@@ -57,10 +57,6 @@ class BurstStrains(NamedTuple):
         """Those that are chosen."""
         return BurstStrains(*(values[chosen] for values in self))
 
-    def then(self, other: BurstStrains) -> BurstStrains:
-        """With others that follow."""
-        return BurstStrains(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
-
 
 class Waves:
     """A channel in cycles, between its readings by a cubic spline.

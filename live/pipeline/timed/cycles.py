@@ -27,6 +27,8 @@ class CycleWatch:
     """
 
     def __init__(self) -> None:
+        import scipy.interpolate  # noqa: F401  takes half a second, which no burst is to wait for
+
         self.channels: Mapping[str, float] = NONE
         self._counter: CycleCounter | None = None
         self._axis, self._readings, self._start_t = "", 0, math.nan
