@@ -53,7 +53,7 @@ class Cyclic(Programme):
 
 
 def take_cyclic(options: Options, material: FlowCurve) -> Cyclic:
-    """Take hz, r, n, fall, hold, end and max_strain out of the settings of an address.
+    """Take hz, r, n, fall, hold, end, seconds (at least) and max_strain out of the settings of an address.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def take_cyclic(options: Options, material: FlowCurve) -> Cyclic:
     """
     hz, n = options.number("hz", 1.0, minimum=1e-4, maximum=1000), options.integer("n", 10, minimum=1)
     fall = options.number("fall", 0.0, minimum=0, maximum=0.9)
-    top = options.number("max_strain", 1e-3, minimum=1e-6, maximum=0.5)
+    top = options.number("max_strain", 1e-3, minimum=0, maximum=0.5)
     if top / (1 - fall) > material.yield_strain:
         raise ConfigError(
             "{text}: a cyclic test is elastic here; give max_strain below {strain:.3g}, or yield_MPa",
@@ -71,4 +71,5 @@ def take_cyclic(options: Options, material: FlowCurve) -> Cyclic:
         )
     hold, end = options.number("hold", 2.0, minimum=0.1), options.number("end", 1 / hz, minimum=0)
     ratio = options.number("r", 0.1, minimum=-10, maximum=0.99)
+    end = max(end, options.number("seconds", 0.1, minimum=0.1) - hold - n / hz)
     return Cyclic(hold, n / hz, end, top / 2, top, n=n, ratio=ratio, fall=fall)

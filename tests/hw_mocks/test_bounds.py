@@ -53,7 +53,8 @@ CYCLIC = {
     "fall": "a number from 0 to 0.9",
     "hold": "a number from 0.1",
     "end": "a number from 0",
-    "max_strain": "a number from 1e-06 to 0.5",
+    "max_strain": "a number from 0 to 0.5",
+    "seconds": "a number from 0.1",
 }
 CAMERA = {
     "bits": "one of 8, 10, 12, 16",

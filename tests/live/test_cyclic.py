@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquire.addresses import parse_address
 from acquire.errors import ConfigError
 from live.cli import main
 from live.config.loading import from_dict
@@ -20,6 +21,7 @@ from live.results.run_folder import open_run
 from live.run.alarms import Alarm, check_alarms
 from live.run.live_run import LiveRun
 from live.run.outcome import Outcome
+from live.setup.devices import at_rest
 from live.ui.web.run_result import run_result
 from tests.live.test_end_to_end import live_run
 
@@ -149,3 +151,10 @@ def test_of_cycle_is_for_figures_of_cycles() -> None:
             {"load": force, "alarm": [{"channel": "secant_modulus", "below": 0.9, "of_cycle": 1}]}, {}, ""
         )
     )
+
+
+def test_a_look_at_the_rig_begins_no_cycles() -> None:
+    from hw_mocks.specimen import specimen_from
+
+    specimen = specimen_from(parse_address(at_rest(SIM)))
+    assert specimen.duration_s == 3600 and not specimen.force(np.arange(0, 100, 0.1)).any()

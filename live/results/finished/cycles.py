@@ -167,7 +167,7 @@ class Cycles:
             f"{figure_text(figure, one, unit)} in cycle {number}"
             for number, figure in dict([first, last]).items()
         ]
-        change = f": {figure_text(self.change, 0.01, '%')} of change" if self.change.known else ""
+        change = f", a change of {figure_text(self.change, 0.01, '%')}" if self.change.known else ""
         return [f"{words}; secant modulus {', '.join(text)}{change}"]
 
     def write(self, folder: Path) -> None:
