@@ -123,8 +123,10 @@ def _without(field: StrainField, alone: Bools) -> StrainField:
 
 def _parts(field: StrainField, labels: NDArray[np.int32]) -> NDArray[np.uint8] | None:
     """Numbers of the parts that have come apart, from 1, 0 beside them, (R, C); None where none have."""
-    counts = np.bincount(labels.ravel())
-    large = [k for k in range(1, len(counts)) if counts[k] >= PART * counts[1:].sum()]
+    counts = np.bincount(labels.ravel())[1:]
+    large = np.flatnonzero(counts >= PART * counts.sum()) + 1
+    if len(large) < 2:
+        return None
     parts = np.zeros(labels.shape, np.uint8)
     for number, k in enumerate(large, 1):
         parts[labels == k] = number

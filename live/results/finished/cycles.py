@@ -94,103 +94,86 @@ class Cycles:
 
         Both on one clock, of which ``start_t`` (s) is the zero of the table.
         """
-        t, stop = curve.t, broken_at(curve.stress, curve.strain)
-        bursts = BurstStrains(t, strain, width).part(slice(0, None if stop is None else stop + 1))
-        ends = (
-            bursts.t[[0, -1]] + np.median(np.diff(t)) * np.array([-1, 1])
-            if len(bursts.t) > 1
-            else np.zeros(2)
-        )
-        samples = samples.known()
-        inside = (samples.t >= ends[0]) & (samples.t <= ends[1])
-        load = Track(samples.t[inside], samples.values[inside] / (area_m2 or 1.0))
+        stop, samples = broken_at(curve.stress, curve.strain), samples.known()
+        bursts = BurstStrains(curve.t, strain, width).part(slice(None if stop is None else stop + 1))
+        step = float(np.median(np.diff(curve.t, prepend=curve.t[:1]))) if len(curve.t) else 0.0
+        first, last = np.searchsorted(samples.t, (bursts.t[:1].sum() - step, bursts.t[-1:].sum() + step))
+        load = Track(samples.t[first:last], samples.values[first:last] / (area_m2 or 1.0))
         return cls(CycleTable.of(load if len(samples.t) else None, bursts, start_t), area_m2)
 
-    def modulus(self, at: int) -> tuple[int, Figure] | None:
-        """The secant modulus of the first (0) or last (-1) cycle that has one, with its number; None without any."""
-        known = np.flatnonzero(np.isfinite(self.table.column("modulus")))
-        if not len(known):
-            return None
-        value, sigma = (float(self.table.column(name)[known[at]]) for name in ("modulus", "sigma_modulus"))
-        return int(known[at]) + 1, Figure.about(value, sigma)
+    @property
+    def moduli(self) -> dict[int, Figure]:
+        """The secant moduli of the first and the last cycle that have one, by their numbers."""
+        modulus, sigma = (self.table.column(name).tolist() for name in ("modulus", "sigma_modulus"))
+        known = np.flatnonzero(np.isfinite(modulus))
+        return {int(k) + 1: Figure.about(modulus[k], sigma[k]) for k in (*known[:1], *known[-1:])}
 
     @property
     def change(self) -> Figure:
         """Of the secant modulus from the first cycle to the last, over that of the first."""
-        first, last = self.modulus(0), self.modulus(-1)
-        if first is None or last is None or first[0] == last[0]:
+        if len(self.moduli) < 2:
             return Figure.none(Message("two cycles with a secant modulus are needed"))
-        (_, a), (_, b) = first, last
-        share = b.value / a.value
-        relative = math.hypot(*((one.high - one.value) / quantile() / one.value for one in (a, b)))
-        return Figure.about(share - 1, abs(share) * relative)
+        first, last = self.moduli.values()
+        share = last.value / first.value
+        relative = (abs((one.high - one.value) / quantile() / one.value) for one in (first, last))
+        return Figure.about(share - 1, abs(share) * math.hypot(*relative))
 
     @property
     def unit(self) -> tuple[str, float]:
         """Of the modulus, for a person, and what it is in that of the table."""
         return ("GPa", 1e9) if self.area_m2 else ("kN", 1e3)
 
+    @property
+    def _why(self) -> str:
+        return next(filter(None, reversed(self.table.why)), "")
+
     def figures(self) -> Iterator[tuple[str, Figure, str]]:
         """Name, figure and SI unit of what other programs get; nothing of a test that is not cyclic."""
-        n = len(self.table)
         if not self.any:
             return
-        none, unit = (
-            Figure.none(next(filter(None, reversed(self.table.why)), "not known")),
-            "Pa" if self.area_m2 else "N",
-        )
+        n, none, moduli = len(self.table), Figure.none(self._why), [*self.moduli.values()]
         yield "cycles", Figure(n, n, n), "1"
-        for at, words in ((0, "first"), (-1, "last")):
-            found = self.modulus(at)
-            yield f"secant modulus of the {words} cycle", found[1] if found else none, unit
+        for k, words in ((0, "first"), (-1, "last")):
+            found = moduli[k] if moduli else none
+            yield f"secant modulus of the {words} cycle", found, "Pa" if self.area_m2 else "N"
         yield "change of the secant modulus", self.change, "1"
         value, sigma = (float(self.table.column(f"{name}range_strain")[-1]) for name in ("", "sigma_"))
-        yield (
-            "strain range of the last cycle",
-            Figure.about(value, sigma) if math.isfinite(value) else none,
-            "1",
-        )
+        ranged = Figure.about(value, sigma) if math.isfinite(value) else none
+        yield "strain range of the last cycle", ranged, "1"
 
     def lines(self) -> list[str]:
         """What a person reads; nothing of a test that is not cyclic."""
-        n = len(self.table)
         if not self.any:
             return []
-        words = f"{n} cycles of {np.median(self.table.column('duration')):.4g} s"
-        first, last = self.modulus(0), self.modulus(-1)
-        if first is None or last is None:
-            return [
-                f"{words}; no secant modulus: {next(filter(None, reversed(self.table.why)), 'not known')}"
-            ]
-        unit, one = self.unit
-        text = [
-            f"{figure_text(figure, one, unit)} in cycle {number}"
-            for number, figure in dict([first, last]).items()
-        ]
+        found = [f"{figure_text(one, *self.unit[::-1])} in cycle {k}" for k, one in self.moduli.items()]
         change = f", a change of {figure_text(self.change, 0.01, '%')}" if self.change.known else ""
-        return [f"{words}; secant modulus {', '.join(text)}{change}"]
+        known = ", ".join(found) + change if found else f"not known: {self._why}"
+        duration = float(np.median(self.table.column("duration")))
+        return [f"{len(self.table)} cycles of {duration:.4g} s; secant modulus {known}"]
 
     def write(self, folder: Path) -> None:
         """Write ``cycles.csv`` of a cyclic test; raises DataError or ConfigError where that cannot be done."""
         if not self.any:
             return
-        heads = (
-            COLUMNS if self.area_m2 else [name.replace("_Pa", "_N").replace("_m3", "_m") for name in COLUMNS]
-        )
+        of_force = [name.replace("_Pa", "_N").replace("_m3", "_m") for name in COLUMNS]
         factors = np.ones(len(COLUMNS) - 1)
         factors[_FORCES] = self.area_m2 or 1.0
         with new_file(folder / FILE) as part, part.open("x", encoding="utf-8", newline="") as file:
             rows = csv.writer(file, lineterminator="\n")
-            rows.writerow(heads)
+            rows.writerow(COLUMNS if self.area_m2 else of_force)
             for values, why in zip(self.table.values, self.table.why, strict=True):
                 rows.writerow([*(f"{value:.10g}" for value in values * factors), why])
 
 
 def shown_figures(cycles: Cycles) -> list[dict[str, object]]:
     """The cycles as rows of figures of the page; none of a test that is not cyclic."""
-    found: list[dict[str, object]] = []
-    for number, figure in dict(filter(None, (cycles.modulus(0), cycles.modulus(-1)))).items():
-        amount = Amount("stress" if cycles.area_m2 else "force", figure.value, figure.high - figure.value, 2)
-        found.append({"name": Message("secant modulus of cycle {number}", number), "text": amount})
+    kind = "stress" if cycles.area_m2 else "force"
+    found = [
+        {
+            "name": Message("secant modulus of cycle {number}", number),
+            "text": Amount(kind, one.value, one.high - one.value, 2),
+        }
+        for number, one in cycles.moduli.items()
+    ]
     words = {"name": Message("cycles"), "text": str(len(cycles.table)), "words": True}
     return [words, *found] if cycles.any else []
