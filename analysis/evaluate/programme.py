@@ -104,7 +104,8 @@ def _found(curve: Curve) -> tuple[Kind, str, int | None]:
         return "tensile", "", None
     t, strain, stress = (values[known] for values in (curve.t, curve.strain, curve.stress))
     turns = reversals(stress, max(_REVERSAL * float(np.ptp(stress)), _SURE * sigma))
-    peaks = [k for k in turns if stress[k] > 0 and stress[k] >= stress[turns].mean()]
+    middle = float(stress[turns].mean()) if turns else 0.0
+    peaks = [k for k in turns if stress[k] > 0 and stress[k] >= middle]
     if peaks and _is_cyclic(strain, stress, turns, peaks[0]):
         return "cyclic", Message(", whose stress turns round {count} times", len(turns)), int(known[peaks[0]])
     held = _hold(t, strain, stress)
