@@ -58,6 +58,8 @@ class FinishedTest:
         Strains of the region (``REGION``) and of the gauges (``gauge NAME``) in the last burst.
     cycles : Cycles
         None where the test is not cyclic.
+    response : tuple of str
+        What was found of the response of the places, in words; empty where none was wanted.
     """
 
     curve: Curve
@@ -71,6 +73,7 @@ class FinishedTest:
     gauge: Mapping[str, Any] = field(default_factory=dict)
     at_end: Mapping[str, GaugeValue] = field(default_factory=dict)
     cycles: Cycles = field(default_factory=Cycles.none)
+    response: tuple[str, ...] = ()
 
     @classmethod
     def of_run(
