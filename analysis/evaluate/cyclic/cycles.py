@@ -3,7 +3,7 @@
 A peak counts when the load has fallen from it by a tenth of the whole range of the test so far, and by ``_SURE``
 standard deviations of its noise; so has a valley (``reversals``). A cycle lies about the middle between the crossings
 of its mean level beside the peak, which the noise of a flat peak does not move, and is as long as the distance from the
-middle before. Without a load the strain itself is what turns.
+middle before, after a pause as that to the next. Without a load the strain itself is what turns.
 
 Noise and drift turn at random: cycles are there from ``MIN_CYCLES`` on, of which ``_SHARE`` must be as long and as high
 as the one before, within a factor. Memory is bounded: what lies before the last whole cycle is forgotten, a cycle of
@@ -131,7 +131,8 @@ class CycleCounter:
         if not len(middle) or (len(middle) < 2 and math.isnan(self._middle)):
             return []
         before = 2 * middle[0] - middle[1] if math.isnan(self._middle) else self._middle
-        duration = np.diff(middle, prepend=before)
+        duration, after = np.diff(middle, prepend=before), np.append(np.diff(middle), math.inf)
+        duration = np.where(duration > 2 * after, after, duration)  # a pause is no part of a cycle
         n = int(np.count_nonzero(np.cumprod(middle + duration * (0.5 - _LACKING * ended) <= until)))
         middle, duration = middle[:n], duration[:n]
         if not n:
