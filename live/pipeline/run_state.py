@@ -251,6 +251,7 @@ class RunState:
             frames=self.frame_counts.as_dict(),
             time_step=step,
             cycles=self.cycles.channels,
+            at_cycle=self.cycles.at,
         )
 
     def force(self, now: float, step: TimeStep | None = None) -> TimedFigure:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from acquire.text import Message
@@ -57,6 +57,8 @@ class Snapshot:
         The operator has paused measuring.
     cycles : mapping of str to float
         The channels of the last whole cycle of a cyclic test.
+    at_cycle : callable
+        Takes a channel and a number, gives the value in that cycle.
     """
 
     t: float
@@ -77,6 +79,7 @@ class Snapshot:
     time_step: TimeStep | None = None
     paused: bool = False
     cycles: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(CYCLE_CHANNELS, math.nan))
+    at_cycle: Callable[[str, int], float] = lambda channel, number: math.nan
 
     def figure(self, name: str) -> TimedFigure:
         """The figure of this name, of state "none" where there is no such source."""

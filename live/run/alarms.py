@@ -201,23 +201,12 @@ class Alarm:
         )
         self.name = c.name or Message("{channel} {limit}", c.channel, limit)
         self._sign, self._limit = (1.0, c.above) if c.above is not None else (-1.0, c.below or 0.0)
-        self._compared = math.nan
 
     @property
     def actions(self) -> list[Action]:
         """What it does; a run is ended by a value, and only on demand by one that is not known."""
         ends = self.config.end_on_unknown or not self.unknown
         return [action for action in self._actions if ends or not isinstance(action, EndRun)]
-
-    def over_cycle(self, value: float, cycle: float) -> float:
-        """``value`` of a cycle over that of the cycle it is compared with (``of_cycle``); else as it is."""
-        if self.config.of_cycle is None:
-            return value
-        if cycle < self.config.of_cycle:  # the count has begun anew
-            self._compared = math.nan
-        elif math.isnan(self._compared) and not math.isnan(cycle):
-            self._compared = value
-        return value / self._compared if self._compared else math.nan
 
     def check(self, value: float) -> bool:
         """Check a value; whether the alarm went on or off. A value that is not known changes nothing."""
@@ -332,7 +321,9 @@ class AlarmWatch(Consumer):
         """Judge all; ``stamp`` is the time of what the values are from, None: of each figure."""
         for alarm in self._alarms:
             channel = alarm.config.channel
-            value = alarm.over_cycle(values.get(channel, math.nan), values.get("cycle", math.nan))
+            value = values.get(channel, math.nan)
+            if alarm.config.of_cycle is not None:
+                value /= self._values.now.at_cycle(channel, alarm.config.of_cycle) or math.nan
             figure = self._values.now.of_channel(channel)
             changed, words = alarm.judge(figure, value), channel.replace("_", " ")
             instead = figure.trouble(channel.removesuffix("_N").removesuffix("_MPa").replace("_", " "))

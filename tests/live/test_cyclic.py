@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,15 @@ import pytest
 
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError
+from acquire.events import Event
 from live.cli import main
 from live.config.loading import from_dict
 from live.config.sections import AlarmConfig
+from live.pipeline.channel_values import ChannelValues
 from live.pipeline.measurement import Measurement
+from live.pipeline.run_state import ActiveAlarms
 from live.results.run_folder import open_run
-from live.run.alarms import Alarm, check_alarms
+from live.run.alarms import Alarm, AlarmWatch, check_alarms
 from live.run.live_run import LiveRun
 from live.run.outcome import Outcome
 from live.setup.devices import at_rest
@@ -127,16 +131,22 @@ def test_a_pull_has_no_cycles(tmp_path: Path) -> None:
         assert "cycles" not in json.loads((run.path / "figures.json").read_text())
 
 
-def test_a_limit_over_the_value_of_a_cycle() -> None:
-    alarm = Alarm(AlarmConfig(channel="secant_modulus", below=0.9, of_cycle=2))
-    given = [(math.nan, math.nan), (80e9, 1.0), (70e9, 2.0), (math.nan, 3.0), (64e9, 4.0), (62e9, 5.0)]
-    shares = [alarm.over_cycle(*one) for one in given]
-    assert shares == pytest.approx([math.nan, math.nan, 1.0, math.nan, 64 / 70, 62 / 70], nan_ok=True)
-    assert [alarm.check(share) and alarm.on for share in shares] == [False] * 5 + [True]
-    assert alarm.message(shares[-1]) == "secant modulus 88.6% of that in cycle 2, limit 90.0%"
-    assert (
-        math.isnan(alarm.over_cycle(1e9, 1.0)) and alarm.over_cycle(5e9, 2.0) == 1.0
-    )  # the count began anew
+@pytest.mark.parametrize(("of_cycle", "number"), [(1, N), (4, N), (N + 1, 0)])
+def test_a_limit_over_the_value_of_a_cycle(
+    finished: tuple[Path, Outcome, Any], of_cycle: int, number: int
+) -> None:
+    folder, outcome, _ = finished
+    modulus = rows_of(folder)["secant_modulus_Pa"]
+    config, events = AlarmConfig(channel="secant_modulus", below=0.95, of_cycle=of_cycle), list[Event]()
+    state = outcome.run_state
+    values = ChannelValues(0.0, lambda t, step: replace(state.snapshot(t, step), figures={}))
+    AlarmWatch([Alarm(config)], values, lambda t: {}, ActiveAlarms(), events.append).idle()
+    if not number:
+        return
+    (event,) = events
+    share = modulus[number - 1] / modulus[of_cycle - 1]
+    assert event.data["value"] == pytest.approx(share, rel=5e-3)
+    assert str(event.text).endswith(f"% of that in cycle {of_cycle}, limit 95.0%")
 
 
 def test_of_cycle_is_for_figures_of_cycles() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from array import array
 from collections.abc import Mapping
 
 import numpy as np
@@ -32,6 +34,7 @@ class CycleWatch:
         self.channels: Mapping[str, float] = NONE
         self._counter: CycleCounter | None = None
         self._axis, self._readings, self._start_t = "", 0, math.nan
+        self._all = {name: array("d") for name in CYCLE_CHANNELS}
 
     def add(self, step: TimeStep, axis: str, loads: LoadLog, area_m2: float | None, *, loaded: bool) -> None:
         """Count with one more burst and the readings until then; another ``axis`` begins anew."""
@@ -42,9 +45,21 @@ class CycleWatch:
         self._readings += len(t)
         area = area_m2 or 1.0
         burst = BurstStrains(*(np.array([value]) for value in (step.t, step.axial(axis)[0], step.width_s)))
-        found = self._counter.add(Track(t - loads.lag_s, force / area), burst)
-        if found and self._counter.is_cyclic:
-            self.channels = _channels(found[-1], area)
+        for cycle in self._counter.add(Track(t - loads.lag_s, force / area), burst):
+            if cycle.number == 1:
+                self._all = {name: array("d") for name in CYCLE_CHANNELS}
+            channels = _channels(cycle, area)
+            for name, value in channels.items():
+                self._all[name].append(value)
+            if self._counter.is_cyclic:
+                self.channels = channels
+
+    def at(self, channel: str, number: int) -> float:
+        """The value of the cycle of this number, or of the first after it that has one; NaN before there is one."""
+        if math.isnan(self.channels["cycle"]):
+            return math.nan
+        later = itertools.islice(self._all[channel], number - 1, None)
+        return next((value for value in later if not math.isnan(value)), math.nan)
 
 
 def _channels(cycle: Cycle, area: float) -> dict[str, float]:
