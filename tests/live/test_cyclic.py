@@ -137,7 +137,7 @@ def test_a_limit_over_the_value_of_a_cycle(
 ) -> None:
     folder, outcome, _ = finished
     modulus = rows_of(folder)["secant_modulus_Pa"]
-    config, events = AlarmConfig(channel="secant_modulus", below=0.95, of_cycle=of_cycle), list[Event]()
+    config, events = AlarmConfig(channel="secant_modulus", below=0.99, of_cycle=of_cycle), list[Event]()
     state = outcome.run_state
     values = ChannelValues(0.0, lambda t, step: replace(state.snapshot(t, step), figures={}))
     AlarmWatch([Alarm(config)], values, lambda t: {}, ActiveAlarms(), events.append).idle()
@@ -146,7 +146,7 @@ def test_a_limit_over_the_value_of_a_cycle(
     (event,) = events
     share = modulus[number - 1] / modulus[of_cycle - 1]
     assert event.data["value"] == pytest.approx(share, rel=5e-3)
-    assert str(event.text).endswith(f"% of that in cycle {of_cycle}, limit 95.0%")
+    assert str(event.text).endswith(f"% of that in cycle {of_cycle}, limit 99.0%")
 
 
 def test_of_cycle_is_for_figures_of_cycles() -> None:
