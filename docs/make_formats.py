@@ -25,6 +25,7 @@ from acquire.load_sample import LoadFlag
 from acquire.session import SessionInfo, SessionWriter
 from analysis import Roi, ZoiGrid
 from analysis.field import Status
+from live.results.finished.cycles import COLUMNS as CYCLES
 from live.results.quantities import quantity_of
 from live.results.row import ResultsInfo
 from live.results.strain_csv import COLUMNS
@@ -109,6 +110,11 @@ def means() -> str:
     return table(("column", "unit", "meaning"), ((f"`{n}`", q.unit, q.words) for n, q in quantities))
 
 
+def cycles() -> str:
+    """The columns of cycles.csv."""
+    return table(("column", "unit", "meaning"), ((f"`{name}`", *about) for name, about in CYCLES.items()))
+
+
 def statuses() -> str:
     """The values of the map of statuses."""
     rows = ((str(int(status)), status.name, status.text) for status in Status)
@@ -155,7 +161,7 @@ def _text(value: object) -> str:
 
 TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
     "session": session_layout, "flags": flags, "maps": strain_maps, "means": means, "status": statuses,
-    "response": response,
+    "response": response, "cycles": cycles,
 })  # fmt: skip
 PAGES = (DOCS / "session-format.md", DOCS / "strain-format.md")
 _TABLE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)

@@ -200,6 +200,10 @@ class Programme:
         strains = (0.0, self.knee_strain, self.max_strain)
         return np.asarray(np.interp(np.asarray(t, float), self.knots_s, strains))
 
+    def stiffness(self, t: ArrayLike) -> Array:
+        """Share of the stiffness of the material that the specimen still has: all of it."""
+        return np.ones(np.shape(t))
+
     def progress(self, t: ArrayLike) -> Array:
         """Part of the ramp that is done, 0 to 1."""
         begins, _, ends = self.knots_s

@@ -326,11 +326,12 @@ def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpec
 
     Keys, beside those of the specimen (width, height, seconds, hold, end, max_strain, E_GPa, nu,
     yield_MPa, yield2_MPa (of halves), section_mm2, px_per_mm, n, r, neck, axis, hole, cell, overstrain, drift_x,
-    drift_y, rotation_deg, lockstep, machine, waits): fps (a number, or auto: what this machine renders with ease),
-    bits, noise (% of full scale at mid-grey), fpn (%), brightness, exposure_us, radius (px), contrast (%), seed,
-    buffers, offset (s), faults. Of the view (``hw_mocks.optics``): stand_off_mm (none: telecentric), distortion
-    (% at the corner), tilt_x_deg, tilt_y_deg, settle_mm, settle_x_deg, settle_y_deg (reached at the largest load),
-    plates (x,y,width,height;...), plate_strain, readout_ms, flicker (%), lamp_hz, side, bending (%, of the front).
+    drift_y, rotation_deg, lockstep, machine, waits, programme=cyclic with hz, r, n and fall): fps (a number, or auto:
+    what this machine renders with ease), bits, noise (% of full scale at mid-grey), fpn (%), brightness, exposure_us,
+    radius (px), contrast (%), seed, buffers, offset (s), faults. Of the view (``hw_mocks.optics``): stand_off_mm
+    (none: telecentric), distortion (% at the corner), tilt_x_deg, tilt_y_deg, settle_mm, settle_x_deg, settle_y_deg
+    (reached at the largest load), plates (x,y,width,height;...), plate_strain, readout_ms, flicker (%), lamp_hz, side,
+    bending (%, of the front).
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """One virtual specimen behind both devices: what the camera takes and what the load cell measures.
 
 Every quantity is a pure function of the time since the start of the test (the programme holds,
-pulls to yield, pulls on, holds). It is the truth that measurements are compared with:
+pulls to yield, pulls on, holds; or ``hw_mocks.cyclic``). It is the truth that measurements are compared with:
 ``specimen.at(t)`` has the displacement and its gradient, ``force(t)`` the load. The strain is the
 displacement gradient (engineering strain along the load), about the middle of the image.
 """
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from acquire.addresses import Address, Options
 from acquire.errors import ConfigError
+from hw_mocks.cyclic import take_cyclic
 from hw_mocks.deformation import Gradient, SpecimenDeformation
 from hw_mocks.machine import FlowCurve, Machine, PowerLaw, Programme, Pull, TestClock
 from hw_mocks.strain_modes import NECK_AT, Axis, Kind, StrainModes
@@ -49,6 +50,9 @@ SPECIMEN_KEYS = frozenset(
         "lockstep",
         "machine",
         "waits",
+        "programme",
+        "hz",
+        "fall",
     }
 )
 
@@ -168,7 +172,7 @@ class VirtualSpecimen:
 
     def stress(self, t: ArrayLike) -> Array:
         """Mean stress, Pa (for the hole: gross and remote)."""
-        return self.material.stress(self.programme.strain(t))
+        return np.asarray(self.material.stress(self.programme.strain(t)) * self.programme.stiffness(t))
 
     def force(self, t: ArrayLike) -> Array:
         """Load on the specimen, N, tension positive."""
@@ -228,14 +232,19 @@ def specimen_from(address: Address) -> VirtualSpecimen:
 
 def take_specimen(options: Options) -> VirtualSpecimen:
     """Take the keys of the specimen out of an address's settings; raises as ``specimen_from``."""
-    kind = _kind(options.address)
-    material, clock = _take_material(options, 120.0 if kind == "halves" else 140.0), TestClock()
+    kind, cyclic = _kind(options.address), options.choice("programme", ("pull", "cyclic"), "pull") == "cyclic"
+    material, clock = (
+        _take_material(options, 120.0 if kind == "halves" else 140.0, metal=not cyclic),
+        TestClock(),
+    )
     return VirtualSpecimen(
         kind=kind,
         width=options.integer("width", 640, minimum=32, maximum=8192),
         height=options.integer("height", 512, minimum=32, maximum=8192),
         material=material,
-        programme=_take_programme(options, material, clock),
+        programme=take_cyclic(options, material)
+        if cyclic and isinstance(material, FlowCurve)
+        else _take_programme(options, material, clock),
         axis="x" if options.choice("axis", ("y", "x"), "y") == "x" else "y",
         area_m2=options.number("section_mm2", 40.0, minimum=1e-3) * 1e-6,
         px_per_m=options.number("px_per_mm", 20.0, minimum=1e-3) * 1e3,
@@ -282,12 +291,13 @@ def _take_second(options: Options, kind: Kind, material: FlowCurve | PowerLaw) -
     return replace(material, yield_stress=(160.0 if strength is None else strength) * 1e6)
 
 
-def _take_material(options: Options, yield_MPa: float) -> FlowCurve | PowerLaw:
-    """Sheet metal of given n and r, where one of them is given."""
+def _take_material(options: Options, yield_MPa: float, *, metal: bool) -> FlowCurve | PowerLaw:
+    """Sheet metal of given n and r, where one of them is given; not ``metal``: they are of the programme."""
     modulus = options.number("E_GPa", 70.0, minimum=1e-3) * 1e9
     nu = options.number("nu", 0.33, minimum=0, maximum=0.5)
     strength = options.number("yield_MPa", yield_MPa, minimum=1e-3) * 1e6
-    n, r = options.number("n", minimum=0.01, maximum=0.9), options.number("r", minimum=0.05, maximum=10)
+    n = options.number("n", minimum=0.01, maximum=0.9) if metal else None
+    r = options.number("r", minimum=0.05, maximum=10) if metal else None
     if n is None and r is None:
         return FlowCurve(E=modulus, nu=nu, yield_stress=strength)
     return PowerLaw(0.2 if n is None else n, 1.0 if r is None else r, modulus, nu, strength)

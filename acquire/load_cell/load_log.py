@@ -185,7 +185,24 @@ class LoadLog:
         """Samples appended, lines without a reading included."""
         return self._count
 
-    def arrays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times (N,) in monotonic s and forces (N,) in N, as they are interpolated."""
+    def arrays(
+        self, first: int = 0, until: float = math.inf, zero_of: float | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Times (N,) in monotonic s and forces (N,) in N, as they are interpolated.
+
+        Parameters
+        ----------
+        first : int
+            Without as many before.
+        until : float, s
+            Not later.
+        zero_of : float, s, optional
+            As if the zero of this time had held: a tare is no unloading.
+        """
         with self._lock:
-            return np.array(self._t, float), np.array(self._force, float)
+            chosen = slice(first, bisect_right(self._t, until))
+            t, force = np.array(self._t[chosen], float), np.array(self._force[chosen], float)
+            if zero_of is not None:
+                for since, step in self._zeros:
+                    force += step * ((t >= since).astype(float) - (zero_of >= since))
+        return t, force

@@ -284,18 +284,20 @@ def _between(values: Floats, at: float, sigma: float) -> UncertainValue:
     return UncertainValue(float(values[k] + (at - k) * slope), sigma, slope)
 
 
-def noise(values: Floats) -> float:
+def noise(values: Floats, order: int = 2) -> float:
     """Standard deviation of white noise on a smooth course, from second differences; 0 of fewer than 5 values.
 
     Parameters
     ----------
     values : (N,) float64
         At equal distances in time. The median keeps steps and kinks out.
+    order : int
+        Of the differences: the higher, the less of a bend counts as noise.
     """
-    second = np.diff(values[np.isfinite(values)], n=2)
-    if len(second) < 3:
+    differences = np.diff(values[np.isfinite(values)], n=order)
+    if len(differences) < 3:
         return 0.0
-    return float(np.median(np.abs(second))) / _MEDIAN_OF_NORMAL / math.sqrt(6)
+    return float(np.median(np.abs(differences))) / _MEDIAN_OF_NORMAL / math.sqrt(math.comb(2 * order, order))
 
 
 def smoothed(values: Floats, half: int) -> Floats:

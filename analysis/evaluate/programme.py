@@ -104,7 +104,8 @@ def _found(curve: Curve) -> tuple[Kind, str, int | None]:
         return "tensile", "", None
     t, strain, stress = (values[known] for values in (curve.t, curve.strain, curve.stress))
     turns = reversals(stress, max(_REVERSAL * float(np.ptp(stress)), _SURE * sigma))
-    peaks = [k for k in turns if stress[k] > 0 and stress[k] >= stress[turns].mean()]
+    middle = float(stress[turns].mean()) if turns else 0.0
+    peaks = [k for k in turns if stress[k] > 0 and stress[k] >= middle]
     if peaks and _is_cyclic(strain, stress, turns, peaks[0]):
         return "cyclic", Message(", whose stress turns round {count} times", len(turns)), int(known[peaks[0]])
     held = _hold(t, strain, stress)
@@ -128,17 +129,30 @@ def _noise(curve: Curve) -> float:
 def reversals(values: Floats, least: float) -> list[int]:
     """Where ``values`` turn round, each time to go back by at least ``least``: highest and lowest in turns."""
     found: list[int] = []
-    high = low = 0
-    rising: bool | None = None
-    for k, value in enumerate(values):
-        high, low = (k if value >= values[high] else high), (k if value <= values[low] else low)
-        if rising is not False and values[high] - value >= least:
-            found += [high] if rising else []
-            rising, low = False, k
-        elif rising is not True and value - values[low] >= least:
-            found += [low] if rising is False else []
-            rising, high = True, k
-    return found
+    start, sign = 0, 0
+    while True:
+        tried = (sign,) if sign else (1, -1)
+        sides = [(end, side) for side in tried if (end := _turned(values, side, start, least))]
+        if not sides:
+            return found
+        end, side = min(sides)
+        if sign:
+            k = end - int(np.argmax(side * values[start : end + 1][::-1]))
+            found.append(k)
+        start, sign = end, -side
+
+
+def _turned(values: Floats, side: int, start: int, least: float) -> int:
+    """Where ``side`` (1, -1) times ``values`` first falls by ``least`` from its highest since ``start``; 0: nowhere."""
+    top, size = -math.inf, 64
+    while start < len(values):
+        part = side * values[start : start + size]
+        highest = np.fmax(np.fmax.accumulate(part), top)
+        fallen = np.flatnonzero(highest - part >= least)
+        if len(fallen):
+            return start + int(fallen[0])
+        start, size, top = start + size, 2 * size, highest[-1]
+    return 0
 
 
 def _is_cyclic(strain: Floats, stress: Floats, turns: list[int], first: int) -> bool:

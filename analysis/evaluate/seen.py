@@ -86,8 +86,9 @@ def _stiffness(strain: Floats, level: Floats) -> float:
 
 def running_median(values: Floats, half: int) -> Floats:
     """Median over 2 ``half`` + 1 values, the ends repeated beyond them, (N,)."""
-    padded = np.pad(values, half, mode="edge")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1))
+    from scipy.ndimage import median_filter
+
+    return np.asarray(median_filter(values, 2 * half + 1, mode="nearest"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -129,6 +129,7 @@ def _reported(run: RunFolder, wanted: ReportRequest, screen: Screen) -> Report:
     report = make_report(run, wanted, screen)
     if report.test is not None and not (run.path / FILE).exists():
         try:
+            report.test.cycles.write(run.path)
             FiguresFile.of(report.test, run.frame_counts or {}, 0).write(run.path)
         except PhasedicError as error:
             screen.print(f"note: {error}")

@@ -22,6 +22,15 @@ MEASURED_CHANNELS = {
     "latency_s": "time from the stamp of the last frame to the result, s",
     "noise_GL": "noise of one frame, grey levels",
 }
+CYCLE_CHANNELS = {
+    "cycle": "number of the last whole cycle of a cyclic test",
+    "peak_strain": "highest axial strain in it",
+    "range_strain": "range of the axial strain in it",
+    "peak_N": "highest force in it, N",
+    "secant_modulus": "range of the stress over that of the strain in it, Pa; of the force, N, without a section",
+}
+"""Of the last whole cycle."""
+MEASURED_CHANNELS |= CYCLE_CHANNELS
 JOINT_CHANNELS = {
     "mean_time_s": "the newest instant that front and back both have, s since the start of the test",
     "mean_axial": "axial strain then, mean of front and back",
@@ -40,8 +49,10 @@ SYSTEM_CHANNELS = {
     "load_silent_s": "time since the last value of the load cell, s",
     "disk_min": "time until the disk is full, minutes",
 }
-OF_LOAD = ("force_N", "force_age_s", "force_state", "stress_MPa")
+OF_LOAD = ("force_N", "force_age_s", "force_state", "stress_MPa", "peak_N", "secant_modulus")
 """Channels that there are with a load cell alone."""
+OF_SECTION = {"stress_MPa", "secant_modulus"}
+"""Channels that are stresses."""
 DEFAULT_CHANNELS = (
     "time_s",
     "frame",

@@ -21,7 +21,7 @@ from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
 from acquire.text import Message
-from live.config.channels import channel_names
+from live.config.channels import CYCLE_CHANNELS, channel_names
 from live.config.gauges import DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_checks
 from live.config.sections import (
     AlarmConfig,
@@ -306,6 +306,9 @@ def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:
     for number, alarm in enumerate(alarms, 1):
         if (alarm.above is None) is (alarm.below is None):
             raise ConfigError("{where}: alarm {number}: give one of above and below", where, number)
+        if alarm.of_cycle and alarm.channel not in CYCLE_CHANNELS:
+            known = ", ".join(CYCLE_CHANNELS)
+            raise ConfigError("{where}: alarm {number}: of_cycle is for {known}", where, number, known)
         if alarm.end_on_unknown and not alarm.end:
             raise ConfigError("{where}: alarm {number}: end_on_unknown needs end = true", where, number)
     return alarms

@@ -241,6 +241,8 @@ class AlarmConfig:
     above: float | None = key(number(), None, "the alarm is on above this value")
     below: float | None = key(number(), None, "the alarm is on below this value")
     hysteresis: float = key(number(0), 0.0, "distance back from the limit at which the alarm ends")
+    of_cycle: int | None = key(integer(1, 10**9), None,
+        "above and below are multiples of the value of the channel in this cycle (1: the first)")
     name: str = key(TEXT, "", "name of the alarm in messages")
     end: bool = key(FLAG, False, "the alarm ends the run")
     end_on_unknown: bool = key(FLAG, False, "also where it comes because the value is not known (with end = true)")

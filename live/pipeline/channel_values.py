@@ -58,6 +58,7 @@ class ChannelValues:
             "force_N": force.value,
             "force_age_s": force.age,
             "stress_MPa": now.figure(STRESS).value * 1e-6,
+            **now.cycles,
         }
         if measurement is not None:
             values |= self._measured(measurement, measurement.time_step)

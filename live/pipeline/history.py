@@ -25,7 +25,7 @@ _GROWTH = 1.1  # of the time steps from one search for the axis to the next
 _COUNTS = ("n_valid", "n_zoi", "n_parts")
 SHORT = (
     "sigma_exx", "sigma_eyy", "sigma_exy", "sigma_extension_x", "sigma_extension_y", "zoi_sigma", "u", "v", "noise_GL",
-    "measure_s", "latency_s", "misfit", "blur", "sigma_blur", "sigma_lens_exx", "sigma_lens_eyy",
+    "measure_s", "latency_s", "misfit", "blur", "sigma_blur", "width_s", "sigma_lens_exx", "sigma_lens_eyy",
 )  # fmt: skip
 """Numbers of which nobody needs more than seven digits."""
 _TYPES = {

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from acquire.frame import Burst
 from acquire.text import Message
@@ -73,6 +74,8 @@ class TimeStep:
         Of the region that its strains stand for, where a block of ZOIs was lost (``analysis.field.area_share``).
     n_parts : int
         Parts that the region has come apart into (``StrainField.parts``); beyond 1 its strains are NaN.
+    width_s : float, s
+        Of the time that the burst is a mean over (``mean_width``).
     """
 
     t: float
@@ -109,6 +112,7 @@ class TimeStep:
     sigma_lens_eyy: float = math.nan
     area_share: float = 1.0
     n_parts: int = 1
+    width_s: float = 0.0
 
     @property
     def apart(self) -> str:
@@ -196,7 +200,17 @@ def time_step_of(burst: Burst, field: StrainField, force: float, measure_s: floa
         sigma_blur=blur.sigma,
         area_share=area_share(field),
         n_parts=field.n_parts(),
+        width_s=float(mean_width(burst.duration, burst.n)),
     )
+
+
+def mean_width(duration: ArrayLike, n: ArrayLike) -> NDArray[np.float64]:
+    """The time that the mean of ``n`` even pictures, the last ``duration`` after the first, stands for.
+
+    That of an even mean with the same second moment: its share of a vibration is the same.
+    """
+    count = np.maximum(np.asarray(n, np.float64), 1)
+    return np.asarray(np.asarray(duration) * np.sqrt((count + 1) / np.maximum(count - 1, 1)), np.float64)
 
 
 def ordered_mean(values: np.ndarray) -> float:

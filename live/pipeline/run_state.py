@@ -13,6 +13,7 @@ from live.pipeline.event_log import EventLog, sentence
 from live.pipeline.history import History
 from live.pipeline.measurement import TimeStep, strains_along
 from live.pipeline.snapshot import FORCE, STRESS, Snapshot
+from live.pipeline.timed.cycles import CycleWatch
 from live.pipeline.timed.figure import FigureState, TimedFigure
 from live.pipeline.timed.health import Health, force_at, strains_at
 
@@ -165,6 +166,7 @@ class RunState:
     specimen : SpecimenConfig
     with_load : bool
         There is a load cell, or recorded forces.
+    cycles : CycleWatch
     """
 
     event_log: EventLog
@@ -176,6 +178,7 @@ class RunState:
     health: Health = field(default_factory=Health)
     specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
     with_load: bool = True
+    cycles: CycleWatch = field(default_factory=CycleWatch)
 
     @classmethod
     def new(
@@ -192,6 +195,12 @@ class RunState:
         found = cls(EventLog(), FrameCounts(), loads, history, specimen=specimen, with_load=with_load)
         found.event_log.add_listener(found.note)
         return found
+
+    def add(self, step: TimeStep) -> None:
+        """Keep what was measured."""
+        self.history.add(step)
+        axis, loaded = self.history.current_axis, self.with_load
+        self.cycles.add(step, axis, self.loads, self.specimen.area_m2, loaded=loaded)
 
     def note(self, event: Event) -> None:
         """Keep an error until its source reports that it is over."""
@@ -241,6 +250,8 @@ class RunState:
             faults=self.faults.texts,
             frames=self.frame_counts.as_dict(),
             time_step=step,
+            cycles=self.cycles.channels,
+            at_cycle=self.cycles.at,
         )
 
     def force(self, now: float, step: TimeStep | None = None) -> TimedFigure:

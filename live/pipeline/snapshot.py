@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from acquire.text import Message
-from live.config.channels import SYSTEM_CHANNELS, is_joint
+from live.config.channels import CYCLE_CHANNELS, SYSTEM_CHANNELS, is_joint
 from live.pipeline.measurement import TimeStep
 from live.pipeline.timed.figure import TimedFigure
 
@@ -55,6 +55,10 @@ class Snapshot:
         The last one measured.
     paused : bool
         The operator has paused measuring.
+    cycles : mapping of str to float
+        The channels of the last whole cycle of a cyclic test.
+    at_cycle : callable
+        Takes a channel and a number, gives the value in that cycle.
     """
 
     t: float
@@ -74,6 +78,8 @@ class Snapshot:
     frames: Mapping[str, int] = field(default_factory=dict)
     time_step: TimeStep | None = None
     paused: bool = False
+    cycles: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(CYCLE_CHANNELS, math.nan))
+    at_cycle: Callable[[str, int], float] = lambda channel, number: math.nan
 
     def figure(self, name: str) -> TimedFigure:
         """The figure of this name, of state "none" where there is no such source."""

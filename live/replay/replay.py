@@ -42,7 +42,6 @@ from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Work, 
 from live.results.finished.figures_file import finished
 from live.results.finished.finished_test import FinishedTest
 from live.results.folder import LOG, BurstFailures, check_folder, make_folder
-from live.results.response.evaluate import response_of
 from live.results.response.rising import check_channel
 from live.results.writer import write_results
 from live.setup.devices import open_rig
@@ -256,9 +255,9 @@ def _run(
     )
     code = 130 if stopping.is_set() else 5 if lossy else 0
     at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
-    test = finished(folder, config, run_state, code, at_reference)
-    if request.response:
-        lines = [*response_of(folder, test.figures, request.response), *lines]
+    start_t = source.start.monotonic
+    test = finished(folder, config, run_state, code, at_reference, start_t, request.response)
+    lines = [*test.response, *lines]
     return Replayed(folder, run_state, config, code, test, tuple(lines), left_out)
 
 

@@ -212,7 +212,7 @@ def tare_line(history: History, loads: LoadLog) -> list[str]:
 
 def sharpness_line(blur: Sequence[float], sigma: Sequence[float]) -> list[str]:
     """How the sharpness of the picture changed, from its blur and sigma over time, px; nothing where not known."""
-    known = [one for one in map(Blur, blur, sigma) if one.text]
+    known = [one for one in map(Blur, blur, sigma) if math.isfinite(one.px)]
     if not known:
         return []
     largest = max(known, key=lambda one: abs(one.px))

@@ -21,7 +21,16 @@ from live import VERSION
 from live.pipeline.measure import NewReference
 from live.pipeline.run_state import RunState
 
-FILES = ("session.h5", "mask.png", "strain.h5", "strain.csv", "view.rrd", "config.json", "figures.json")
+FILES = (
+    "session.h5",
+    "mask.png",
+    "strain.h5",
+    "strain.csv",
+    "cycles.csv",
+    "view.rrd",
+    "config.json",
+    "figures.json",
+)
 _PACKAGES = ("numpy", "scipy", "numba", "opencv-python-headless", "h5py", "rerun-sdk", "pyserial")
 
 LOG = "errors.log"

@@ -17,7 +17,7 @@ from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.text import Message
 from acquire.text.quantity import Amount
-from live.config.channels import OF_LOAD, is_joint
+from live.config.channels import OF_LOAD, OF_SECTION, is_joint
 from live.config.loading import Config
 from live.config.sections import AlarmConfig
 from live.pipeline.channel_values import ChannelValues
@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 EVERY_S = 0.2
 """What changes without a measurement is checked at this interval."""
-_STRAINS = ("axial", "exx", "eyy", "exy", "largest")
+_STRAINS = ("axial", "exx", "eyy", "exy", "largest", "peak_strain", "range_strain")
 _TWO_CAMERAS = Message("a camera on each side: give --back")
 _UNITS = {"_N": "N", "_MPa": "MPa", "_s": "s", "_min": "min", "_GL": "GL", "": ""}
 _KINDS = {"_N": ("force", 1.0), "_MPa": ("stress", 1e6)}
@@ -133,7 +133,11 @@ def check_alarms(config: Config, *, both_sides: bool = False) -> None:
     if config.load.address != "none:":
         missing.clear()
     if config.specimen.area_m2 is None:
-        missing.setdefault("stress_MPa", Message("the section: give --section W,T"))
+        for channel in {
+            "stress_MPa",
+            *(one.channel for one in config.alarm if one.of_cycle is None),
+        } & OF_SECTION:
+            missing.setdefault(channel, Message("the section: give --section W,T"))
     if not config.record.enabled:
         missing["disk_min"] = Message("a recording: leave --no-record out")
     if not both_sides:
@@ -157,6 +161,8 @@ def in_words(channel: str, value: float, limit: float) -> str:
     suffix = next((one for one in _UNITS if plain.endswith(one)), "")
     label = _LABELS.get(channel, channel.removesuffix(suffix).replace("_", " "))
     kind, one = _KINDS.get(suffix, ("", 1.0))
+    if plain == "secant_modulus":
+        kind, label = "stress", channel.replace("_", " ")
     if plain in _STRAINS or plain.startswith("gauge_"):
         kind, one, label = "strain", 1.0, channel.replace("_", " ")
     if kind:
@@ -238,6 +244,15 @@ class Alarm:
         """Its text at ``value``, or with what is there ``instead`` of one."""
         c = self.config
         named = Message("{name}: ", c.name) if c.name else ""
+        if c.of_cycle and not instead:
+            words = Message(
+                "{channel} {share:.1%} of that in cycle {number}, limit {limit:.1%}",
+                c.channel.replace("_", " "),
+                value,
+                c.of_cycle,
+                self._limit,
+            )
+            return named + words
         return named + (instead or in_words(c.channel, value, self._limit))
 
 
@@ -306,7 +321,10 @@ class AlarmWatch(Consumer):
         """Judge all; ``stamp`` is the time of what the values are from, None: of each figure."""
         for alarm in self._alarms:
             channel = alarm.config.channel
-            figure, value = self._values.now.of_channel(channel), values.get(channel, math.nan)
+            value = values.get(channel, math.nan)
+            if alarm.config.of_cycle is not None:
+                value /= self._values.now.at_cycle(channel, alarm.config.of_cycle) or math.nan
+            figure = self._values.now.of_channel(channel)
             changed, words = alarm.judge(figure, value), channel.replace("_", " ")
             instead = figure.trouble(channel.removesuffix("_N").removesuffix("_MPa").replace("_", " "))
             if not (instead or figure.known or figure.state is FigureState.NONE):

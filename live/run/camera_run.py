@@ -327,5 +327,6 @@ class CameraRun(Subscriber):
     def outcome(self) -> Outcome:
         """The result, after it has ended."""
         run, state, code = self._prepared, self._run_state, self.exit_code
-        test = finished(self.folder, run.config, state, code, reference_force(state.event_log.events()))
+        reference_N = reference_force(state.event_log.events())
+        test = finished(self.folder, run.config, state, code, reference_N, run.start.monotonic)
         return Outcome(self.folder, run.config, state, self.outputs, run.rig, run.plan.grid, code, test)

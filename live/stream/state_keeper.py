@@ -58,7 +58,7 @@ class StateKeeper(Subscriber):
         elif isinstance(body, LoadSample):
             self._loaded(body)
         elif isinstance(body, Measurement):
-            state.history.add(body.time_step)
+            state.add(body.time_step)
         elif isinstance(body, Event):
             state.loads.take_event(body)
         elif isinstance(body, LoadEnded):

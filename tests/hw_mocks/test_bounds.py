@@ -44,6 +44,17 @@ SPECIMEN = {
     "lockstep": "yes or no",
     "machine": "a whole number from 0 to 65535",
     "waits": "yes or no",
+    "programme": "one of pull, cyclic",
+}
+CYCLIC = {
+    "hz": "a number from 0.0001 to 1000",
+    "n": "a whole number from 1",
+    "r": "a number from -10 to 0.99",
+    "fall": "a number from 0 to 0.9",
+    "hold": "a number from 0.1",
+    "end": "a number from 0",
+    "max_strain": "a number from 0 to 0.5",
+    "seconds": "a number from 0.1",
 }
 CAMERA = {
     "bits": "one of 8, 10, 12, 16",
@@ -117,7 +128,9 @@ def test_bounds_that_follow_from_other_settings() -> None:
     """The exposure ends with the frame; a specimen comes no nearer than half of its distance."""
     assert refusal("camera", "fps=50&exposure_us=20001") == "a number from 0 to 20000"
     assert refusal("camera", "stand_off_mm=300&settle_mm=151") == "a number from -150 to 150"
-    assert set(SPECIMEN) == SPECIMEN_KEYS
+    assert {*SPECIMEN, *CYCLIC} == SPECIMEN_KEYS
+    for key, allowed in CYCLIC.items():
+        assert refusal("camera", f"programme=cyclic&{key}=nonsense") == allowed
 
 
 def test_a_specimen_of_which_nothing_is_said() -> None:

@@ -183,9 +183,12 @@ def test_a_second_specimen_is_refused(text: str, word: str) -> None:
 
 
 def test_keys_of_the_specimen_are_all_listed() -> None:
-    options = Options(parse_address("sim:"))
-    take_specimen(options)
-    assert set(options._known) == SPECIMEN_KEYS
+    known = set[str]()
+    for text in ("sim:", "sim:?programme=cyclic"):
+        options = Options(parse_address(text))
+        take_specimen(options)
+        known |= set(options._known)
+    assert known == SPECIMEN_KEYS
 
 
 def test_pty_outlives_its_reader_and_counts_what_nobody_reads() -> None:

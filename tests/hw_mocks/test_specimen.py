@@ -259,3 +259,30 @@ def test_the_strains_of_a_neck_fall_off_from_its_middle() -> None:
     assert dv_dy == pytest.approx(metal.uniform_strain + most * share, rel=1e-9)
     across = [float(metal.transverse(one)) for one in (metal.uniform_strain, 0.45)]
     assert du_dx == pytest.approx(across[0] + (across[1] - across[0]) * share, rel=1e-9)
+
+
+def test_cycles_keep_their_forces_while_the_stiffness_falls() -> None:
+    specimen = specimen_from(
+        parse_address("sim:?programme=cyclic&hz=2&r=0.1&n=5&fall=0.2&hold=1&E_GPa=70&section_mm2=10")
+    )
+    assert specimen.duration_s == pytest.approx(1 + 2.5 + 0.5)
+    valleys, peaks = 1 + np.arange(5) / 2, 1.25 + np.arange(5) / 2
+    assert specimen.force(0.0) == specimen.axial_strain(0.0) == 0
+    assert specimen.force(peaks) == pytest.approx(700.0)
+    assert specimen.force([*valleys, 3.5, 4.0]) == pytest.approx(70.0)
+    stiffness = 70e9 * (1 - 0.05 * np.arange(5))
+    assert specimen.stress(peaks) / specimen.axial_strain(peaks) == pytest.approx(stiffness)
+    t = np.linspace(0, 4, 4001)
+    assert specimen.force(t).max() <= 700.0 + 1e-6 and specimen.force(t).min() >= 0
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [("max_strain=2e-3&fall=0.1", "elastic"), ("hold=0", "hold"), ("n=0", "n")],
+)
+def test_impossible_cycles_are_refused(settings: str, words: str) -> None:
+    from hw_mocks.sim_camera import open_sim_camera
+
+    address = parse_address(f"sim:?programme=cyclic&{settings}")
+    with pytest.raises(ConfigError, match=words):
+        open_sim_camera(address, lambda event: None, specimen_from(address))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -158,6 +159,13 @@ def test_pictures_with_forces_have_compliances(shots: Path, tmp_path: Path) -> N
     with open_run(out) as run:
         compliance = response_in(run).map("compliance")
         assert np.nanmedian(compliance) == pytest.approx(1 / 70e9, rel=0.05)
+        left = np.count_nonzero(response_in(run).map("fate") == 1)
+    figures = {one["name"]: one for one in json.loads((out / "figures.json").read_text())["figures"]}
+    found = figures["compliance of the places"]
+    assert found["value"] == pytest.approx(float(np.nanmedian(compliance))) and found["unit"] == "1/Pa"
+    assert found["low"] < found["value"] < found["high"]
+    assert figures["places that leave their line"]["value"] == left > 0
+    assert 100e6 < figures["leaves_at_stress of the places"]["value"] < 180e6
 
 
 @pytest.mark.parametrize(

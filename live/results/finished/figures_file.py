@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,11 +19,14 @@ from live.results.export.atomic_file import new_file
 from live.results.figures import tensile_table
 from live.results.finished.findings import DataCheck, findings
 from live.results.finished.finished_test import FinishedTest
+from live.results.response.evaluate import response_of
 from live.results.run_folder import RunFolder
 
 FILE, FORMAT, VERSION = "figures.json", "phasedic-figures", 1
 COUNTS = ("grabbed", "recorded", "measured", "skipped", "lost", "without_force")
 _SI = {"MPa": "Pa", "GPa": "Pa", "kN": "N", "%": "1", "": "1"}
+NamedFigure = tuple[str, Figure, str]
+"""Name, figure and SI unit."""
 _NO_SECTION = "the section is not known: give --section W,T"
 
 
@@ -47,10 +50,12 @@ class FiguresFile:
     exit_code: int
 
     @classmethod
-    def of(cls, test: FinishedTest, counts: Mapping[str, int], exit_code: int) -> FiguresFile:
-        """The file of a finished test; of the counts of frames those in ``COUNTS`` are taken."""
+    def of(
+        cls, test: FinishedTest, counts: Mapping[str, int], exit_code: int, more: Iterable[NamedFigure] = ()
+    ) -> FiguresFile:
+        """The file of a finished test, with ``more`` figures; of the counts of frames those in ``COUNTS`` are taken."""
         chosen = {name: counts.get(name) for name in COUNTS}
-        return cls(list(_figures(test)), chosen, findings(test), exit_code)
+        return cls([*_figures(test), *(_row(*one) for one in more)], chosen, findings(test), exit_code)
 
     @property
     def text(self) -> str:
@@ -73,15 +78,29 @@ class FiguresFile:
 
 
 def finished(
-    folder: Path, config: Config, run_state: RunState, exit_code: int, reference_N: float
+    folder: Path,
+    config: Config,
+    run_state: RunState,
+    exit_code: int,
+    reference_N: float,
+    start_t: float = 0.0,
+    response: str = "",
 ) -> FinishedTest:
-    """Evaluate a run or replay that has just ended, and write its ``figures.json``; where that fails it is an event.
+    """Evaluate a run or replay that has just ended, and write its ``figures.json`` and ``cycles.csv``.
 
-    ``reference_N`` is the force at the reference, N; NaN where it is not known.
+    Where writing fails it is an event. ``reference_N`` is the force at the reference, N; NaN where it is not known;
+    ``start_t`` the time, s, that times of the results count from; ``response`` the channel that a response of the
+    places is wanted over.
     """
-    test = FinishedTest.of_run(run_state, config.specimen, config.gauges, reference_N)
+    test = FinishedTest.of_run(run_state, config.specimen, config.gauges, reference_N, start_t)
+    further: Sequence[NamedFigure] = ()
+    if response:
+        lines, further = response_of(folder, test.figures, response)
+        test = replace(test, response=tuple(lines))
     try:
-        FiguresFile.of(test, run_state.frame_counts.as_dict(), exit_code).write(folder)
+        test.cycles.write(folder)
+        counts = run_state.frame_counts.as_dict()
+        FiguresFile.of(test, counts, exit_code, further).write(folder)
     except PhasedicError as error:
         run_state.event_log.emit(EventKind.RECORDER, FILE, error.text, "warning")
     return test
@@ -119,6 +138,8 @@ def _figures(test: FinishedTest) -> Iterator[dict[str, Any]]:
             if _SI.get(row.unit) == "Pa":
                 yield _row(row.name, Figure.none(_NO_SECTION), "Pa")
     yield _row("lag", test.lag, "s")
+    for name, figure, unit in test.cycles.figures():
+        yield _row(name, figure, unit)
     for name, value in test.at_end.items():
         figure = Figure.about(value.value, value.sigma) if not value.reason else Figure.none(value.reason)
         film = test.specimen.film_error_percent

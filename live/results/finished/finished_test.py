@@ -22,9 +22,10 @@ from analysis.evaluate import (
     find_lag,
 )
 from live.config.sections import SpecimenConfig
-from live.pipeline.measurement import AXIAL, TimeStep
+from live.pipeline.measurement import AXIAL, TimeStep, mean_width
 from live.pipeline.run_state import RunState
 from live.results.figures import lag_of, tensile_options
+from live.results.finished.cycles import Cycles
 from live.results.run_folder import RunFolder
 
 NO_VALUE = "no ZOI has a value in the last burst"
@@ -55,6 +56,10 @@ class FinishedTest:
         Force at the reference; NaN where it is not known.
     at_end : mapping of str to GaugeValue
         Strains of the region (``REGION``) and of the gauges (``gauge NAME``) in the last burst.
+    cycles : Cycles
+        None where the test is not cyclic.
+    response : tuple of str
+        What was found of the response of the places, in words; empty where none was wanted.
     """
 
     curve: Curve
@@ -67,6 +72,8 @@ class FinishedTest:
     reference_N: float = math.nan
     gauge: Mapping[str, Any] = field(default_factory=dict)
     at_end: Mapping[str, GaugeValue] = field(default_factory=dict)
+    cycles: Cycles = field(default_factory=Cycles.none)
+    response: tuple[str, ...] = ()
 
     @classmethod
     def of_run(
@@ -75,11 +82,17 @@ class FinishedTest:
         specimen: SpecimenConfig,
         gauges: Mapping[str, Mapping[str, Any]],
         reference_N: float,
+        start_t: float = 0.0,
     ) -> FinishedTest:
-        """A run or replay that has just ended; ``gauges`` as configured, ``reference_N`` the force at the reference."""
+        """A run or replay that has just ended.
+
+        ``gauges`` as configured, ``reference_N`` the force at the reference, ``start_t`` (s) the zero of times.
+        """
         history, loads = run_state.history, run_state.loads
         samples = Track(*loads.arrays())
         curve = history.curve(history.forces(loads) / (specimen.area_m2 or 1.0), specimen.axis)
+        t, force = loads.arrays(zero_of=float(curve.t[0]) if len(curve.t) else None)
+        strain, width = history.along(specimen.axis)[0], history.column("width_s")
         return cls(
             curve,
             evaluate_test(curve, tensile_options(specimen)),
@@ -91,6 +104,7 @@ class FinishedTest:
             reference_N,
             gauges.get(AXIAL, {}),
             strains_at_end(history.time_steps[-1]) if len(history.time_steps) else {},
+            Cycles.of(curve, strain, width, Track(t - loads.lag_s, force), specimen.area_m2, start_t),
         )
 
     @classmethod
@@ -100,6 +114,9 @@ class FinishedTest:
         samples = Track(*run.load_curve)
         recorded = len(samples.t) > 0
         at_bursts = Track(np.asarray(t, np.float64), run.force)
+        lag_s = float(corrected) if isinstance(corrected, int | float) else 0.0
+        width = mean_width(run.strain.values["duration_s"], run.strain.values["n_frames"])
+        one_zero = _one_zero(samples, run, lag_s) if recorded else Track(at_bursts.t, run.force_one_zero)
         return cls(
             run.curve,
             evaluate_test(run.curve, tensile_options(run.specimen)),
@@ -109,10 +126,11 @@ class FinishedTest:
             find_lag(Track(at_bursts.t, run.axial_strain), samples)
             if recorded
             else Figure.none(_NO_READINGS),
-            float(corrected) if isinstance(corrected, int | float) else 0.0,
+            lag_s,
             reference_force(run.events),
             run.gauges[AXIAL].described if AXIAL in run.gauges else {},
             _stored_at_end(run),
+            Cycles.of(run.curve, run.axial_strain, width, one_zero, run.specimen.area_m2),
         )
 
     @property
@@ -139,6 +157,15 @@ def reference_force(events: list[Event]) -> float:
     """The force at the first reference, N; NaN where no event has it."""
     forces = [event.data.get("force_N") for event in events if event.kind is EventKind.REFERENCE]
     return float(forces[0]) if forces and forces[0] is not None else math.nan
+
+
+def _one_zero(samples: Track, run: RunFolder, lag_s: float) -> Track:
+    """The readings on the clock of the pictures, as if the zero of the first instant had held."""
+    t, zero = samples.t - lag_s, run.strain.values.get("zero_N")
+    if zero is None:
+        return Track(t, samples.values)
+    at = np.clip(np.searchsorted(run.strain.time_s, t, side="right") - 1, 0, None)
+    return Track(t, samples.values + np.asarray(zero, np.float64)[at] - float(zero[0]))
 
 
 def _stored_at_end(run: RunFolder) -> dict[str, GaugeValue]:

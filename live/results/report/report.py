@@ -28,6 +28,7 @@ from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
 from live.results.maps.colours import number
 from live.results.report import curves
+from live.results.report.cycles import cycle_plots, cycle_table
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
 from live.results.report.maps import MapPictures, map_pictures, maps, statuses, whole_maps
 from live.results.report.noise_floor import StillPhase, still_phase_of
@@ -146,6 +147,9 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
         section("Specimen and rig", facts(_rig(run, pictures))),
         section("Curves", plots(content.figures), _about_parts(run), _about_curves(content.curve)),
         section("Figures of the test", *figure_table(run, content.curve)),
+        section("Cycles", plots(cycle_plots(content.test.cycles)), *cycle_table(content.test.cycles))
+        if content.test.cycles.any
+        else Html(""),
         section("Budget of E", *budget_table(run, content.curve)),
         section("Virtual gauges", gauges(run)),
         section("Lag and latency", times(run, content.test)),

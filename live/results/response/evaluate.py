@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from analysis.evaluate import TensileFigures
+from analysis.evaluate import Figure, TensileFigures
 from analysis.evaluate.response.departures import NOT_USED, Departures
 from analysis.evaluate.response.lines import ResponseSums
 from analysis.picture.pattern import gauge_length
@@ -30,7 +30,7 @@ from live.results.response.stored import (
     read_noise,
     slope_name,
 )
-from live.results.response.words import response_lines
+from live.results.response.words import response_figures, response_lines
 from live.results.run_folder import STRAIN, RunFolder, open_run
 from live.results.stored_fields import window_of
 
@@ -40,14 +40,16 @@ UP_TO = 0.9
 _OF_STRAIN = ("strain", "lens", "blur", "film")  # causes in the budget of E that do not come with the stress
 
 
-def response_of(folder: Path, figures: TensileFigures, channel: str) -> list[str]:
-    """``respond`` for a test that has just ended; what was found, or why nothing was, for the summary."""
+def response_of(
+    folder: Path, figures: TensileFigures, channel: str
+) -> tuple[list[str], list[tuple[str, Figure, str]]]:
+    """``respond`` for a test that has just ended; what was found, or why nothing was, for summary and figures.json."""
     try:
         respond(folder, figures, channel)
         with Strain.open(folder / STRAIN) as strain:
-            return response_lines(strain)
+            return response_lines(strain), [*response_figures(strain)]
     except DataError as error:
-        return [f"no response over {channel}: {error}"]
+        return [f"no response over {channel}: {error}"], []
 
 
 def respond(folder: Path, figures: TensileFigures, channel: str) -> None:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from analysis.evaluate import Figure
 from analysis.evaluate.response.departures import FIRST, WINDOW
 from live.results.maps.scale import shown_unit
+from live.results.quantities import quantity_of
 from live.results.reader import Strain
 from live.results.response.stored import FATE, STRESS, TIME, StoredResponse, leaves_name, slope_name
 
@@ -43,6 +47,21 @@ def response_lines(strain: Strain) -> list[str]:
         f" {_side(strain, found)}{across}",
         *_departures(strain, found),
     ]
+
+
+def response_figures(strain: Strain) -> Iterator[tuple[str, Figure, str]]:
+    """Name, figure and SI unit of what other programs get: the median, and where 95 % of the places are."""
+    found = strain.response
+    if found is None:
+        return
+    for name in filter(None, (slope_name(found.channel), leaves_name(found.channel))):
+        known = found.map(name)[strain.grid.active]
+        known = known[np.isfinite(known)]
+        none = Figure.none("no place has a value")
+        figure = Figure(*np.percentile(known, (50, 2.5, 97.5)).tolist()) if known.size else none
+        yield f"{name} of the places", figure, quantity_of(name).unit or "1"
+    left = float(np.count_nonzero(found.map(FATE)[strain.grid.active] == 1))
+    yield "places that leave their line", Figure(left, left, left), "1"
 
 
 def _departures(strain: Strain, found: StoredResponse) -> list[str]:

@@ -64,6 +64,7 @@ def brief_lines(run_state: RunState, test: FinishedTest) -> list[str]:
         noise_line(history),
         *belief_lines(test),
         *_figures(run_state, test),
+        *test.cycles.lines(),
         *_remarks(run_state, test),
     ]
     return [line.strip() for line in lines]

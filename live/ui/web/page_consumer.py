@@ -266,6 +266,7 @@ class PageConsumer(Consumer):
             "events": [self._shown_event(*one) for one in [*self._events][-MAX_EVENTS:]],
             "late_s": s.latency_p95_s if s.figure(BURST).known else math.nan,
             "fps": s.figure(FPS).value,
+            "cycle": s.cycles["cycle"],
             "ledger": s.frames,
             "disk_min": s.figure(DISK).value / 60,
             "sides": None if self._cameras is None else self._cameras.state(),

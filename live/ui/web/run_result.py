@@ -15,6 +15,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import sentence
 from live.pipeline.run_state import RunState
 from live.results.figures import TensileRow, headline, tensile_table
+from live.results.finished.cycles import shown_figures
 from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
 from live.results.report.curves import load_unit, strain_unit, stress_strain
@@ -49,7 +50,7 @@ def run_result(run_state: RunState, test: FinishedTest, folder: Path, words: str
     return {
         "folder": str(folder),
         "words": words,
-        "figures": [] if figures is None else _figures(figures, specimen),
+        "figures": [] if figures is None else [*_figures(figures, specimen), *shown_figures(test.cycles)],
         "belief": None
         if figures is None
         else belief(headline(figures, stresses=specimen.area_m2 is not None), troubles),

@@ -112,7 +112,7 @@ def test_no_key_is_left_out_here() -> None:
     assert rest == OTHERS
     assert dataclasses.asdict(AlarmConfig()) == {
         "channel": "", "above": None, "below": None, "hysteresis": 0.0, "name": "", "end": False, "line": "",
-        "end_on_unknown": False,
+        "end_on_unknown": False, "of_cycle": None,
     }  # fmt: skip
     assert PlateConfig().box is None
     assert (DEFAULT_BURST, DEFAULT_REFERENCE_BURST) == (4, 32)

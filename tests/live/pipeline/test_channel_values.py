@@ -9,7 +9,7 @@ import pytest
 
 from acquire.load_sample import LoadSample
 from analysis.evaluate import GaugeValue
-from live.config.channels import MEASURED_CHANNELS
+from live.config.channels import CYCLE_CHANNELS, MEASURED_CHANNELS
 from live.config.sections import SpecimenConfig
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.measurement import Measurement
@@ -41,6 +41,7 @@ def test_every_channel_has_the_value_of_its_name() -> None:
     read = values().read(replace(m, time_step=step))
     assert set(read) == {*MEASURED_CHANNELS, "gauge_left", "sigma_gauge_left", "more"}
     assert math.isnan(read.pop("strain_rate"))
+    assert [math.isnan(read.pop(name)) for name in CYCLE_CHANNELS] == [True] * 5
     assert (read.pop("age_s"), read.pop("force_age_s")) == (pytest.approx(0.1), pytest.approx(0.3))
     assert read == pytest.approx({
         "time_s": 0.2, "frame": 16, "axial": 1e-3, "sigma_axial": 4e-6, "force_N": 800.0, "stress_MPa": 20.0,

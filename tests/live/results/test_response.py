@@ -237,7 +237,8 @@ def test_too_few_instants_are_told(tmp_path: Path) -> None:
             results.add(make_measurement(k, 0.0))
     with open_run(tmp_path) as run:
         figures = FinishedTest.of_folder(run).figures
-    (line,) = response_of(tmp_path, figures, "stress")
+    (line,), none = response_of(tmp_path, figures, "stress")
+    assert none == []
     assert line.startswith("no response over stress: the load rises at ")
 
 

@@ -164,7 +164,7 @@ def test_an_alarm_does_only_what_it_is_asked_for() -> None:
 
 
 def test_every_key_of_an_alarm_is_what_it_looks_at_or_an_action() -> None:
-    looked_at = {"channel", "above", "below", "hysteresis", "name", "end_on_unknown"}
+    looked_at = {"channel", "above", "below", "hysteresis", "name", "end_on_unknown", "of_cycle"}
     assert {field.name for field in fields(AlarmConfig)} == looked_at | {kind.key for kind in ACTIONS} - {""}
 
 

@@ -225,11 +225,12 @@ function showState(value) {
 }
 
 // Small and grey; each turns amber on its own when it counts.
-const CELLS = ["frames/s", "recorded", "lost", "skipped", "delay", "disk", "ZOIs", "without a force"];
+const CELLS = ["cycle", "frames/s", "recorded", "lost", "skipped", "delay", "disk", "ZOIs", "without a force"];
 const DELAY_S = 0.5, DISK_MIN = 30;
 function showMachine(value) {
   const l = value.ledger ?? {}, lost = (l.lost ?? 0) + (l.unrecorded ?? 0);
   const facts = {
+    cycle: value.cycle == null ? null : [fixed(value.cycle), false],
     "frames/s": [fixed(value.fps), false], recorded: [fixed(l.recorded), false], lost: [fixed(lost), lost > 0],
     skipped: l.skipped ? [fixed(l.skipped), true] : null, delay: value.late_s == null ? null : [`${fixed(value.late_s * 1e3)} ms`, value.late_s > DELAY_S],
     disk: value.disk_min == null ? null : [disk(value.disk_min), value.disk_min < DISK_MIN],

@@ -1,0 +1,170 @@
+"""A cyclic test of a simulated specimen whose stiffness falls: run, replay, files, report, and alarms on its cycles."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquire.addresses import parse_address
+from acquire.errors import ConfigError
+from acquire.events import Event
+from live.cli import main
+from live.config.loading import from_dict
+from live.config.sections import AlarmConfig
+from live.pipeline.channel_values import ChannelValues
+from live.pipeline.measurement import Measurement
+from live.pipeline.run_state import ActiveAlarms
+from live.results.run_folder import open_run
+from live.run.alarms import Alarm, AlarmWatch, check_alarms
+from live.run.live_run import LiveRun
+from live.run.outcome import Outcome
+from live.setup.devices import at_rest
+from live.ui.web.run_result import run_result
+from tests.live.test_end_to_end import live_run
+
+N, FALL, E = 8, 0.1, 70e9
+SIM = (
+    f"sim:uniform?programme=cyclic&lockstep=yes&hz=1&r=0.1&n={N}&fall={FALL}"
+    "&fps=16&width=224&height=192&bits=12&noise=0.5"
+)
+MODULI = E * (1 - FALL * np.arange(N) / (N - 1))
+SECTION = {"specimen.area_mm2": 40.0, "specimen.axis": "y", "measure.burst": 1}
+
+
+def rows_of(folder: Path) -> dict[str, np.ndarray]:
+    with (folder / "cycles.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0] if name != "reason"}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome, list[dict[str, float]]]:
+    folder, seen = tmp_path_factory.mktemp("cyclic") / "run", list[dict[str, float]]()
+
+    def note(live: LiveRun, measurement: Measurement) -> None:
+        seen.append(dict(live.run_state.cycles.channels))
+
+    return folder, live_run(folder, SIM, note, **SECTION), seen
+
+
+def test_the_cycles_are_those_of_the_specimen(finished: tuple[Path, Outcome, Any]) -> None:
+    folder, *_ = finished
+    rows = rows_of(folder)
+    assert rows["cycle"].tolist() == [*range(1, N + 1)]
+    assert rows["bursts"].min() >= 15
+    assert rows["time_s"] == pytest.approx(2 + np.arange(N), abs=0.02)
+    off = (rows["secant_modulus_Pa"] - MODULI) / rows["sigma_secant_modulus_Pa"]
+    assert np.abs(off).max() < 3.5 and np.abs(off[[0, -1]]).max() < 2.5
+    assert rows["sigma_secant_modulus_Pa"].max() < 0.03 * E
+    assert rows["peak_N"] == pytest.approx(40e-6 * E * 1e-3, rel=2e-3)
+    strain = 0.9e-3 * E / MODULI
+    assert np.abs(rows["range_strain"] - strain).max() < 3.5 * rows["sigma_range_strain"].max()
+    assert np.abs(rows["phase_rad"]).max() < 4 * rows["sigma_phase_rad"].max()
+
+
+def test_figures_and_summary_have_the_change(finished: tuple[Path, Outcome, Any]) -> None:
+    folder, outcome, _ = finished
+    figures = {one["name"]: one for one in json.loads((folder / "figures.json").read_text())["figures"]}
+    assert figures["cycles"]["value"] == N
+    change = figures["change of the secant modulus"]
+    assert change["low"] < -FALL < change["high"] and change["high"] - change["low"] < 0.05
+    (line,) = outcome.test.cycles.lines()
+    assert line.startswith(f"{N} cycles of 1 s; secant modulus ") and f"in cycle {N}" in line
+    shown = run_result(outcome.run_state, outcome.test, folder, "")["figures"]
+    assert [str(one["name"]) for one in shown if "cycle" in str(one["name"])] == [
+        "cycles", "secant modulus of cycle 1", f"secant modulus of cycle {N}",
+    ]  # fmt: skip
+
+
+def test_channels_follow_while_the_test_goes_on(finished: tuple[Path, Outcome, Any]) -> None:
+    folder, _, seen = finished
+    rows, numbers = rows_of(folder), [one["cycle"] for one in seen]
+    assert math.isnan(numbers[0])
+    known = [one for one in seen if not math.isnan(one["cycle"])]
+    assert {one["cycle"] for one in known} >= {*range(4, N)}
+    for one in known:
+        k = int(one["cycle"]) - 1
+        assert one["secant_modulus"] == pytest.approx(rows["secant_modulus_Pa"][k], rel=0.01)
+        assert one["peak_N"] == pytest.approx(rows["peak_N"][k], rel=1e-3)
+
+
+def test_a_replay_counts_the_same(finished: tuple[Path, Outcome, Any], tmp_path: Path) -> None:
+    folder, _, _ = finished
+    again = tmp_path / "again"
+    assert (
+        main(
+            [
+                "replay",
+                str(folder / "session.h5"),
+                "--as-measured",
+                "--out",
+                str(again),
+                "--no-view",
+                "--no-rrd",
+            ]
+        )
+        == 0
+    )
+    assert (again / "cycles.csv").read_text() == (folder / "cycles.csv").read_text()
+    (folder / "figures.json").rename(tmp_path / "figures.json")
+    (folder / "cycles.csv").rename(tmp_path / "cycles.csv")
+    assert main(["report", str(folder)]) == 0  # as of a run that was killed
+    page, rows, made = (folder / "report.html").read_text(), rows_of(tmp_path), rows_of(folder)
+    assert "Secant modulus of the cycles" in page and f"{N} cycles of" in page
+    for name in ("secant_modulus_Pa", "peak_N", "time_s"):
+        assert made[name] == pytest.approx(rows[name], rel=1e-4)
+
+
+def test_a_pull_has_no_cycles(tmp_path: Path) -> None:
+    outcome = live_run(
+        tmp_path / "run", "sim:uniform?lockstep=yes&seconds=4&fps=10&width=160&height=128", **SECTION
+    )
+    assert not outcome.test.cycles.any and not (tmp_path / "run" / "cycles.csv").exists()
+    with open_run(tmp_path / "run") as run:
+        assert "cycles" not in json.loads((run.path / "figures.json").read_text())
+
+
+@pytest.mark.parametrize(("of_cycle", "number"), [(1, N), (4, N), (N + 1, 0)])
+def test_a_limit_over_the_value_of_a_cycle(
+    finished: tuple[Path, Outcome, Any], of_cycle: int, number: int
+) -> None:
+    folder, outcome, _ = finished
+    modulus = rows_of(folder)["secant_modulus_Pa"]
+    config, events = AlarmConfig(channel="secant_modulus", below=0.99, of_cycle=of_cycle), list[Event]()
+    state = outcome.run_state
+    values = ChannelValues(0.0, lambda t, step: replace(state.snapshot(t, step), figures={}))
+    AlarmWatch([Alarm(config)], values, lambda t: {}, ActiveAlarms(), events.append).idle()
+    if not number:
+        return
+    (event,) = events
+    share = modulus[number - 1] / modulus[of_cycle - 1]
+    assert event.data["value"] == pytest.approx(share, rel=5e-3)
+    assert str(event.text).endswith(f"% of that in cycle {of_cycle}, limit 99.0%")
+
+
+def test_of_cycle_is_for_figures_of_cycles() -> None:
+    with pytest.raises(ConfigError, match="alarm 1: of_cycle is for cycle, peak_strain"):
+        from_dict({"alarm": [{"channel": "axial", "above": 1.0, "of_cycle": 1}]}, {}, "here")
+    force = {"address": "sim:"}
+    absolute = from_dict({"load": force, "alarm": [{"channel": "secant_modulus", "below": 1e9}]}, {}, "here")
+    with pytest.raises(ConfigError, match="it needs the section"):
+        check_alarms(absolute)
+    check_alarms(
+        from_dict(
+            {"load": force, "alarm": [{"channel": "secant_modulus", "below": 0.9, "of_cycle": 1}]}, {}, ""
+        )
+    )
+
+
+def test_a_look_at_the_rig_begins_no_cycles() -> None:
+    from hw_mocks.specimen import specimen_from
+
+    specimen = specimen_from(parse_address(at_rest(SIM)))
+    assert specimen.duration_s == 3600 and not specimen.force(np.arange(0, 100, 0.1)).any()
