@@ -124,7 +124,7 @@ def test_slopes_are_of_the_elastic_strain_and_the_rest_of_the_other() -> None:
 @pytest.mark.parametrize(
     ("points", "why"),
     [
-        (7, r"strain and a tensile stress are known together at 7 points, 8 are needed"),
+        (7, r"only 7 measurements have strain and a tensile force, 8 are needed"),
         (
             8,
             r"no elastic line: \d points between 10 % and 40 % of half of the highest stress, and 8 that rise are "

@@ -11,6 +11,7 @@ from typing import Any
 
 from acquire.errors import DataError, PhasedicError
 from acquire.events import EventKind
+from acquire.text import Message
 from analysis.evaluate import CONFIDENCE, Figure
 from analysis.evaluate.elastic import FILM
 from live.config.loading import Config
@@ -24,7 +25,7 @@ from live.results.run_folder import RunFolder
 FILE, FORMAT, VERSION = "figures.json", "phasedic-figures", 1
 COUNTS = ("grabbed", "recorded", "measured", "skipped", "lost", "without_force")
 _SI = {"MPa": "Pa", "GPa": "Pa", "kN": "N", "%": "1", "": "1"}
-_NO_SECTION = "the section is not known: give --section W,T"
+_NO_SECTION = Message("the section is not known: give --section W,T")
 
 
 @dataclass(frozen=True, slots=True)

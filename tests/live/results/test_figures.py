@@ -70,7 +70,7 @@ def test_a_tare_in_mid_test_falsifies_no_figure() -> None:
         assert getattr(tared, name).value == pytest.approx(getattr(plain, name).value, rel=2e-3)
     run_state = RunState(EventLog(), FrameCounts(), *reversed(kept(truth, tared_at=1.0)))
     assert any(
-        line.strip().startswith("tared in mid-test by +")
+        line.strip().startswith("tared in mid-test by 3")
         for line in summary_lines(run_state, finished(run_state, FLAT))
     )
     run_state = RunState(EventLog(), FrameCounts(), *reversed(kept(truth)))

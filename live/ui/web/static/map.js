@@ -89,7 +89,7 @@ async function read(x, y) {
     found = await response.json();
   } catch { return; } // no link: the page says so
   if (!cross && !pointed) return;
-  const place = `x ${x.toFixed(0)}, y ${y.toFixed(0)} px`;
+  const place = `x ${fixed(x)}, y ${fixed(y)} px`;
   put($("readout"), found.value == null ? `${place}: ${t(found.status)}` : `${place}: ${picture.strain ? strainText(found.value, found.sigma) : `${fixed(found.value, 4)} ${unitOf(picture)}`}`);
 }
 for (const kind of ["pointerdown", "pointermove"]) svg.addEventListener(kind, (event) => { pointed = position(svg, event); read(...pointed); });

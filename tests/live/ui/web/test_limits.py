@@ -12,10 +12,10 @@ from analysis.evaluate import Figure
 from analysis.field import Roi, ZoiGrid
 from live.config.sections import AlarmConfig
 from live.results.figures import TensileRow
+from live.results.finished.belief import belief
 from live.ui.web.curve_history import CurveHistory
 from live.ui.web.limits import FigureLimits
 from live.ui.web.painting import cells_png
-from live.ui.web.run_result import belief
 
 
 def of(
@@ -128,4 +128,18 @@ def test_whether_the_figures_can_be_believed(
     rows: list[TensileRow], troubles: list[str], kind: str, words: str
 ) -> None:
     found = belief(rows, troubles)
-    assert (found["kind"], str(found["words"])) == (kind, words)
+    assert (found.kind, found.words) == (kind, words)
+    held = "The intervals (95 %) hold the scatter"
+    clear = "The data say nothing against them. " * (kind == "good")
+    assert found.more == ("" if kind == "bad" else f"{clear}{held}.")
+    stated = belief(rows, troubles, "limits of load cell, section").more
+    assert stated == (
+        "" if kind == "bad" else f"{clear}{held}, that of E also the limits of load cell, section."
+    )
+
+
+def test_the_range_of_a_load_cell_is_a_limit_that_ends_nothing() -> None:
+    low, high = (FigureLimits.of_range(force, 10e3) for force in (-8e3, 9.5e3))
+    assert low is not None and low["share"] == 0.8 and not low["near"] and not low["ends"]
+    assert high is not None and high["near"] and not high["beyond"] and high["value"] == 10e3
+    assert FigureLimits.of_range(math.nan, 10e3) is None and FigureLimits.of_range(1.0, math.nan) is None

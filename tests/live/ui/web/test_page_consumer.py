@@ -35,6 +35,8 @@ from tests.live.streaming import record_of
 from tests.live.ui.waiting import until
 from tests.live.ui.web.page_texts import STATIC
 
+COLOURS = [("left", 3), ("right", 1)]
+
 
 def measurement() -> Measurement:
     m = make_measurement(0)
@@ -95,13 +97,14 @@ def test_the_state_of_a_run(config: Config) -> None:
     assert isinstance(state, dict)
     assert state["force_N"] == -400 and state["peak_N"] == 500 and state["stress_Pa"] == pytest.approx(-1e7)
     assert state["axial"] == {"name": "axial", "value": 0.001, "sigma": 2e-6, "assumed": ""}
-    assert state["gauges"][1] == {"name": "b", "value": None, "sigma": None, "reason": "lost", "part": ""}
+    lost = {"name": "b", "value": None, "sigma": None, "reason": "lost", "part": "", "colour": None}
+    assert state["gauges"][1] == lost
     assert state["part"] == state["gauges"][0]["part"] == Message("of {share} % of the area", 83).to_json()
     assert state["events"][0]["level"] == "error" and "\x1b" not in state["events"][0]["text"]
     for k in range(4555):
         consumer.event(Event(0.0, EventKind.ALARM, "alarm", f"force is {k} N", "warning"))
     shown = consumer.state()["events"]
-    assert len(shown) == 5 and shown[-1]["text"] == "alarm: force is 4554 N (4,555 times)"
+    assert len(shown) == 5 and shown[-1]["text"] == "alarm: force is 4554 N (4\u202f555 times)"
 
 
 def test_the_map_is_drawn_only_while_a_page_is_open(config: Config) -> None:
@@ -269,6 +272,31 @@ def test_a_recording_shows_figures_of_one_instant(config: Config) -> None:
     assert state["force_N"] == state["peak_N"] == 1234.0 and state["stress_Pa"] == pytest.approx(1234 / 40e-6)
     assert math.isnan(state["late_s"])
     assert consumer.curve.since(0, 0)["rows"][-1][1] == pytest.approx(state["stress_Pa"])
+
+
+def test_a_gauge_has_its_stored_colour_and_the_force_the_range_of_its_cell() -> None:
+    """The colours of the map are those of lists and curves, also where a gauge before was removed."""
+    gauges = {
+        f"gauges.{name}": {"kind": "line", "start": [1, 2], "end": [3, 40], "colour": k}
+        for name, k in COLOURS
+    }
+    config = load_config(None, {"specimen.area_mm2": 40.0, **gauges})
+    run, consumer = Run(config), ready(PageConsumer(Broadcaster(), config, lambda: 0.5))
+    consumer.attach(run)  # type: ignore[arg-type]
+    m = measurement()
+    m = replace(
+        m, time_step=replace(m.time_step, gauges={name: GaugeValue(0.001, 2e-6) for name, _ in COLOURS})
+    )
+    consumer.matched(m)
+    run.run_state.history.add(m.time_step)
+    run.run_state.health.loaded(0.4, -8000.0)
+    assert [(one["name"], one["colour"]) for one in consumer.state()["gauges"]] == COLOURS
+    assert [(one["name"], one["colour"]) for one in consumer.at_peak()["gauges"]] == COLOURS
+    assert consumer.curve.since(0, 0)["colours"] == [k for _, k in COLOURS]
+    assert consumer.state()["figures"]["force"]["limit"] is None, "the range is not known"
+    run.run_state.health.load_range_N = 10e3
+    limit = consumer.state()["figures"]["force"]["limit"]
+    assert (limit["share"], limit["value"], limit["range"], limit["near"]) == (0.8, 10e3, True, False)
 
 
 def test_the_map_at_the_highest_force(config: Config) -> None:
