@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.load_cell import LoadLog
+from acquire.text import Message
 from analysis.evaluate import Curve, GaugeValue, LoadAxis, load_axis
 from live.pipeline.columns import BlockFile, NumberColumn, TextColumn
 from live.pipeline.measurement import AXIAL, TRANSVERSE, TimeStep, extension_along, strains_along
@@ -166,7 +167,7 @@ def _curve_of(
     narrowing = None if across is None or not np.isfinite(across).any() else across
     return Curve(
         t, extension, stress, strain(transverse), elastic, strain(f"uneven_{axial}"), strain("misfit"),
-        narrowing, lens, f"extension between strips along {axis}", f"{axial} of the region",
+        narrowing, lens, Message("extension between strips along {axis}", axis), f"{axial} of the region",
     )  # fmt: skip
 
 

@@ -84,7 +84,7 @@ def times(run: RunFolder, test: FinishedTest) -> Html:
     late = np.asarray(run.strain.values.get("latency_s", ()), np.float64) * 1e3
     late = late[np.isfinite(late)]
     corrected = Message("{lag:g} s", test.corrected_s) if test.corrected_s else Message("none")
-    found = {
+    found: dict[str, object] = {
         Message("lag of the load behind the frames"): words,
         Message("lag corrected in the force"): corrected,
     }

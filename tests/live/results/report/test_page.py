@@ -294,7 +294,10 @@ def test_the_report_is_in_the_language_of_the_terminal(
     """The sentence of belief is its first band, as on the page; the decimal mark is that of the language."""
     monkeypatch.setenv("LC_ALL", f"{language}_XX.UTF-8")
     with open_run(make_run(tmp_path / "run", PULLED)) as run:
+        warned = make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html
+        run.__dict__["events"] = [one for one in run.events if one.level == "info"]
         text = make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html
+    assert '<p class="band look">' in warned, "a warning stands against the figures, as on the page"
     bands = re.findall(r'<p class="band (\w+)">(.*?)</p>', text)
     assert bands[0][0] == "good" and bands[0][1].startswith(belief), bands
     assert f"<h2>{head}</h2>" in text and f'<html lang="{language}">' in text

@@ -155,7 +155,7 @@ def test_the_summary_in_another_language(
     test, troubles = finished(run_state), [*trouble_lines(run_state, ())]
     for verbose in (False, True):
         print_summary(TerminalScreen(out), run_state, test, tmp_path, troubles, verbose=verbose)
-    text = out.getvalue()
-    assert not re.search(r"\b(the|of|is|are|and|with|points|missing|not known)\b", text), text
+    text = out.getvalue().replace(str(tmp_path), "FOLDER")
+    assert not re.search(r"\b(the|of|is|are|and|with|missing|not known|along|to)\b", text), text
     assert not re.search(r"\d\.\d", text.replace("Rp0.", "").replace("Rp0.2", "")), text
     assert ("Prüfungen der Daten: " if language == "de" else "contrôles des données : ") in text
