@@ -100,7 +100,8 @@ def frame_counts(run: RunFolder) -> Html:
     found = run.frame_counts
     if not found:
         return paragraph(Message("No frame counts were recorded."), "dim")
-    return facts({Message("{what}", name): Amount("count", count) for name, count in found.items()})
+    counts = {name: Amount("count", one) if isinstance(one, int) else one for name, one in found.items()}
+    return facts({Message("{what}", name): one for name, one in counts.items()})
 
 
 def events(run: RunFolder) -> Html:

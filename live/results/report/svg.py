@@ -34,7 +34,7 @@ STYLE = """
 .curve{fill:none;stroke-width:2.25;stroke-linejoin:round}
 .d2{stroke-dasharray:9 4} .d3{stroke-dasharray:3 3} .d4{stroke-dasharray:11 3 3 3} .d5{stroke-dasharray:15 4}
 .d6{stroke-dasharray:2 5} .curve.dashed{stroke:var(--ink,#12171d);stroke-dasharray:6 4;stroke-width:1.2}
-.band{stroke:none;opacity:.25} .dot{fill:var(--ink,#12171d);stroke:var(--panel,#fff);stroke-width:2}
+polygon.band{stroke:none;opacity:.25} .dot{fill:var(--ink,#12171d);stroke:var(--panel,#fff);stroke-width:2}
 """
 COLOURS = len(LINES)
 STYLE += "".join(

@@ -142,6 +142,7 @@ def test_points_are_bounded_and_a_page_gets_what_it_lacks() -> None:
         curve.add([n, n])
     assert curve.since(0, 7) == {
         "names": ["t", "x"],
+        "colours": [],
         "edition": 0,
         "first": 7,
         "rows": [[7, 7], [8, 8], [9, 9]],
@@ -289,6 +290,7 @@ def test_a_gauge_has_its_stored_colour_and_the_force_the_range_of_its_cell() -> 
     )
     consumer.matched(m)
     run.run_state.history.add(m.time_step)
+    run.run_state.loads.append(LoadSample(0.4, -8000.0))
     run.run_state.health.loaded(0.4, -8000.0)
     assert [(one["name"], one["colour"]) for one in consumer.state()["gauges"]] == COLOURS
     assert [(one["name"], one["colour"]) for one in consumer.at_peak()["gauges"]] == COLOURS
