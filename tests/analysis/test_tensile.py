@@ -184,7 +184,7 @@ def test_without_enough_points_nothing_is_made_up() -> None:
     few = linear(fps=1.0)
     found = evaluate_test(noisy(few, 0))
     assert known(found) == {"Rm", "seconds"}
-    assert "8 that rise are needed" in found.E.why
+    assert "8 are needed: take more pictures there" in found.E.why
 
 
 def test_no_transverse_strain_leaves_nu_alone_unknown() -> None:
