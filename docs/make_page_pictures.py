@@ -1,11 +1,13 @@
 """The pictures of page, report and display: ``python -m docs.make_page_pictures`` (chromium, playwright, pillow).
 
-A simulated test, set up and run by mouse and keyboard in a headless browser; and a demo with its report and its display.
+A simulated test, set up and run by mouse and keyboard in a headless browser; and a demo with report and display.
 """
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -51,7 +53,9 @@ def main(folder: Path, size: tuple[int, int] = (1280, 800), dark: bool = False) 
 def display(browser: Any, recording: Path, folder: Path) -> None:
     """The display of a recorded test, in rerun's viewer."""
     command = [rerun_command(), "--serve-web", str(recording), "--web-viewer-port", "0", "--port", "9778"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as viewer:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+    ) as viewer:
         assert viewer.stdout is not None
         found = (re.search(r"connect at (http://127\S+)", line) for line in viewer.stdout)
         address = next(one[1] for one in found if one)
@@ -62,7 +66,7 @@ def display(browser: Any, recording: Path, folder: Path) -> None:
         page.mouse.click(265 + AT * (1392 - 265), 886)  # the line of the time
         page.wait_for_timeout(5_000)
         picture(Page(page), folder / "demo.png")
-        viewer.terminate()
+        os.killpg(viewer.pid, signal.SIGTERM)  # its command starts a process of its own
 
 
 def take_pictures(page: Page, program: Program, folder: Path) -> None:

@@ -148,7 +148,8 @@ def _elastic(loading: Loading, options: TensileOptions) -> _Elastic | str:
         line = line_through(loading, first, last)
         if line is None:
             return Message(
-                "only {n} measurements {words}, {MIN_POINTS} are needed: take more pictures there, or give modulus_between",
+                "only {n} measurements {words}, {MIN_POINTS} are needed: take more pictures there, or give "
+                "modulus_between",
                 last - first,
                 words,
                 MIN_POINTS,

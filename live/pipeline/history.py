@@ -158,16 +158,18 @@ def _curve_of(
     elastic, extension = strain(axial), strain(extension_along(gauges, axis))
     lens = strain(f"sigma_lens_e{axis}{axis}")
     if axial == AXIAL:
-        return Curve(t, _known(elastic, t), stress, strain(transverse), lens=lens, source=Message("gauge {name}", AXIAL))
+        source = Message("gauge {name}", AXIAL)
+        return Curve(t, _known(elastic, t), stress, strain(transverse), lens=lens, source=source)
+    region = Message("{axial} of the region", axial)
     if extension is None or not np.isfinite(extension).any():
         # Files of before November 2026 have no extension, and means of the gradients.
-        words = Message("mean {axial}", axial) if extension is None else Message("{axial} of the region", axial)
+        words = Message("mean {axial}", axial) if extension is None else region
         return Curve(t, _known(elastic, t), stress, strain(transverse), lens=lens, source=words)
     across = strain(TRANSVERSE if transverse == TRANSVERSE else f"extension_{'x' if axis == 'y' else 'y'}")
     narrowing = None if across is None or not np.isfinite(across).any() else across
     return Curve(
         t, extension, stress, strain(transverse), elastic, strain(f"uneven_{axial}"), strain("misfit"),
-        narrowing, lens, Message("extension between strips along {axis}", axis), Message("{axial} of the region", axial),
+        narrowing, lens, Message("extension between strips along {axis}", axis), region,
     )  # fmt: skip
 
 

@@ -41,11 +41,8 @@ def valid_line(history: History) -> str:
     bursts, valid, zois = (Amount("count", n) for n in (len(history.time_steps), last.n_valid, last.n_zoi))
     return Message(
         "measured {bursts} bursts, {valid} of {zois} ZOIs valid in the last{refused}",
-        bursts,
-        valid,
-        zois,
-        refused,
-    )
+        bursts, valid, zois, refused,
+    )  # fmt: skip
 
 
 def noise_line(history: History) -> str:
@@ -56,10 +53,8 @@ def noise_line(history: History) -> str:
     one, mean = (float(np.nanmedian(history.column(name))) for name in ("zoi_sigma", "sigma_eyy"))
     return Message(
         "noise: {picture}strain of one ZOI {one}, of the region {mean} (predicted, 1 sigma)",
-        picture,
-        Amount.rough("strain", one),
-        Amount.rough("strain", mean, 2),
-    )
+        picture, Amount.rough("strain", one), Amount.rough("strain", mean, 2),
+    )  # fmt: skip
 
 
 def latency_lines(history: History) -> list[str]:

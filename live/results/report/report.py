@@ -366,10 +366,8 @@ def budget_table(run: RunFolder, curve: EvaluatedCurve, *, both_sides: bool = Fa
     )
     whole = Message(
         "The interval of {CONFIDENCE:.0%} of {name} = {text} is that of all together. Rows with words are not in it.",
-        CONFIDENCE,
-        modulus.name,
-        modulus.text,
-    )
+        CONFIDENCE, modulus.name, modulus.text,
+    )  # fmt: skip
     return [paragraph(joined_texts(" ", (words, whole))), table(heads, cells, (1, 2, 3))]
 
 
