@@ -63,9 +63,13 @@ def display(browser: Any, recording: Path, folder: Path) -> None:
         page = context.new_page()
         page.goto(f"{address}&renderer=webgl")
         page.wait_for_timeout(20_000)
-        page.mouse.click(265 + AT * (1392 - 265), 886)  # the line of the time
+        page.mouse.click(28, 886)  # pause
+        page.mouse.move(265, 886)
+        page.mouse.down()
+        page.mouse.move(265 + AT * (1392 - 265), 886, steps=8)  # along the line of the time
+        page.mouse.up()
         page.wait_for_timeout(5_000)
-        picture(Page(page), folder / "demo.png")
+        picture(Page(page), folder / "demo.png", 1280)
         os.killpg(viewer.pid, signal.SIGTERM)  # its command starts a process of its own
 
 
@@ -90,12 +94,12 @@ def take_pictures(page: Page, program: Program, folder: Path) -> None:
     picture(page, folder / "page_after.png")
 
 
-def picture(page: Page, path: Path) -> None:
-    """A small PNG of the page."""
+def picture(page: Page, path: Path, wide: int = WIDE) -> None:
+    """A PNG of the page, so many px wide."""
     page.page.screenshot(path=path)
     with Image.open(path) as seen:
-        height = round(seen.height * WIDE / seen.width)
-        small = seen.convert("RGB").resize((WIDE, height), Image.Resampling.LANCZOS)
+        height = round(seen.height * wide / seen.width)
+        small = seen.convert("RGB").resize((wide, height), Image.Resampling.LANCZOS)
     small.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
