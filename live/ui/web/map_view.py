@@ -15,7 +15,7 @@ from live.pipeline.measurement import Measurement
 from live.results.maps.colours import MICROSTRAIN, PERCENT
 from live.results.maps.field_maps import FIELD_MAPS, FieldMaps, Painted
 from live.results.maps.painting import overlay_cells
-from live.ui.web.painting import Bytes, as_jpeg, cells_png, shrunk
+from live.ui.web.painting import as_jpeg, cells_box, cells_png, grey_levels, shrunk
 
 RANGES = ("automatic", "symmetric", "fixed")
 BARS = 24
@@ -81,24 +81,25 @@ class MapView:
 
     def draw(self, m: Measurement) -> tuple[bytes, dict[str, Any]]:
         """The picture of ``m`` with its map, as JPEG, and its scale as the page shows it."""
-        picture, zoom, painted, shown = self._drawn(m)
+        picture, zoom = shrunk(m.burst.mean, m.burst.bits)
+        painted, shown = self._drawn(m)
         overlay_cells(picture, zoom, m.field.grid, painted.rgba, (m.time_step.u, m.time_step.v))
         return as_jpeg(picture), shown
 
     def layers(self, m: Measurement) -> tuple[bytes, bytes, dict[str, Any]]:
         """The picture of ``m`` as JPEG, its map as PNG to lay over it, and its scale as the page shows it."""
-        picture, zoom, painted, shown = self._drawn(m)
-        size, moved = (picture.shape[1], picture.shape[0]), (m.time_step.u, m.time_step.v)
-        return as_jpeg(picture), cells_png(size, zoom, m.field.grid, painted.rgba, moved), shown
+        grey, _ = grey_levels(m.burst.mean, m.burst.bits)
+        painted, shown = self._drawn(m)
+        place = cells_box(m.field.grid, (m.time_step.u, m.time_step.v))
+        return as_jpeg(grey), cells_png(painted.rgba), shown | {"cells": place}
 
-    def _drawn(self, m: Measurement) -> tuple[Bytes, float, Painted, dict[str, Any]]:
-        picture, zoom = shrunk(m.burst.mean, m.burst.bits)
+    def _drawn(self, m: Measurement) -> tuple[Painted, dict[str, Any]]:
         painted = self._maps.paint(m.field, (self.choice.name,))[self.choice.name]
         self._painted = m, painted
         height, width = m.burst.mean.shape
         shown = {"of": self.choice.name, "range": self.choice.span, "width": width, "height": height}
         shapes = gauge_shapes(self._config) | plate_shapes(self._config)
-        return picture, zoom, painted, shown | _scale_of(painted) | {"gauges": shapes}
+        return painted, shown | _scale_of(painted) | {"gauges": shapes}
 
     def value_at(self, x: float, y: float) -> dict[str, Any]:
         """Value, sigma and status of the ZOI that is shown at a place of the picture, px."""

@@ -50,7 +50,7 @@ export function setAlong(name = "eyy") {
 // A strain of the region has a code as its name, a gauge the one that it was given.
 const isCode = (name) => /^e[xy]{2}$/.test(name);
 export const nameOfStrain = (name) => (isCode(name) ? t(name) : name);
-export const nameOfRegion = (name) => (isCode(name) && !isExpert() ? t("mean of the region") : name);
+export const nameOfRegion = (name) => (isCode(name) && !isExpert() ? t("region") : name);
 
 // Not the name of a file, a device or a setting, nor a list of them.
 const isSentence = (text) => text.split(", ").some((one) => one.includes(" ")) && /[a-z]{2,}[,;]? [a-z]{2,}/i.test(text.replace(/\{.*?\}/g, "")) && !/^[\w.-]*[:/]/.test(text);
