@@ -32,7 +32,11 @@ def filled(template: str, values: Mapping[str, Any], shown: Callable[[Any, str],
 def formatted(value: Any, spec: str) -> str:
     """As ``format``, but no exponent for what a person reads as a whole number: 6350, not 6.35e+03."""
     text = format(value, spec)
-    return f"{float(text):.0f}" if "e+0" in text and spec.endswith("g") else text
+    return (
+        format(float(text), spec[: spec.startswith("+")] + ".0f")
+        if "e+0" in text and spec.endswith("g")
+        else text
+    )
 
 
 @cache

@@ -57,7 +57,7 @@ class MapView:
     def __init__(self, config: Config) -> None:
         self._config, self._axis = config, config.specimen.first_axis
         limit = config.view.strain_range
-        self._painted: tuple[Measurement, Painted] | None = None
+        self._painted: tuple[Measurement, Painted, str] | None = None
         self._take(MapChoice(f"e{self._axis * 2}", "automatic" if limit is None else "fixed", limit))
 
     def _take(self, choice: MapChoice) -> None:
@@ -94,10 +94,11 @@ class MapView:
         return as_jpeg(grey), cells_png(painted.rgba), shown | {"cells": place}
 
     def _drawn(self, m: Measurement) -> tuple[Painted, dict[str, Any]]:
-        painted = self._maps.paint(m.field, (self.choice.name,))[self.choice.name]
-        self._painted = m, painted
+        choice = self.choice  # another may be chosen meanwhile
+        painted = self._maps.paint(m.field, (choice.name,))[choice.name]
+        self._painted = m, painted, choice.name
         height, width = m.burst.mean.shape
-        shown = {"of": self.choice.name, "range": self.choice.span, "width": width, "height": height}
+        shown = {"of": choice.name, "range": choice.span, "width": width, "height": height}
         shapes = gauge_shapes(self._config) | plate_shapes(self._config)
         return painted, shown | _scale_of(painted) | {"gauges": shapes}
 
@@ -105,7 +106,7 @@ class MapView:
         """Value, sigma and status of the ZOI that is shown at a place of the picture, px."""
         if self._painted is None:
             return {"value": None, "status": OUTSIDE}
-        m, painted = self._painted
+        m, painted, name = self._painted
         grid, moved = m.field.grid, np.nan_to_num([m.time_step.u, m.time_step.v])
         column, row = (
             int(np.argmin(np.abs(c - p))) for c, p in ((grid.x, x - moved[0]), (grid.y, y - moved[1]))
@@ -116,7 +117,6 @@ class MapView:
         status = Status(int(m.field.status[row, column]))
         if painted.values is None or not np.isfinite(painted.values[row, column]):
             return {"value": None, "status": status.text}
-        name = self.choice.name
         sigma = float(m.field.sigma(name)[row, column]) if name in VALUES else None
         return {"value": float(painted.values[row, column]), "sigma": sigma, "status": status.text}
 

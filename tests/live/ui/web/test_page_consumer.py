@@ -255,6 +255,23 @@ def test_the_value_is_that_of_the_zoi_that_has_moved_to_the_place(config: Config
         assert (view.value_at(grid.x[-1] + 20.0 + off, grid.y[2] - 13.0)["value"] is not None) == there
 
 
+def test_a_map_that_is_chosen_while_another_is_drawn_is_the_next_one(config: Config) -> None:
+    view, m = MapView(config), measurement()
+    paint = view._maps.paint
+
+    def painted(*given: Any) -> Any:
+        assert not view.choose("status", "automatic", None)
+        return paint(*given)
+
+    view._maps.paint = painted  # type: ignore[method-assign]
+    assert view.layers(m)[2]["of"] == "eyy"
+    read = [view.value_at(float(x), float(y)) for x in m.field.grid.x for y in m.field.grid.y]
+    assert any(one.get("sigma") is not None for one in read), (
+        "what is read is eyy with its sigma, not a status"
+    )
+    assert view.layers(m)[2]["of"] == "status"
+
+
 def test_a_recording_shows_figures_of_one_instant(config: Config) -> None:
     """Its load samples come far ahead of its pictures: the newest force is of another instant."""
     broadcaster, run = Broadcaster(), Run(config)
