@@ -79,7 +79,7 @@ def patterns() -> None:
 
 def report(work: Path) -> None:
     """The first screen of the report of a demo."""
-    main(["demo", "--no-view", "--no-rrd", "--report", "--out", str(work / "demo")])
+    main(["demo", "--no-view", "--report", "--out", str(work / "demo")])
     browser = find_browser()
     if browser is None:
         sys.exit(f"the picture of the report: {NO_BROWSER}")

@@ -84,5 +84,5 @@ PROTOCOL = Protocol(
         "tare": b"T\r\n",
         "zero": b"Z\r\n",
     },
-    undetected=Message("no check digit: a changed digit reads as another value"),
+    undetected=Message("transmission errors are not detected: a changed digit reads as another value"),
 )

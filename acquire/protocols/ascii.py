@@ -207,5 +207,7 @@ PROTOCOL = Protocol(
     make_parser=make_parser,
     baud=9600,
     flags_overload=False,
-    undetected=Message("no check digit: a lost or changed digit reads as another value"),
+    undetected=Message(
+        "transmission errors are not detected: a lost or changed digit reads as another value"
+    ),
 )

@@ -89,5 +89,7 @@ PROTOCOL = Protocol(
     rates={
         rate: b"ICR%d;MSV?0;" % icr for icr, rate in enumerate((100.0, 50.0, 25.0, 12.0, 6.0, 3.0, 2.0, 1.0))
     },
-    undetected=Message("no check digit; without the status of COF9 no overflow: say capacity="),
+    undetected=Message(
+        "transmission errors are not detected, nor an overflow without the status of COF9: say capacity="
+    ),
 )

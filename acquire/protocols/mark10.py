@@ -40,5 +40,5 @@ PROTOCOL = Protocol(
         "identify": b"LIST\r",
     },
     rates={float(rate): b"AOUT%d\r" % rate for rate in RATES},
-    undetected=Message("an overload has no mark on the line: say capacity=; no check digit"),
+    undetected=Message("transmission errors are not detected, nor an overload: say capacity="),
 )

@@ -64,5 +64,5 @@ PROTOCOL = Protocol(
         "zero": b"ZI\r\n",
         "identify": b"I4\r\n",
     },
-    undetected=Message("no check digit: a changed digit reads as another value"),
+    undetected=Message("transmission errors are not detected: a changed digit reads as another value"),
 )

@@ -64,6 +64,6 @@ PROTOCOL = Protocol(
     unit_on_line=False,
     flags_overload=False,
     commands={"poll": b"9", "single": b"9"},
-    undetected=Message("no check digit, no overload mark: say capacity="),
+    undetected=Message("transmission errors are not detected, nor an overload: say capacity="),
     silence_s=0.05,
 )

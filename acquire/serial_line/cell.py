@@ -181,7 +181,7 @@ class SerialCell(Closing):
             self._report(
                 "info",
                 Message(
-                    "device clock: arrivals {jitter:.1f} ms late on average (rms){known}",
+                    "load times are those of the device's clock; readings came {jitter:.1f} ms late (rms){known}",
                     jitter * 1e3,
                     known,
                 ),
@@ -290,7 +290,7 @@ class SerialCell(Closing):
         return self._scaling.sample(reading, self._last_t, LoadFlag.STALE if late else LoadFlag.NONE)
 
     def _hole(self) -> LoadSample:
-        """Something happened here that no force may be interpolated across."""
+        """A gap: forces are never interpolated across it."""
         self._last_t = max(self._clock(), self._last_t)
         return LoadSample(self._last_t, math.nan, self._settings.unit or "", flags=LoadFlag.STALE)
 
@@ -312,7 +312,7 @@ class SerialCell(Closing):
         self._tare = UNDO
 
     def _tare_requested(self) -> list[LoadSample]:
-        """Move zero on request; no force may be interpolated across that."""
+        """Apply a requested tare; forces are never interpolated across it."""
         request, self._tare = self._tare, None
         if request is None:
             return []

@@ -188,7 +188,7 @@ def _try(line: LineSettings, name: str, settings: str, received: bytes, seconds:
 
 
 def _is_a_clock(readings: list[Reading], seconds: float) -> bool:
-    """Whether what would be milliseconds never goes back, and runs about as long as was listened."""
+    """Whether the field is a plausible counter of milliseconds: monotonic, and as fast as our clock."""
     times = [reading.device_ms for reading in readings if reading.device_ms is not None]
     if len(times) < MIN_LINES or any(later < earlier for earlier, later in pairwise(times)):
         return False

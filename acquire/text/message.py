@@ -29,6 +29,16 @@ def filled(template: str, values: Mapping[str, Any], shown: Callable[[Any, str],
     return FIELD.sub(put, template)
 
 
+def formatted(value: Any, spec: str) -> str:
+    """As ``format``, but no exponent for what a person reads as a whole number: 6350, not 6.35e+03."""
+    text = format(value, spec)
+    return (
+        format(float(text), spec[: spec.startswith("+")] + ".0f")
+        if "e+0" in text and spec.endswith("g")
+        else text
+    )
+
+
 @cache
 def fields(template: str) -> tuple[str, ...]:
     """The names of its fields, each once, in their order."""
@@ -70,7 +80,7 @@ class Message(str):
             name: getattr(value, "text", value) if isinstance(value, Exception) else value
             for name, value in values.items()
         }
-        made = super().__new__(cls, filled(template, values, format))
+        made = super().__new__(cls, filled(template, values, formatted))
         made.template, made.values = template, values
         return made
 

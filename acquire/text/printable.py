@@ -8,6 +8,7 @@ from collections.abc import Callable
 from numbers import Number
 
 from acquire.text.message import Message
+from acquire.text.quantity import Amount
 
 # Control characters of both kinds (but for line feed and tab), halves of surrogate pairs, marks that turn the
 # direction of writing or are not seen, and separators that some terminals take for an end of line.
@@ -29,7 +30,8 @@ def _changed(text: object, change: Callable[[str], str]) -> str:
     if not isinstance(text, Message):
         return change(str(text))
     values = {
-        key: _changed(one, change) if not isinstance(one, Number) else one for key, one in text.values.items()
+        key: one if isinstance(one, Number | Amount) else _changed(one, change)
+        for key, one in text.values.items()
     }
     return Message(text.template, **values)
 

@@ -49,6 +49,10 @@ UNITS = {
     "force": (ShownUnit("N", 1.0, 0.0, 1), ShownUnit("kN", 1e3, 1e4, 3)),
     "stress": (ShownUnit("MPa", 1e6, 0.0, 1), ShownUnit("GPa", 1e9, 1e10, 2)),
     "time": (ShownUnit("s", 1.0, 0.0, 1), ShownUnit("min", 60.0, 120.0, 1)),
+    "delay": (ShownUnit("ms", 1e-3, 0.0, 0),),
+    "length": (ShownUnit("mm", 1e-3, 0.0, 2),),
+    "size": (ShownUnit("MB", 1e6, 0.0, 1), ShownUnit("GB", 1e9, 1e9, 2)),
+    "count": (ShownUnit("", 1.0, 0.0, 0),),
 }
 
 
@@ -86,6 +90,11 @@ class Amount:
     sigma: float = math.nan
     digits: int = 1
     unit: str = ""
+
+    @classmethod
+    def rough(cls, kind: str, value: float, digits: int = 3) -> Amount:
+        """A value to so many digits, of which the uncertainty is not told."""
+        return cls(kind, float(f"{value:.{digits}g}"), digits=2)
 
     def to_json(self) -> dict[str, Any]:
         """Its attributes; null where a number is not known."""

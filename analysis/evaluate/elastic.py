@@ -207,8 +207,8 @@ def poisson_between(loading: Loading, low: float, high: float) -> Figure:
     if n < MIN_POINTS:
         return Figure.none(
             Message(
-                "{n} points between the strains {low:g} and {high:g} %, {MIN_POINTS} are needed (the strain reaches "
-                "{reached:.2g} %)",
+                "only {n} measurements between the strains {low:g} and {high:g} %, {MIN_POINTS} are needed: take more "
+                "pictures there (the strain reaches {reached:.2g} %)",
                 n,
                 100 * low,
                 100 * high,

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from acquire.text import Message
+from acquire.text.message import joined
 from analysis.evaluate.curve import Floats, Loading, first_crossing
 from analysis.evaluate.elastic import FittedLine
 from analysis.evaluate.figure import Figure
@@ -59,9 +60,8 @@ def _against(rate: float, parts: list[float], bands: tuple[Band, ...]) -> str:
             else Message(" on average, its tenths at {least:.2g} to {most:.2g} 1/s", min(parts), max(parts))
         )
         return Message("within {name}{tenths}", inside[0].name, tenths)
-    allowed = ", ".join(
-        Message("{name} {low:.2g} to {high:.2g} 1/s", band.name, band.low, band.high) for band in bands
-    )
+    texts = [Message("{name} {low:.2g} to {high:.2g} 1/s", band.name, band.low, band.high) for band in bands]
+    allowed = joined(", ", texts)
     return Message("outside the standard ({allowed})", allowed)
 
 

@@ -115,7 +115,8 @@ def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:
     loading, strength = Loading.of(curve), tensile_strength(curve)
     if loading.n < MIN_POINTS or loading.stress[loading.top] <= 0:
         words = Message(
-            "strain and a tensile stress are known together at {n} points, {MIN_POINTS} are needed",
+            "only {n} measurements have strain and a tensile force, {MIN_POINTS} are needed: are sign (--load-sign) "
+            "and time (--lag) of the force right?",
             loading.n,
             MIN_POINTS,
         )
@@ -147,7 +148,8 @@ def _elastic(loading: Loading, options: TensileOptions) -> _Elastic | str:
         line = line_through(loading, first, last)
         if line is None:
             return Message(
-                "{last} points {words}, and {MIN_POINTS} that rise are needed",
+                "only {n} measurements {words}, {MIN_POINTS} are needed: take more pictures there, or give "
+                "modulus_between",
                 last - first,
                 words,
                 MIN_POINTS,

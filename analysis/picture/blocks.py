@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 BLOCK_PX = 8
 MAX_LINES = 64
-"""That are enough along either axis: with 256 none of 32 pictures, raw or JPEG 50 to 95, comes to the other side."""
+"""Rows and columns that are sampled; 256 give the same verdict on 32 pictures, raw and JPEG 50 to 95."""
 BLOCKS = 1.3
 """Blockiness from which on a picture was compressed: JPEG 80 has 1.9, JPEG 50 2.7, raw pictures 0.98 to 1.06."""
 

@@ -164,6 +164,8 @@ Command = Callable[[argparse.Namespace], int]
 
 def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
     """The command and its arguments; help ends the program with exit code 0, bad usage with 2."""
+    argparse._ = said_here  # type: ignore[attr-defined]  # its own texts: what gettext would be asked for
+    argparse.ngettext = lambda one, many, n: said_here(one if n == 1 else many)  # type: ignore[attr-defined]
     parser = full_parser([word for word in argv if word in COMMANDS][:1], all_options=HELP_ALL in argv)
     try:
         argv = understood(argv)

@@ -17,6 +17,9 @@ from acquire.clock import ClockPair
 from acquire.events import Event
 from acquire.frame import CameraInfo, Frame
 from acquire.load_sample import LoadSample
+from acquire.text import Message
+from acquire.text.message import about, joined
+from acquire.text.printable import counted
 from live.config.loading import Config
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
@@ -175,10 +178,11 @@ class ConsumerReport:
         counts = [self._count(kind) for kind in ("measurement", "matched", "frame", "load", "event")]
         parts = [*filter(None, counts), *filter(None, [self.summary])]
         if self.failed:
-            parts.append(f"STOPPED: {self.failed}")
-        return f"{self.name}: {'; '.join(parts) or 'nothing came'}"
+            parts.append(Message("STOPPED: {why}", self.failed))
+        return about(self.name, joined("; ", parts) or Message("nothing came"))
 
     def _count(self, kind: str) -> str:
         taken, dropped = self.taken.get(kind, 0), self.dropped.get(kind, 0)
-        plural = {"matched": "measurements", "load": "load samples"}.get(kind, f"{kind}s")
-        return f"{taken} {plural}" + f", {dropped} dropped" * (dropped > 0) if taken or dropped else ""
+        noun = {"matched": "measurement", "load": "load sample"}.get(kind, kind)
+        lost = Message(", {dropped} dropped", dropped) * (dropped > 0)
+        return counted(taken, noun) + lost if taken or dropped else ""

@@ -18,6 +18,7 @@ from acquire.events import Event, EventKind, EventSink, Level, RateLimiter
 from acquire.text import Message
 from acquire.text.message import about, without_name
 from acquire.text.printable import brief
+from acquire.text.quantity import Amount
 from live.pipeline.repeats import AS_THEY_COME, Likeness, Repeats, likeness
 
 log = logging.getLogger(__name__)
@@ -28,7 +29,7 @@ _SESSION_ONLY = {EventKind.MEASURED}  # one for each burst: not for a person
 
 def counted_text(text: str, count: int) -> str:
     """The text of an event with the number of its like; the plain text of one that is alone."""
-    return Message("{text} ({count} times)", text, f"{count:,}") if count > 1 else text
+    return Message("{text} ({count} times)", text, Amount("count", count)) if count > 1 else text
 
 
 def sentence(event: Event, names: Mapping[str, str] | None = None) -> str:

@@ -261,7 +261,7 @@ class PictureGuard:
             self._emit(step.t, picture_words(field), "warning", error)
             self._cause = error.cause
         elif self._cause and not error.cause and error.factor < 0.85 * LIMIT:
-            self._emit(step.t, Message("the picture leaves what its noise explains again"), "info", error)
+            self._emit(step.t, Message("the picture is as noisy as expected again"), "info", error)
             self._cause = ""
 
     def _emit(self, t: float, text: str, level: Level, error: PictureError) -> None:
@@ -284,7 +284,7 @@ def picture_words(field: StrainField) -> str:
         )
     usual = sigma / error.factor
     return Message(
-        "the picture shows {shown}: strain of a ZOI is uncertain by {sigma} in place of {usual}",
+        "the picture shows {shown}: strain of a ZOI is uncertain by {sigma}, usually {usual}",
         shown,
         Amount("strain", sigma),
         Amount("strain", usual),
@@ -333,7 +333,7 @@ def _blur_words(blur: Blur, field: StrainField) -> str:
     sigma = _usual_sigma(field)
     return Message(
         "the picture is {text} since the reference: look at focus, distance and exposure; strain of a ZOI is "
-        "uncertain by {sigma} in place of {usual}",
+        "uncertain by {sigma}, usually {usual}",
         blur.text,
         Amount("strain", sigma),
         Amount("strain", sigma / error.factor),

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.load_cell import LoadLog
+from acquire.text import Message
 from analysis.evaluate import Curve, GaugeValue, LoadAxis, load_axis
 from live.pipeline.columns import BlockFile, NumberColumn, TextColumn
 from live.pipeline.measurement import AXIAL, TRANSVERSE, TimeStep, extension_along, strains_along
@@ -157,16 +158,18 @@ def _curve_of(
     elastic, extension = strain(axial), strain(extension_along(gauges, axis))
     lens = strain(f"sigma_lens_e{axis}{axis}")
     if axial == AXIAL:
-        return Curve(t, _known(elastic, t), stress, strain(transverse), lens=lens, source=f"gauge {AXIAL}")
+        source = Message("gauge {name}", AXIAL)
+        return Curve(t, _known(elastic, t), stress, strain(transverse), lens=lens, source=source)
+    region = Message("{axial} of the region", axial)
     if extension is None or not np.isfinite(extension).any():
         # Files of before November 2026 have no extension, and means of the gradients.
-        words = f"mean {axial}" if extension is None else f"{axial} of the region"
+        words = Message("mean {axial}", axial) if extension is None else region
         return Curve(t, _known(elastic, t), stress, strain(transverse), lens=lens, source=words)
     across = strain(TRANSVERSE if transverse == TRANSVERSE else f"extension_{'x' if axis == 'y' else 'y'}")
     narrowing = None if across is None or not np.isfinite(across).any() else across
     return Curve(
         t, extension, stress, strain(transverse), elastic, strain(f"uneven_{axial}"), strain("misfit"),
-        narrowing, lens, f"extension between strips along {axis}", f"{axial} of the region",
+        narrowing, lens, Message("extension between strips along {axis}", axis), region,
     )  # fmt: skip
 
 

@@ -109,7 +109,7 @@ class FrameCounts:
             self.left_out,
             self.unrecorded,
             on_purpose,
-            "adds up" if self.adds_up else "DOES NOT ADD UP",
+            "every frame is accounted for" if self.adds_up else "NOT EVERY FRAME IS ACCOUNTED FOR",
         )
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from acquire.errors import DataError
 from acquire.text import Message
 from acquire.text.printable import counted
+from acquire.text.quantity import number as grouped
 from live.config.sections import LoadConfig
 from live.replay.export_headings import name_and_unit, newtons_of, seconds_per
 from live.replay.export_numbers import (
@@ -382,10 +383,10 @@ class _Reader:
         )
         against = f" against {t.name(t.key)}{kind}" if t.key is not None else ""
         return (
-            f"column {t.name(t.force)}, {self._unit}, {len(forces):,} rows, {low} to {high} N{against}; {t.form},"
-            f" decimal {self._decimal}"
+            f"column {t.name(t.force)}, {self._unit}, {grouped(len(forces))} rows, {low} to {high} N{against};"
+            f" {t.form}, decimal {self._decimal}"
         )
 
 
 def _shown(force: float) -> str:
-    return f"{force:,.0f}" if abs(force) >= 1000 else f"{force:.4g}"
+    return grouped(force) if abs(force) >= 1000 else f"{force:.4g}"

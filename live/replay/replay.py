@@ -24,7 +24,9 @@ from acquire.events import Event, EventKind, EventSink
 from acquire.frame import Burst, Frame
 from acquire.hdf5 import FolderWatch
 from acquire.opencv.images import picture_times
+from acquire.text import Message
 from acquire.text.printable import counted
+from acquire.text.quantity import Amount
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
 from live.pipeline.consumer import Compose, RunInfo
@@ -287,22 +289,26 @@ def _account(source: ReplaySource, run_state: RunState) -> list[str]:
     if count is None or not count.left_out:
         return []
     why = [event.text for event in run_state.event_log.events("warning") if event.kind is EventKind.DEVICE]
-    more = [f"... and {len(why) - _MOST_TOLD} more; the log (-v) has all"] if len(why) > _MOST_TOLD else []
+    left = len(why) - _MOST_TOLD
+    more = [Message("... and {left} more; the log (-v) has all", left)] if left > 0 else []
     measured = run_state.frame_counts.measured
-    words = f"{count.pictures} pictures: reference {count.reference}, measured {measured}, left out {count.left_out}"
+    words = Message(
+        "{pictures} pictures: reference {reference}, measured {measured}, left out {left_out}",
+        count.pictures, count.reference, measured, count.left_out,
+    )  # fmt: skip
     rest = count.pictures - count.reference - measured - count.left_out
-    words += f", of no whole burst {rest}" * (rest > 0)
-    return [words, *(f"  {text}" for text in [*why[:_MOST_TOLD], *more])]
+    words += Message(", of no whole burst {rest}", rest) * (rest > 0)
+    return [words, *(Message("  {text}", text) for text in [*why[:_MOST_TOLD], *more])]
 
 
 def speed_line(history: History, seconds: float) -> str:
     """The speed, and the kernel's share of the time."""
     n, zois = len(history.time_steps), history.column("n_zoi").sum()
     share = history.column("measure_s").sum() / seconds
-    return (
-        f"{n} bursts in {seconds:.3g} s: {n / seconds:.3g} bursts/s, {zois / seconds:,.0f} ZOI/s, of that time"
-        f" {share:.0%} in the kernel"
-    )
+    return Message(
+        "{n} bursts in {seconds:.3g} s: {rate:.3g} bursts/s, {zois} ZOI/s, of that time {share:.0%} in the kernel",
+        n, seconds, n / seconds, Amount("count", zois / seconds), share,
+    )  # fmt: skip
 
 
 def _not_empty(bursts: Iterable[Work], request: ReplayRequest, count: PictureCount | None) -> Iterator[Work]:
@@ -317,7 +323,7 @@ def _not_empty(bursts: Iterable[Work], request: ReplayRequest, count: PictureCou
         )
     if not first:
         raise DataError(
-            "{source}: no whole burst after the reference, nothing to measure; give a smaller --burst",
+            "{source}: the first pictures are the reference, and no whole burst follows; give a smaller --burst",
             request.source,
         )
     return _after(first, rest)

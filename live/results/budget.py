@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+from acquire.text import Message
 from live.config.sections import CameraConfig, ScaleConfig
 
 MOTION_MM = 0.1
@@ -102,7 +103,7 @@ def budget_rows(
     rows = [
         row(cause, shares[cause])
         if cause in shares
-        else BudgetRow(cause, words=f"not stated: {_KEYS.get(cause, 'not known')}")
+        else BudgetRow(cause, words=Message("not stated: {key}", _KEYS.get(cause, "")))
         for cause in causes
     ]
     seen = _optics(view, stated="strain" in shares)
@@ -117,29 +118,33 @@ def budget_cells(rows: Iterable[BudgetRow], unit: str, one: float) -> list[tuple
 
     def cells(row: BudgetRow) -> tuple[str, ...]:
         numbers = row.strain * 1e6, row.share * 100, row.modulus / one
-        texts = (row.words, "", "") if row.words else tuple(f"{number:.3g}" for number in numbers)
-        return (row.cause, *texts[: 3 if known else 2])
+        texts = (row.words, "", "") if row.words else tuple(Message("{number:.3g}", n) for n in numbers)
+        return (Message("{cause}", row.cause), *texts[: 3 if known else 2])
 
-    return [("", "µm/m", "% of E", unit)[: 4 if known else 3], *map(cells, rows)]
+    return [("", "µm/m", Message("% of E"), unit)[: 4 if known else 3], *map(cells, rows)]
 
 
 def _optics(view: CameraView, *, stated: bool) -> Iterator[tuple[str, str]]:
     """What the view adds to strains, in words: removed, in the row strain where that is ``stated``, or not counted."""
     yield "motion off the plane", _motion(view, stated=stated)
-    yield LENS, "in strain" if stated else "not stated: --lens, specimen.strain_error_um_m"
+    lens = Message("not stated: {key}", "--lens, specimen.strain_error_um_m")
+    yield LENS, Message("in strain") if stated else lens
     yield BLUR, view.sharpness
-    shutter = "not stated: camera.readout_ms" if view.readout_ms is None else "removed"
-    yield "rolling shutter", shutter if view.readout_ms != 0 else "none"
+    unknown = Message("not stated: {key}", "camera.readout_ms")
+    shutter = unknown if view.readout_ms is None else Message("removed")
+    yield "rolling shutter", shutter if view.readout_ms != 0 else Message("none")
 
 
 def _motion(view: CameraView, *, stated: bool) -> str:
     if view.both_sides:
-        return "not in the mean of both sides"
+        return Message("not in the mean of both sides")
     if view.plates:
-        return "removed by plates; their noise is in scatter"
+        return Message("removed by plates; their noise is in scatter")
     if stated:
-        return "in strain"
+        return Message("in strain")
     if view.stand_off_mm is None:
-        return "not stated: scale.stand_off_mm"
+        return Message("not stated: {key}", "scale.stand_off_mm")
     per = MOTION_MM / view.stand_off_mm * 1e6
-    return f"not counted: {MOTION_MM:g} mm at {view.stand_off_mm:g} mm is {per:.0f} µm/m"
+    return Message(
+        "not counted: {motion:g} mm at {stand_off:g} mm is {per:.0f} µm/m", MOTION_MM, view.stand_off_mm, per
+    )

@@ -10,7 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from acquire.load_cell import LoadLog
-from acquire.text.quantity import Amount, Printed, unit_of, with_sigma
+from acquire.text import Message
+from acquire.text.message import joined
+from acquire.text.quantity import Amount, unit_of
 from analysis.evaluate import (
     AT_LEAST,
     CONFIDENCE,
@@ -42,19 +44,26 @@ _REMARKED = ("E", "nu", *_FLOW)
 _PLAIN, _PERCENT, _MPA, _GPA, _KN = ("", 1.0), ("%", 0.01), ("MPa", 1e6), ("GPa", 1e9), ("kN", 1e3)
 _STRENGTH_SUFFIXES = dict(zip(_STRENGTHS, ("p0.1", "p0.2", "p1", "eH", "eL", "m"), strict=True))
 LAG_MATTERS_S = 0.005  # and beyond its own uncertainty: to correct a smaller one changes no figure
-_KINDS = {"GPa": "stress", "MPa": "stress", "kN": "force", "%": "share", "": ""}
+_KINDS = {
+    "GPa": "stress", "MPa": "stress", "kN": "force", "%": "share", "": "", "ms": "delay", "mm": "length",
+}  # fmt: skip
+NOT_KNOWN = Message("not known")
 
 
 def value_text(value: float, sigma: float, unit: str) -> str:
     """``value ± sigma unit``, rounded to two digits of the uncertainty."""
-    return str(Printed(*with_sigma(value, sigma, 2), unit)) if math.isfinite(value) else "not known"
+    if not math.isfinite(value):
+        return NOT_KNOWN
+    kind = _KINDS[unit]
+    one = unit_of(kind, 0.0, unit).one
+    return joined("", [Amount(kind, value * one, sigma * one, 2, unit)])
 
 
 def figure_text(figure: Figure, unit_is: float = 1.0, unit: str = "") -> str:
     """A figure with the larger half of its interval, or as a bound, in ``unit``, which is ``unit_is`` in SI units."""
     half = max(figure.high - figure.value, figure.value - figure.low)
-    words = f"{AT_LEAST} " if figure.is_bound else ""
-    return words + value_text(figure.value / unit_is, half / unit_is, unit)
+    text = value_text(figure.value / unit_is, half / unit_is, unit)
+    return joined(" ", (AT_LEAST, text)) if figure.is_bound else text
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,13 +104,9 @@ class TensileRow:
     @property
     def number(self) -> str:
         """Value, interval and unit for a person."""
-        return str(self.printed) if self.figure.known else "not known"
-
-    @property
-    def printed(self) -> Printed:
-        """The parts of the number; a bound has its words before the value."""
-        shown = self.quantity.printed()
-        return shown._replace(value=f"{AT_LEAST} {shown.value}") if self.figure.is_bound else shown
+        if not self.figure.known:
+            return NOT_KNOWN
+        return joined(" ", [*[AT_LEAST] * self.figure.is_bound, self.quantity])
 
     @property
     def quantity(self) -> Amount:
@@ -113,7 +118,7 @@ class TensileRow:
     @property
     def text(self) -> str:
         """The number and the remark."""
-        return self.number + (f" ({self.remark})" if self.remark else "")
+        return self.number + Message(" ({remark})", self.remark) if self.remark else self.number
 
 
 def tensile_table(figures: TensileFigures, *, stresses: bool) -> dict[str, TensileRow]:
@@ -179,9 +184,9 @@ def lag_of(history: History, loads: LoadLog, specimen: SpecimenConfig) -> Figure
     """The lag of the load behind the frames, s, found from the test itself."""
     t, force = loads.arrays()
     if not len(t):
-        return Figure.none("no readings of a load cell are there")
+        return Figure.none(Message("no readings of a load cell are there"))
     if loads.by_name:
-        return Figure.none("each force was given for a picture: there is none")
+        return Figure.none(Message("each force was given for a picture: there is none"))
     return find_lag(Track(history.column("t"), history.along(specimen.axis)[0]), Track(t, force))
 
 
@@ -191,13 +196,16 @@ def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list
         return []
     lag = lag_of(history, loads, specimen)
     if not lag.known:
-        return [f"lag of the load behind the frames: not known ({lag.why})"]
-    how = "too small to matter"
+        return [Message("lag of the load behind the frames: not known ({why})", lag.why)]
+    how = Message("too small to matter")
     if loads.lag_s:
-        how = f"{loads.lag_s * 1e3:g} ms corrected"
+        how = Message("{lag:g} ms corrected", loads.lag_s * 1e3)
     elif abs(lag.value) > max(LAG_MATTERS_S, lag.high - lag.value, lag.value - lag.low):
-        how = f"not applied; --lag {lag.value:.3f} does"
-    return [f"lag of the load behind the frames: {figure_text(lag, 1e-3, 'ms')} ({CONFIDENCE:.0%}; {how})"]
+        how = Message("not applied; --lag {lag} does", f"{lag.value:.3f}")
+    text = figure_text(lag, 1e-3, "ms")
+    return [
+        Message("lag of the load behind the frames: {text} ({CONFIDENCE:.0%}; {how})", text, CONFIDENCE, how)
+    ]
 
 
 def tare_line(history: History, loads: LoadLog) -> list[str]:
@@ -206,7 +214,10 @@ def tare_line(history: History, loads: LoadLog) -> list[str]:
     if not tared:
         return []
     return [
-        f"tared in mid-test by {tared:+.4g} N: these figures use the zero before; strain.csv has the tare as zero_N"
+        Message(
+            "tared in mid-test by {force}: these figures use the zero before; strain.csv has the tare as zero_N",
+            Amount("force", tared),
+        )
     ]
 
 
@@ -216,7 +227,14 @@ def sharpness_line(blur: Sequence[float], sigma: Sequence[float]) -> list[str]:
     if not known:
         return []
     largest = max(known, key=lambda one: abs(one.px))
-    return [f"sharpness since the reference: {largest.text} at most, {known[-1].text} in the last picture"]
+    last = known[-1]
+    return [
+        Message(
+            "sharpness since the reference: {largest} at most, {last} in the last picture",
+            largest.text,
+            last.text,
+        )
+    ]
 
 
 def film_line(specimen: SpecimenConfig) -> list[str]:
@@ -225,8 +243,11 @@ def film_line(specimen: SpecimenConfig) -> list[str]:
     if not limit:
         return []
     return [
-        f"strains of a compressed film: not better than {limit:g} %, beside ± (the codec holds motion back; record"
-        " MJPG, FFV1 or pictures)"
+        Message(
+            "strains of a compressed film: not better than {limit:g} %, beside ± (the codec holds motion back; record "
+            "MJPG, FFV1 or pictures)",
+            limit,
+        )
     ]
 
 
@@ -238,20 +259,25 @@ def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
     words = axis_text(load)
     turned = load.found and load.axis != specimen.first_axis
     placed = [name for name in (AXIAL, "extension") if turned and history.gauge(name) is not None]
-    return [words + "".join(f"; the gauge {name} keeps its place" for name in placed)] if words else []
+    kept = [Message("; the gauge {name} keeps its place", name) for name in placed]
+    return [joined("", [words, *kept])] if words else []
 
 
 def axis_text(load: LoadAxis) -> str:
     """The axis of the load and the angle to the largest strain; empty where the axis is given and no more is known."""
     if load.assumed:
-        return f"{load.axis} is assumed to be the axis of the load; give [specimen] axis = 'x' or 'y'"
+        return Message(
+            "{axis} is assumed to be the axis of the load; give [specimen] axis = 'x' or 'y'", load.axis
+        )
     if not load.angle.known:
-        return f"{load.axis} was found to be the axis of the load: the larger strain" if load.found else ""
-    words = f"largest strain {figure_text(load.angle, math.pi / 180, 'degrees')} off {load.axis} (clockwise)"
+        found = Message("{axis} was found to be the axis of the load: the larger strain", load.axis)
+        return found if load.found else ""
+    angle = figure_text(load.angle, math.pi / 180)
+    words = Message("largest strain {angle} degrees off {axis} (clockwise)", angle, load.axis)
     if load.found:
-        return f"{words}; {load.axis} was found to be the axis of the load"
+        return words + Message("; {axis} was found to be the axis of the load", load.axis)
     wrong = abs(load.angle.value) > math.pi / 4
-    return words + (f"; is specimen.axis = {load.axis!r} right?" if wrong else "")
+    return words + Message("; is specimen.axis = {axis} right?", repr(load.axis)) if wrong else words
 
 
 def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]:
@@ -259,17 +285,20 @@ def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str
     if not figures.E.known or figures.span is None:
         return []
     rows = _rows(figures, specimen)
-    of = f" of {figures.elastic_strain}" if figures.elastic_strain else ""
-    beyond = f", of E with {beyond_scatter(figures)}" if beyond_scatter(figures) else " of the scatter alone"
-    words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, ±: {CONFIDENCE:.0%} interval{beyond})"
+    of = Message(" of {strain}", figures.elastic_strain) if figures.elastic_strain else ""
+    limits = beyond_scatter(figures)
+    held = Message(", of E with {limits}", limits) if limits else Message(" of the scatter alone")
+    how = Message(
+        "({n} points{of}, ±: {CONFIDENCE:.0%} interval{held})", figures.span.n, of, CONFIDENCE, held
+    )
     strengths = _known_texts(rows, _STRENGTHS)
-    return [_text(rows, "E") + words, *([strengths] if strengths else [])]
+    return [joined("  ", (_text(rows, "E"), _text(rows, "nu"), how)), *([strengths] if strengths else [])]
 
 
 def beyond_scatter(figures: TensileFigures) -> str:
     """What the interval of E holds beside the scatter, in words; empty where it holds no more."""
     causes = [cause for cause in figures.budget if cause != "scatter"]
-    return f"limits of {', '.join(causes)}" if causes else ""
+    return Message("limits of {causes}", joined(", ", causes)) if causes else ""
 
 
 def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> dict[str, TensileRow]:
@@ -277,11 +306,11 @@ def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> dict[str, Tensil
 
 
 def _text(rows: Mapping[str, TensileRow], key: str) -> str:
-    return f"{rows[key].name} = {rows[key].text}"
+    return Message("{name} = {text}", rows[key].name, rows[key].text)
 
 
 def _known_texts(rows: Mapping[str, TensileRow], keys: Sequence[str]) -> str:
-    return "  ".join(_text(rows, key) for key in keys if rows[key].figure.known)
+    return joined("  ", [_text(rows, key) for key in keys if rows[key].figure.known])
 
 
 def figure_lines(
@@ -298,16 +327,22 @@ def figure_lines(
     if span is not None:
         low, high = span.strain
         lines.append(
-            f"  {figures.standard}: strains {100 * low:.3f} to {100 * high:.3f} %, R2 = {figures.r2:.5f}, by chord"
-            f" {rows['E_chord'].text}; strain{_named(figures.strain)} counts {figures.zero.how}"
-        )
+            Message(
+                "{standard}: strains {low:.3f} to {high:.3f} %, R2 = {r2:.5f}, by chord {chord}; strain{named} counts "
+                "{zero}",
+                figures.standard, 100 * low, 100 * high, figures.r2, rows["E_chord"].text, _named(figures.strain),
+                figures.zero.how,
+            )
+        )  # fmt: skip
     lines += plastic_lines(figures, specimen, length_mm)
-    rates = (("in the elastic part", figures.rate_elastic), ("after it", figures.rate_plastic))
+    parts = Message("in the elastic part"), Message("after it")
     known = [
-        f"{one.value:.3g} 1/s {when}" + f" ({one.why})" * bool(one.why) for when, one in rates if one.known
+        Message("{rate:.3g} 1/s {when}", one.value, when) + (Message(" ({why})", one.why) if one.why else "")
+        for when, one in zip(parts, (figures.rate_elastic, figures.rate_plastic), strict=True)
+        if one.known
     ]
     if known:
-        lines.append("strain rate " + ", ".join(known))
+        lines.append(Message("strain rate {rates}", joined(", ", known)))
     return lines + _unknown_lines(rows)
 
 
@@ -318,7 +353,7 @@ def plastic_lines(
     rows = _rows(figures, specimen)
     extensions, flow = _known_texts(rows, _EXTENSIONS), _known_texts(rows, _FLOW)
     if extensions:
-        extensions += _elongation(figures, length_mm or specimen.gauge_length_mm)
+        extensions = joined("", (extensions, _elongation(figures, length_mm or specimen.gauge_length_mm)))
     return [*figures.notes, *(line for line in (extensions, _true_line(figures, specimen), flow) if line)]
 
 
@@ -328,9 +363,10 @@ def _true_line(figures: TensileFigures, specimen: SpecimenConfig) -> str:
     if not (strain.known and figures.Ag.known and strength.known and specimen.area_m2):
         return ""
     stress, true_strain = true_at_top(strength, strain)
-    return (
-        f"true stress {figure_text(stress, 1e6, 'MPa')}, true strain {figure_text(true_strain, 0.01, '%')}"
-        " at the highest force"
+    return Message(
+        "true stress {stress}, true strain {strain} at the highest force",
+        figure_text(stress, 1e6, "MPa"),
+        figure_text(true_strain, 0.01, "%"),
     )
 
 
@@ -338,17 +374,18 @@ def _elongation(figures: TensileFigures, length_mm: float | None) -> str:
     """The elongation at the highest force and at break, mm; empty without a gauge length."""
     if not length_mm:
         return ""
-    totals = (("at the highest force", figures.Agt), ("at break", figures.At))
-    known = [f"{figure_text(one.over(1 / length_mm), 1, 'mm')} {when}" for when, one in totals if one.known]
-    return (
-        "  ("
-        + ", ".join([f"gauge length {length_mm:.4g} mm", *(f"elongation {words}" for words in known)])
-        + ")"
-    )
+    totals = ((Message("at the highest force"), figures.Agt), (Message("at break"), figures.At))
+    known = [
+        Message("elongation {length} {when}", figure_text(one.over(1 / length_mm), 1, "mm"), when)
+        for when, one in totals
+        if one.known
+    ]
+    words = joined(", ", [Message("gauge length {length:.4g} mm", length_mm), *known])
+    return Message("  ({words})", words)
 
 
 def _named(strain: str) -> str:
-    return f" ({strain})" if strain else ""
+    return Message(" ({strain})", strain) if strain else ""
 
 
 def _unknown_lines(rows: Mapping[str, TensileRow]) -> list[str]:
@@ -358,4 +395,4 @@ def _unknown_lines(rows: Mapping[str, TensileRow]) -> list[str]:
         figure = rows[key].figure
         if not figure.known and figure.applies:
             reasons.setdefault(figure.why, []).append(rows[key].name)
-    return [f"not known: {', '.join(words)} ({why})" for why, words in reasons.items()]
+    return [Message("not known: {names} ({why})", ", ".join(names), why) for why, names in reasons.items()]

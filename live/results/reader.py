@@ -241,7 +241,7 @@ class Strain(Closing):
         return f"<Strain {self.path.name}: {self.n} instants of {rows} x {columns} ZOIs, {self.strain_measure} strain>"
 
     def close(self) -> None:
-        """Close the file; again without effect."""
+        """Close the file; idempotent."""
         self._file.close()
 
 

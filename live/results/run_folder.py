@@ -319,7 +319,7 @@ class RunFolder(Closing):
         return f"<RunFolder {self.path}: {self.strain.n} instants>"
 
     def close(self) -> None:
-        """Close the files; again without effect."""
+        """Close the files; idempotent."""
         self.strain.close()
         for session in self._sessions:
             session.close()

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from acquire.load_cell import LoadLog
+from acquire.text import Message
+from acquire.text.message import joined
 from acquire.text.printable import brief, share_text
 from acquire.text.quantity import Amount
 from analysis.field import Blur
@@ -35,19 +37,24 @@ _CARD_EVERY_S = 1.0  # of the test
 def valid_line(history: History) -> str:
     """How many bursts were measured, and how many ZOIs have a value in the last of them."""
     last = history.time_steps[-1]
-    refused = f" ({last.refused})" if last.refused else ""
-    words = f"{last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}"
-    return f"measured {len(history.time_steps)} bursts, {words}"
+    refused = Message(" ({refused})", last.refused) if last.refused else ""
+    bursts, valid, zois = (Amount("count", n) for n in (len(history.time_steps), last.n_valid, last.n_zoi))
+    return Message(
+        "measured {bursts} bursts, {valid} of {zois} ZOIs valid in the last{refused}",
+        bursts, valid, zois, refused,
+    )  # fmt: skip
 
 
 def noise_line(history: History) -> str:
     """The noise of the picture and of the strain, typical of the run."""
     noise = history.column("noise_GL")
     noise = noise[np.isfinite(noise)]
-    picture = f"one frame {np.median(noise):.3g} GL, " if noise.size else ""
-    one = np.nanmedian(history.column("zoi_sigma")) * 1e6
-    mean = np.nanmedian(history.column("sigma_eyy")) * 1e6
-    return f"noise: {picture}strain of one ZOI {one:.3g} µm/m, of the region {mean:.2g} µm/m (predicted, 1 sigma)"
+    picture = Message("one frame {noise:.3g} GL, ", np.median(noise)) if noise.size else ""
+    one, mean = (float(np.nanmedian(history.column(name))) for name in ("zoi_sigma", "sigma_eyy"))
+    return Message(
+        "noise: {picture}strain of one ZOI {one}, of the region {mean} (predicted, 1 sigma)",
+        picture, Amount.rough("strain", one), Amount.rough("strain", mean, 2),
+    )  # fmt: skip
 
 
 def latency_lines(history: History) -> list[str]:
@@ -57,25 +64,37 @@ def latency_lines(history: History) -> list[str]:
         return []
     p50, p95 = np.nanpercentile(late, (50, 95))
     kernel = np.median(history.column("measure_s")) * 1e3
-    words = f"latency from the last frame of a burst: p50 {p50:.0f} ms, p95 {p95:.0f} ms"
-    return [f"{words}, largest {np.nanmax(late):.0f} ms; the kernel took {kernel:.1f} ms"]
+    return [
+        Message(
+            "latency from the last frame of a burst: p50 {p50:.0f} ms, p95 {p95:.0f} ms, largest {most:.0f} ms; "
+            "the kernel took {kernel:.1f} ms",
+            p50,
+            p95,
+            np.nanmax(late),
+            kernel,
+        )
+    ]
 
 
 def why_nothing(run_state: RunState) -> str:
     """Why no ZOI has a value, in one sentence."""
     time_steps, troubles = run_state.history.time_steps, run_state.event_log.events("warning", "error")
     if time_steps:
-        return f"nothing was measured: no ZOI has a value ({time_steps[-1].refused or 'no ZOI is active'})"
+        why = time_steps[-1].refused or Message("no ZOI is active")
+        return Message("nothing was measured: no ZOI has a value ({why})", why)
     if troubles:
-        return f"nothing was measured: {brief(troubles[-1].text)}"
-    grabbed = run_state.frame_counts.grabbed
-    return f"nothing was measured: {grabbed} frames gave no burst after the reference; take shorter bursts"
+        return Message("nothing was measured: {why}", brief(troubles[-1].text))
+    return Message(
+        "nothing was measured: {grabbed} frames gave no burst after the reference; take shorter bursts",
+        run_state.frame_counts.grabbed,
+    )
 
 
 def belief_lines(test: FinishedTest) -> list[str]:
     """Whether the figures can be believed: the checks made, and what the data say against the figures."""
     found = findings(test)
-    return [*film_line(test.specimen), checks_line(found), *(f"look: {text}" for text in doubts(found))]
+    looks = [Message("look: {text}", text) for text in doubts(found)]
+    return [*film_line(test.specimen), checks_line(found), *looks]
 
 
 def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
@@ -84,19 +103,22 @@ def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     valid = np.flatnonzero(history.column("n_valid"))
     if not valid.size:
         return [why_nothing(run_state)]
-    last, strains = history.time_steps[-1], history.column("largest")[valid]
-    largest = strains[np.argmax(np.abs(strains))]
-    part = share_text(last.least_share)
-    means = "  ".join(
-        f"{name} {Amount('strain', getattr(last, name), getattr(last, f'sigma_{name}'))}"
+    last, largest_ones = history.time_steps[-1], history.column("largest")[valid]
+    largest = largest_ones[np.argmax(np.abs(largest_ones))]
+    strains = {
+        name: Amount("strain", getattr(last, name), getattr(last, f"sigma_{name}"))
         for name in ("exx", "eyy", "exy")
-    )
-    means = f"none, {last.apart}" if last.apart else means
-    means = means if last.n_valid else f"no value, 0 of {last.n_zoi} ZOIs valid"
+    }
+    means = joined("  ", [joined(" ", one) for one in strains.items()])
+    means = Message("none, {why}", last.apart) if last.apart else means
+    means = means if last.n_valid else Message("no value, 0 of {zois} ZOIs valid", last.n_zoi)
     lines = [
         valid_line(history),
-        f"last strain of the region: {means}{f' {part}' if part else ''};"
-        f" largest of any ZOI {Amount('strain', largest)}",
+        Message(
+            "last strain of the region: {means}; largest of any ZOI {largest}",
+            joined(" ", (means, share_text(last.least_share))),
+            Amount("strain", largest),
+        ),
         noise_line(history),
     ]
     lines += sharpness_line(history.column("blur").tolist(), history.column("sigma_blur").tolist())
@@ -110,7 +132,7 @@ def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
 def file_lines(folder: Path) -> list[str]:
     """The files in ``folder``, with sizes."""
     return [
-        f"  {path}  ({path.stat().st_size / 1e6:.1f} MB)"
+        Message("  {path}  ({size})", path, Amount("size", path.stat().st_size))
         for path in sorted(folder.iterdir())
         if path.is_file() and path.stat().st_size
     ]
@@ -136,9 +158,10 @@ class StatusCard:
 
     def _lines(self, snapshot: Snapshot, history: History) -> list[str]:
         i, frames, lost = history.time_steps[-1], snapshot.frames, snapshot.lost
+        one, mean = Amount.rough("strain", i.zoi_sigma), Amount.rough("strain", i.sigma_eyy, 2)
         lines = [
             f"**{i.n_valid} of {i.n_zoi}** ZOIs valid" + (f" ({i.refused})" if i.refused else ""),
-            f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, region **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
+            f"one ZOI **{one}**, region **{mean}** (1 σ)",
         ]
         lines += film_line(self._specimen)
         blur = Blur(i.blur, i.sigma_blur).text

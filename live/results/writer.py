@@ -89,7 +89,7 @@ class Results(Closing):
         return self._h5.flush_when_due()
 
     def close(self) -> None:
-        """Close both files; again without effect."""
+        """Close both files; idempotent."""
         if self._closed:
             return
         self._closed = True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 
 from acquire.errors import PhasedicError
@@ -91,6 +92,7 @@ class CameraRun(Subscriber):
         plan = GrabPlan.of(prepared.config, prepared.bursts)
         self._seconds = plan.seconds
         self._keeper = StateKeeper(run_state, rig.load.info.address)
+        run_state.health.load_range_N = rig.load.info.capacity_N or math.nan
         stream.add(self._keeper, name)
         about = RunInfo(
             prepared.config,

@@ -106,7 +106,7 @@ class ReferenceSelector:
 
     def _moved(self, motion: ReferenceMotion) -> None:
         text = Message(
-            "the reference moved by {amount} px; keep the specimen still when strains must be absolute",
+            "the specimen moved by {amount} px while the reference was taken: keep it still for these frames",
             motion.amount,
         )
         self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "warning")

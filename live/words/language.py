@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.text import Message
-from acquire.text.message import filled
+from acquire.text.message import filled, formatted
 from acquire.text.quantity import Amount, decimal_mark
 
 log = logging.getLogger(__name__)
@@ -82,6 +82,13 @@ def said_here(text: str) -> str:
     return said(text, of_terminal())
 
 
+def told(text: object) -> str:
+    """A message or quantity in the language of the terminal; names and other texts as they are."""
+    if isinstance(text, Amount):
+        return str(text.printed(of_terminal()))
+    return said_here(text) if isinstance(text, Message) else str(text)
+
+
 def said(text: str, language: str) -> str:
     """A text in a language: its template translated, and its values filled in, texts among them likewise."""
     words = entries(language)
@@ -95,7 +102,7 @@ def said(text: str, language: str) -> str:
             return format(said(value, language), spec)
         if isinstance(value, Amount):
             return str(value.printed(language))
-        number = format(value, spec)
+        number = formatted(value, spec)
         return number.replace(".", decimal_mark(language)) if isinstance(value, float) else number
 
     try:

@@ -166,7 +166,11 @@ def test_poissons_ratio_between_strains_is_that_between_them_up_to_the_highest_s
     assert found.value == pytest.approx(0.4, rel=1e-6) and found.why == "strains 0.1 to 0.2 %"
     assert poisson_between(test, 2e-3, 4e-3).why == "strains 0.2 to 0.3 %"
     few = poisson_between(test, 1e-3, 1.21e-3)
-    assert few.why == "7 points between the strains 0.1 and 0.121 %, 8 are needed (the strain reaches 0.3 %)"
+    assert (
+        few.why
+        == "only 7 measurements between the strains 0.1 and 0.121 %, 8 are needed: take more pictures "
+        "there (the strain reaches 0.3 %)"
+    )
 
 
 def test_an_uneven_strain_is_looked_for_in_the_upper_half_of_the_interval() -> None:

@@ -178,11 +178,13 @@ def test_without_enough_points_nothing_is_made_up() -> None:
     ):
         found = evaluate_test(curve)
         assert not known(found)
-        assert ("test in compression" if found.kind == "compression" else "are known together") in found.E.why
+        assert (
+            "test in compression" if found.kind == "compression" else "have strain and a tensile force"
+        ) in found.E.why
     few = linear(fps=1.0)
     found = evaluate_test(noisy(few, 0))
     assert known(found) == {"Rm", "seconds"}
-    assert "8 that rise are needed" in found.E.why
+    assert "8 are needed: take more pictures there" in found.E.why
 
 
 def test_no_transverse_strain_leaves_nu_alone_unknown() -> None:

@@ -124,11 +124,11 @@ def test_slopes_are_of_the_elastic_strain_and_the_rest_of_the_other() -> None:
 @pytest.mark.parametrize(
     ("points", "why"),
     [
-        (7, r"strain and a tensile stress are known together at 7 points, 8 are needed"),
+        (7, r"only 7 measurements have strain and a tensile force, 8 are needed: .* right\?"),
         (
             8,
-            r"no elastic line: \d points between 10 % and 40 % of half of the highest stress, and 8 that rise are "
-            r"needed",
+            r"no elastic line: only \d measurements between 10 % and 40 % of half of the highest stress, 8 are needed: "
+            r"take more pictures there, or give modulus_between",
         ),
     ],
 )

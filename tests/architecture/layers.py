@@ -119,7 +119,12 @@ EXCEPT = {"analysis.compiled": "threading multiprocessing"}  # locks, and no thr
 # Numba takes half a second to import: these packages (and */*_loops.py) import it, others when first used.
 COMPILED = ("analysis.compiled", "analysis.picture", "analysis.fit", "analysis.follow")
 # These modules may read private attributes: numba's cache and the actions of argparse have no public interface.
-PRIVATE = ("analysis.compiled", "acquire.compiled_loops", "live.commands.completion")
+PRIVATE = (
+    "analysis.compiled",
+    "acquire.compiled_loops",
+    "live.commands.arguments",
+    "live.commands.completion",
+)
 # One file a protocol, one a command; the mocks stay flat.
 MANY_FILES = {"acquire.protocols", "hw_mocks", "live.commands"}
 MAX_FILES = 15

@@ -298,7 +298,7 @@ def test_an_armed_run_records_from_a_little_before_the_order_to_the_end_of_it(
     frame_counts = outcome.run_state.frame_counts
     assert frame_counts.adds_up and frame_counts.measured == 14 * 3 and not frame_counts.loss
     left = frame_counts.grabbed - frame_counts.recorded
-    assert f"not recorded 0 and {left} on purpose; adds up" in frame_counts.line()
+    assert f"not recorded 0 and {left} on purpose; every frame is accounted for" in frame_counts.line()
     session = str(folder / "session.h5")
     for extra in ([], ["--as-measured"]):
         again = out / str(len(extra))

@@ -124,6 +124,6 @@ def run_with(**values: list[float]) -> Any:
 
 def test_the_curves_of_the_report_are_marked() -> None:
     text = parts(run_with(area_share=[1.0, 0.9, 0.84], share_gauge_axial=[1.0, 1.0, 0.7]))
-    assert "2 of 3 instants, between 1.5 and 3 s" in text and "70 % at the least" in text
+    assert "2 of 3 instants, from 1.5 to 3 s" in text and "at least 70 %" in text
     assert parts(run_with(area_share=[1.0, 1.0, 1.0])) == ""
     assert parts(run_with(n_valid=[3.0, 2.0, 1.0])) == ""  # a file of an earlier version

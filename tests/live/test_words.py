@@ -82,7 +82,7 @@ KEYWORDS: dict[str, Any] = {
     "Message": None, "refusal": None, "Spoken": None, "PhasedicError": None, "ConfigError": None, "DataError": None,
     "DeviceError": None, "MachineUnfit": None, "Interrupted": None, "ControlRefused": None, "NotAllowed": None,
     "NotACamera": None, "DeviceFault": None, "GenicamError": None, "MachineError": None, "TooLittleMemory": None,
-    "bad_value": None,
+    "bad_value": None, "WireError": None,
 }  # fmt: skip
 FIELDS = re.compile(r"\{(\w+)[:}]")
 

@@ -39,6 +39,8 @@ class Health:
         Time of the test whose bursts have no force.
     peak_N : float, N
         The force of largest magnitude so far, with its sign; NaN before the first.
+    load_range_N : float, N
+        Of the load cell; NaN where it is not known.
     latency_p95_s : float, s
         Of the last seconds (``live.pipeline``).
     state : str
@@ -65,6 +67,7 @@ class Health:
     disk_t: float = math.nan
     without_force_s: float = 0.0
     peak_N: float = math.nan
+    load_range_N: float = math.nan
     latency_p95_s: float = math.nan
     state: str = ""
     view_port: int | None = None

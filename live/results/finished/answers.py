@@ -12,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from acquire.text import Message
+from acquire.text.message import joined
 from live.results.finished.findings import NO_FORCE, DataCheck, changes
 from live.results.finished.finished_test import FinishedTest
 from live.results.run_folder import SESSION
@@ -39,44 +41,62 @@ class MeasuredAgain:
     def of(cls, folder: Path, n_frames: float, skipped: int) -> MeasuredAgain:
         """Of a run or replay in ``folder``."""
         if not (folder / SESSION).exists():
-            return cls("the same command with", n_frames)
+            return cls(Message("the same command with"), n_frames)
         return cls(f"phasedic replay {shlex.quote(str(folder))}", n_frames, skipped)
 
 
 def checks_line(found: Sequence[DataCheck]) -> str:
     """Which checks of the data are good, which are in doubt, and which could not be made."""
-    words = {"good": "good", "doubt": "in doubt", "not checked": "not possible"}
+    words = {
+        "good": Message("good"), "doubt": Message("in doubt"), "not checked": Message("not possible"),
+    }  # fmt: skip
     names = {outcome: [one.name for one in found if one.outcome == outcome] for outcome in words}
     without = [one for one in found if one.text == NO_FORCE]
     if without:
-        names["not checked"] = [f"{len(without)} that need a force"]
-    parts = [f"{', '.join(held)} {words[outcome]}" for outcome, held in names.items() if held]
-    return f"checks of the data: {'; '.join(parts)}"
+        names["not checked"] = [Message("{n} that need a force", len(without))]
+    parts = [joined(" ", (joined(", ", held), words[outcome])) for outcome, held in names.items() if held]
+    return Message("checks of the data: {checks}", joined("; ", parts))
 
 
 def missing_lines(test: FinishedTest, again: MeasuredAgain) -> Iterator[str]:
     """What is missing for E and the rest, each with what to type."""
     section = "" if test.specimen.area_m2 else " --section W,T"
     if not test.has_force and not len(test.samples.t):
-        yield f"missing: forces, for E: {again.command} --load FORCES.csv{section}"
+        yield Message("missing: forces, for E: {command} --load FORCES.csv{section}", again.command, section)
     elif not test.has_force:
-        yield f"missing: forces at the time of the pictures, for E: {again.command} --load FORCES.csv --lag S"
+        yield Message(
+            "missing: forces at the time of the pictures, for E: {command} --load FORCES.csv --lag S",
+            again.command,
+        )
     elif not test.figures.E.known and test.figures.kind == "tensile":
         yield _more_points(test, again)
     elif section and test.figures.E.known:
-        yield f"missing: the section in mm, for E in GPa: {again.command}{section}"
+        yield Message("missing: the section in mm, for E in GPa: {command}{section}", again.command, section)
     if test.has_force and test.axis.assumed:
-        yield f"missing: the axis of the load ({test.axis.axis} is assumed): {again.command} --axis x or y"
+        yield Message(
+            "missing: the axis of the load ({axis} is assumed): {command} --axis x or y",
+            test.axis.axis,
+            again.command,
+        )
     if again.skipped:
-        yield f"missing: {again.skipped} frames came too fast to be measured: {again.command} measures them"
+        yield Message(
+            "missing: {skipped} frames came too fast to be measured: {command} measures them",
+            again.skipped,
+            again.command,
+        )
 
 
 def _more_points(test: FinishedTest, again: MeasuredAgain) -> str:
     """What gives the elastic line more points."""
     stress = test.curve.stress[np.isfinite(test.curve.stress)]
     if not changes(stress, 0.0):
-        return "missing: a force that changes, for E: look at load cell and file of forces"
-    what = "missing: points while the force rises, for E"
+        return Message("missing: a force that changes, for E: look at load cell and file of forces")
     if again.n_frames > 1:
-        return f"{what}: {again.command} --burst 1 gives {again.n_frames:.3g} times as many"
-    return f"{what}: take more pictures there, or pull more slowly"
+        return Message(
+            "missing: points while the force rises, for E: {command} --burst 1 gives {n:.3g} times as many",
+            again.command,
+            again.n_frames,
+        )
+    return Message(
+        "missing: points while the force rises, for E: take more pictures there, or pull more slowly"
+    )

@@ -11,6 +11,7 @@ from typing import Any
 
 from acquire.errors import DataError, PhasedicError
 from acquire.events import EventKind
+from acquire.text import Message
 from analysis.evaluate import CONFIDENCE, Figure
 from analysis.evaluate.elastic import FILM
 from live.config.loading import Config
@@ -27,7 +28,7 @@ COUNTS = ("grabbed", "recorded", "measured", "skipped", "lost", "without_force")
 _SI = {"MPa": "Pa", "GPa": "Pa", "kN": "N", "%": "1", "": "1"}
 NamedFigure = tuple[str, Figure, str]
 """Name, figure and SI unit."""
-_NO_SECTION = "the section is not known: give --section W,T"
+_NO_SECTION = Message("the section is not known: give --section W,T")
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.text import Message
+from acquire.text.quantity import Amount
 from analysis.evaluate import CONFIDENCE, Figure
 from analysis.evaluate.curve import noise
 from analysis.evaluate.figure import quantile
@@ -83,8 +84,9 @@ def _sign_of_force(test: FinishedTest) -> str | None:
     follows = float(np.corrcoef(strain, stress)[0, 1])
     longest = strain[np.argmax(np.abs(strain))]
     if follows < -_FOLLOWS:
-        way = "longer" if longest > 0 else "shorter"
-        sign = "negative" if np.median(stress[np.abs(stress) > np.abs(stress).max() / 2]) < 0 else "positive"
+        way = Message("longer") if longest > 0 else Message("shorter")
+        is_negative = np.median(stress[np.abs(stress) > np.abs(stress).max() / 2]) < 0
+        sign = Message("negative") if is_negative else Message("positive")
         return Message(
             "the force is {sign} where the specimen gets {way} along {axis}: give --load-sign -1, or --axis "
             "where that is not the axis of the load",
@@ -151,10 +153,9 @@ def _coverage(test: FinishedTest) -> str | None:
     if beyond > limit and len(seen) and np.abs(samples.values).max() > 1.01 * seen.max():
         most = samples.values[np.argmax(np.abs(samples.values))]
         return Message(
-            "the pictures end {beyond:.1f} s before the forces, which go on to {most:.4g} N; no picture shows "
-            "that",
+            "the pictures end {beyond:.1f} s before the forces, which go on to {most}; no picture shows that",
             beyond,
-            most,
+            Amount("force", float(most)),
         )
     return ""
 
@@ -166,17 +167,17 @@ def _lag(test: FinishedTest) -> str | None:
         return None
     if abs(lag.value) < max(LAG_MATTERS_S, _SIGMAS * _sigma(lag)):
         return ""
-    way = "behind" if lag.value > 0 else Message("ahead of")
+    way = Message("behind") if lag.value > 0 else Message("ahead of")
     total = lag.value + test.corrected_s
     text = figure_text(
         Figure(abs(lag.value), abs(lag.value) - _half(lag), abs(lag.value) + _half(lag)), 1e-3, "ms"
     )
     return Message(
-        "the force comes {text} ({CONFIDENCE:.0%}) {way} the pictures: --lag {total:.3f} corrects it",
+        "the force comes {text} ({CONFIDENCE:.0%}) {way} the pictures: --lag {total} corrects it",
         text,
         CONFIDENCE,
         way,
-        total,
+        f"{total:.3f}",
     )
 
 
@@ -233,9 +234,8 @@ def _reference_load(test: FinishedTest) -> str | None:
     if abs(force) <= max(_SIGMAS * sigma, _PRELOAD * float(np.abs(samples.values).max())):
         return ""
     return Message(
-        "the reference was taken under load: strains count from {force:.4g} N; take it before the load, or "
-        "tare",
-        force,
+        "the reference was taken under load: strains count from {force}; take it before the load, or tare",
+        Amount("force", force),
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.events import Event, EventKind
+from acquire.text import Message
 from analysis.evaluate import (
     Curve,
     Figure,
@@ -28,8 +29,8 @@ from live.results.figures import lag_of, tensile_options
 from live.results.finished.cycles import Cycles
 from live.results.run_folder import RunFolder
 
-NO_VALUE = "no ZOI has a value in the last burst"
-_NO_READINGS = "no readings of a load cell are there"
+NO_VALUE = Message("no ZOI has a value in the last burst")
+_NO_READINGS = Message("no readings of a load cell are there")
 REGION = ("exx", "eyy", "exy")
 
 
@@ -175,6 +176,6 @@ def _stored_at_end(run: RunFolder) -> dict[str, GaugeValue]:
         found[name] = GaugeValue(value, sigma, "" if math.isfinite(value) else NO_VALUE)
     for name, gauge in run.gauges.items():
         value, sigma = float(gauge.value[-1]), float(gauge.sigma[-1])
-        reason = "" if math.isfinite(value) else "the gauge has no value in the last burst"
+        reason = "" if math.isfinite(value) else Message("the gauge has no value in the last burst")
         found[f"gauge {name}"] = GaugeValue(value, sigma, reason)
     return found

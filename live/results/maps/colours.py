@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.text.quantity import unit_of
+from acquire.text.quantity import GAP, MINUS, decimal_mark, unit_of
 
 _SEQUENTIAL = "431480 39349c 1a51b0 046fa5 0187a1 029f9f 06b696 4acc7b 93d866 c9e35b faed5a"
 LINES = ("#0060ad", "#bd4a00", "#007a62", "#9a3a80", "#7a5c00", "#56606b")
@@ -153,7 +153,8 @@ def ticks(low: float, high: float, about: int = 5) -> list[float]:
     return [float(f"{k * step:.12g}") for k in range(first, math.floor(high / step + 1e-9) + 1)]
 
 
-def number(value: float) -> str:
+def number(value: float, language: str = "en") -> str:
     """A number for a tick: as short as it can be, thousands apart, a true minus sign."""
-    text = f"{abs(value):,.6g}".replace(",", "\u202f") if abs(value) < 1e7 else f"{abs(value):.3g}"
-    return f"−{text}" if value < 0 else text
+    text = f"{abs(value):,.6g}".replace(",", GAP) if abs(value) < 1e7 else f"{abs(value):.3g}"
+    text = text.replace(".", decimal_mark(language))
+    return MINUS + text if value < 0 else text

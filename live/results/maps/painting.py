@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
+from acquire.text import Message
 from analysis.field import ZoiGrid
 from live.results.maps.colours import ticks
 from live.results.maps.scale import OPACITY, ColourScale, StatusCount, status_colours, status_legend
@@ -178,7 +179,8 @@ class Painter:
 def caption(strain: Strain, row: int) -> str:
     """Time and force of an instant."""
     force = float(strain.values["force_N"][row])
-    return f"t = {strain.time_s[row]:.3f} s" + ("" if math.isnan(force) else f"   F = {force:.1f} N")
+    t = Message("t = {t:.3f} s", float(strain.time_s[row]))
+    return t if math.isnan(force) else t + Message("   F = {force:.1f} N", force)
 
 
 def _filled(values: NDArray[Any]) -> NDArray[np.float64]:

@@ -205,9 +205,9 @@ class ColourScale:
         """(length, 3): the colours from the lowest to the highest value."""
         return self._table[np.linspace(0, 255, length).round().astype(np.intp)]
 
-    def mark(self, value: float) -> str:
+    def mark(self, value: float, language: str = "en") -> str:
         """A value of the bar for a person; with a plus sign where zero is its middle."""
-        return "+" * (self.is_diverging and value > 0) + number(value)
+        return "+" * (self.is_diverging and value > 0) + number(value, language)
 
     @property
     def _table(self) -> Image:

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from acquire.text import Message
 from live.config.cameras import SIDES
 from live.pipeline.measurement import AXIAL
 from live.results.figures import headline
-from live.results.report.curves import force_unit, strain_unit
+from live.results.report.curves import TIME, axial_label, force_unit, load_labels, strain_label, strain_unit
 from live.results.report.evaluation import EvaluatedCurve, intercept_of
 from live.results.report.page import Html, element, page, paragraph, section, table
 from live.results.report.report import Report, budget_table, plots
@@ -17,9 +18,9 @@ from live.results.report.svg import COLOURS, Plot, PlotLine
 from live.results.run_folder import RunFolder
 from live.results.sides.together import SidesOfTest
 
-ALIKE = (
-    "The mean of both sides has neither bending nor motion towards a camera; front minus mean has both, which one"
-    " camera on each side cannot tell apart."
+ALIKE = Message(
+    "The mean of both sides has neither bending nor motion towards a camera; front minus mean has both, which one "
+    "camera a side cannot tell apart."
 )
 
 
@@ -41,17 +42,18 @@ def report_of_sides(front: RunFolder, back: RunFolder, reports: dict[str, str]) 
     stresses = front.specimen.area_m2 is not None
     figures = _stress_strain(sides, stresses), _over_time(sides, "mean"), _over_time(sides, "bending")
     parts = [
-        element("h1", f"{front.title}: front and back"),
-        paragraph(f"Test of {front.strain.start_utc}. {ALIKE}", "dim"),
-        section("Curves", plots(figures)),
-        section("Figures of the test", _figures(sides, stresses)),
-        section("Strains at the end", _strains(sides)),
+        element("h1", Message("{title}: front and back", front.title)),
+        paragraph(Message("Test of {start}. {alike}", front.strain.start_utc, ALIKE), "dim"),
+        section(Message("Curves"), plots(figures)),
+        section(Message("Figures of the test"), _figures(sides, stresses)),
+        section(Message("Strains at the end"), _strains(sides)),
         section(
-            "Budget of E of the mean", *budget_table(front, _evaluated(sides, stresses), both_sides=True)
+            Message("Budget of E of the mean"),
+            *budget_table(front, _evaluated(sides, stresses), both_sides=True),
         ),
-        section("The sides", *_links(reports)),
+        section(Message("The sides"), *_links(reports)),
     ]
-    return Report(page(f"{front.title}: phasedic report of two cameras", parts), figures)
+    return Report(page(Message("{title}: phasedic report of two cameras", front.title), parts), figures)
 
 
 def report_of_fields(runs: Mapping[str, RunFolder], reports: Mapping[str, str]) -> Report:
@@ -65,25 +67,33 @@ def report_of_fields(runs: Mapping[str, RunFolder], reports: Mapping[str, str]) 
         PlotLine(name, np.asarray(runs[name].strain.time_s, np.float64), curve.axial * e.factor, colour=k)
         for k, (name, curve) in enumerate(curves.items())
     )
-    figures = (Plot("strain-time", "Strain along the load", "time, s", f"strain, {e.name}", lines),)
-    heads = ("field", *(row.name for row in next(iter(found.values()))))
+    figures = (Plot("strain-time", Message("Strain along the load"), TIME, strain_label(e), lines),)
+    heads = (Message("field"), *(row.name for row in next(iter(found.values()))))
     rows = [(name, *(row.text for row in one)) for name, one in found.items()]
     budgets = [
-        section(f"Budget of E, {name}", *budget_table(runs[name], curve)) for name, curve in curves.items()
+        section(Message("Budget of E, {name}", name), *budget_table(runs[name], curve))
+        for name, curve in curves.items()
     ]
     parts = [
-        element("h1", f"{first.title}: {len(runs)} fields of view"),
-        paragraph(f"Test of {first.strain.start_utc}, with one load cell and one clock.", "dim"),
-        section("Curves", plots(figures)),
-        section("Figures of the test", table(heads, rows)),
+        element("h1", Message("{title}: {n} fields of view", first.title, len(runs))),
+        paragraph(
+            Message("Test of {start}, with one load cell and one clock.", first.strain.start_utc), "dim"
+        ),
+        section(Message("Curves"), plots(figures)),
+        section(Message("Figures of the test"), table(heads, rows)),
         *budgets,
-        section("The fields", *_links(reports)),
+        section(Message("The fields"), *_links(reports)),
     ]
-    return Report(page(f"{first.title}: phasedic report of {len(runs)} fields", parts), figures)
+    return Report(
+        page(Message("{title}: phasedic report of {n} fields", first.title, len(runs)), parts), figures
+    )
 
 
 def _links(reports: Mapping[str, str]) -> list[Html]:
-    return [element("p", element("a", f"report of the {side}", href=name)) for side, name in reports.items()]
+    links = (
+        (Message("report of the {side}", Message("{side}", side)), name) for side, name in reports.items()
+    )
+    return [element("p", element("a", words, href=name)) for words, name in links]
 
 
 def _evaluated(sides: SidesOfTest, stresses: bool) -> EvaluatedCurve:
@@ -96,8 +106,10 @@ def _evaluated(sides: SidesOfTest, stresses: bool) -> EvaluatedCurve:
 
 def _figures(sides: SidesOfTest, stresses: bool) -> Html:
     found = {where: headline(getattr(sides, where), stresses=stresses) for where in ("both", *SIDES)}
-    heads = ("by the strain of", *(row.name for row in found["both"]))
-    return table(heads, [(where, *(row.text for row in rows)) for where, rows in found.items()])
+    heads = (Message("by the strain of"), *(row.name for row in found["both"]))
+    return table(
+        heads, [(Message("{where}", where), *(row.text for row in rows)) for where, rows in found.items()]
+    )
 
 
 def _strains(sides: SidesOfTest) -> Html:
@@ -106,8 +118,10 @@ def _strains(sides: SidesOfTest) -> Html:
         known = np.flatnonzero(np.isfinite(one.mean))
         if len(known):
             k = known[-1]
-            rows.append((name, *(f"{values[k] * 1e6:.1f}" for values in (one.mean, one.bending, one.sigma))))
-    return table(("µm/m", "mean", "front minus mean", "sigma of either"), rows, (1, 2, 3))
+            ends = (values[k] * 1e6 for values in (one.mean, one.bending, one.sigma))
+            rows.append((name, *(Message("{strain:.1f}", end) for end in ends)))
+    heads = "µm/m", Message("mean"), Message("front minus mean"), Message("sigma of either")
+    return table(heads, rows, (1, 2, 3))
 
 
 def _over_time(sides: SidesOfTest, part: str) -> Plot:
@@ -119,14 +133,14 @@ def _over_time(sides: SidesOfTest, part: str) -> Plot:
         )
         for k, (name, value) in enumerate(found.items())
     )
-    title = "Mean of front and back" if part == "mean" else "Front minus mean"
-    return Plot(f"{part}-time", title, "time, s", f"strain, {e.name}", lines)
+    title = Message("Mean of front and back") if part == "mean" else Message("Front minus mean")
+    return Plot(f"{part}-time", title, TIME, strain_label(e), lines)
 
 
 def _stress_strain(sides: SidesOfTest, stresses: bool) -> Plot:
     """The load over the axial strain of each side and of the mean, at the instants of the front."""
     axial, load = sides.courses[AXIAL], sides.curve.stress
-    what, name, factor = ("stress", "MPa", 1e-6) if stresses else ("force", *_force(load))
+    name, factor = ("MPa", 1e-6) if stresses else _force(load)
     strains = {
         "mean": axial.mean,
         "front": axial.mean + axial.bending,
@@ -134,11 +148,11 @@ def _stress_strain(sides: SidesOfTest, stresses: bool) -> Plot:
     }
     e = strain_unit(*strains.values())
     lines = tuple(
-        PlotLine(side, strain * e.factor, load * factor, colour=k)
+        PlotLine(Message("{side}", side), strain * e.factor, load * factor, colour=k)
         for k, (side, strain) in enumerate(strains.items())
     )
-    title = f"{what.capitalize()} against strain"
-    return Plot("stress-strain", title, f"axial strain, {e.name}", f"{what}, {name}", lines)
+    title, up = load_labels(name, stresses=stresses)
+    return Plot("stress-strain", title, axial_label(e), up, lines)
 
 
 def _force(load: np.ndarray) -> tuple[str, float]:

@@ -10,14 +10,16 @@ from typing import TextIO
 import numpy as np
 
 from acquire.errors import ConfigError, DataError
+from acquire.text import Message
 from analysis.evaluate import CONFIDENCE
-from live.results.figures import TensileRow, figure_text, headline
-from live.results.report.curves import load_unit, strain_unit
+from live.results.figures import NOT_KNOWN, TensileRow, figure_text, headline
+from live.results.report.curves import axial_label, load_labels, load_unit, strain_unit
 from live.results.report.evaluation import EvaluatedCurve
 from live.results.report.page import Html, element, joined, page, paragraph, safe, section, table
 from live.results.report.report import Report, plots
 from live.results.report.svg import Plot, PlotLine
 from live.results.run_folder import RunFolder
+from live.words.language import told
 
 _MIN_RUNS = 2
 _MAX_LABELS = 50  # letters above the curves; longer names are replaced by numbers
@@ -73,16 +75,17 @@ def summary(values: Sequence[float]) -> tuple[float, float, int]:
 def compare(tests: Sequence[ComparedTest]) -> Report:
     """The report: the curves in one plot, and the table."""
     figures = (_together(tests),)
-    words = (
-        "E, nu and the strengths of each test, as in its own report, with half of the interval"
-        f" ({CONFIDENCE:.0%}); mean and standard deviation are over the tests."
+    words = Message(
+        "E, nu and the strengths of each test, as in its own report, with half of the interval ({CONFIDENCE:.0%}); "
+        "mean and standard deviation are over the tests.",
+        CONFIDENCE,
     )
     parts = [
-        element("h1", f"Comparison of {len(tests)} tests"),
-        section("Curves", plots(figures)),
-        section("Figures", paragraph(words, "dim"), _table(tests)),
+        element("h1", Message("Comparison of {n} tests", len(tests))),
+        section(Message("Curves"), plots(figures)),
+        section(Message("Figures"), paragraph(words, "dim"), _table(tests)),
     ]
-    return Report(page("Comparison of tests", parts), figures)
+    return Report(page(Message("Comparison of tests"), parts), figures)
 
 
 def write_table(tests: Sequence[ComparedTest], file: TextIO) -> None:
@@ -121,14 +124,13 @@ def _together(tests: Sequence[ComparedTest]) -> Plot:
         PlotLine(names[k], test.curve.axial * e.factor, test.curve.load * load.factor, colour=k)
         for k, test in enumerate(tests)
     )
-    what = "stress" if tests[0].curve.is_stress else "force"
-    return Plot("comparison", f"{what.capitalize()} against strain", f"axial strain, {e.name}",
-                  f"{what}, {load.name}", lines)  # fmt: skip
+    title, up = load_labels(load.name, stresses=tests[0].curve.is_stress)
+    return Plot("comparison", title, axial_label(e), up, lines)
 
 
 def _table(tests: Sequence[ComparedTest]) -> Html:
     figures = _rows(tests)
-    heads = ["", *(row.column.replace("_", ", ") for row, *_ in figures), "strain of E and nu"]
+    heads = ["", *(row.column.replace("_", ", ") for row, *_ in figures), Message("strain of E and nu")]
     rows: list[list[object]] = [
         [
             f"{k + 1} {test.title}",
@@ -138,8 +140,8 @@ def _table(tests: Sequence[ComparedTest]) -> Html:
         for k, test in enumerate(tests)
     ]
     found = [_summary(of_tests) for of_tests in figures]
-    rows.append(["mean", *(_number(mean) for mean, _, _ in found), ""])
-    rows.append(["standard deviation", *(_number(deviation) for _, deviation, _ in found), ""])
+    rows.append([Message("mean"), *(_number(mean) for mean, _, _ in found), ""])
+    rows.append([Message("standard deviation"), *(_number(deviation) for _, deviation, _ in found), ""])
     rows.append(["n", *(str(n) for _, _, n in found), ""])
     return joined([table(heads, rows, tuple(range(1, len(heads))))])
 
@@ -147,9 +149,9 @@ def _table(tests: Sequence[ComparedTest]) -> Html:
 def _cell(row: TensileRow) -> Html:
     """Value and half of the interval in the unit of the column; where it is not known, the reason as a tooltip."""
     if not row.figure.known:
-        return element("span", "not known", title=row.figure.why)
+        return element("span", NOT_KNOWN, title=told(row.figure.why))
     return safe(figure_text(row.figure))
 
 
 def _number(value: float) -> str:
-    return f"{value:.4g}" if math.isfinite(value) else "not known"
+    return Message("{value:.4g}", value) if math.isfinite(value) else NOT_KNOWN

@@ -6,13 +6,16 @@ import math
 
 import numpy as np
 
+from acquire.text import Message
 from analysis.evaluate import true_curve
+from live.config.gauges import gauge_colours
 from live.results.maps.colours import Unit, unit_for
 from live.results.report.evaluation import EvaluatedCurve
-from live.results.report.svg import COLOURS, Array, Mark, Plot, PlotLine
+from live.results.report.svg import Array, Mark, Plot, PlotLine
 from live.results.run_folder import RunFolder
 
 _NAMES = ("exx", "eyy", "exy")
+TIME = Message("time, s")
 
 
 def load_unit(curve: EvaluatedCurve) -> Unit:
@@ -28,6 +31,11 @@ def force_unit(force: Array) -> Unit:
     return unit_for(largest, "force")
 
 
+def strain_label(e: Unit) -> str:
+    """An axis of strains."""
+    return Message("strain, {unit}", e.name)
+
+
 def strain_unit(*strains: Array) -> Unit:
     """% or µm/m, from the largest of ``strains``."""
     values = [np.abs(e[np.isfinite(e)]) for e in strains]
@@ -37,24 +45,33 @@ def strain_unit(*strains: Array) -> Unit:
 def stress_strain(curve: EvaluatedCurve) -> Plot:
     """Stress (or force) over axial strain with the line of E and the construction of Rp0.2."""
     e, load, figures = strain_unit(curve.axial), load_unit(curve), curve.figures
-    curves = [PlotLine("measured", curve.axial * e.factor, curve.load * load.factor)]
+    curves = [PlotLine(Message("measured"), curve.axial * e.factor, curve.load * load.factor)]
     marks = []
     if figures.E.known and math.isfinite(curve.intercept):
         label = "E" if curve.is_stress else "EA"
         curves.append(_straight(curve, label, 0.0, e, load))
     if figures.Rp02.known:
-        curves.append(_straight(curve, "0.2 % offset", 0.002, e, load))
+        curves.append(_straight(curve, Message("{offset:g} % offset", 0.2), 0.002, e, load))
         strain = 0.002 + (figures.Rp02.value - curve.intercept) / figures.E.value
         name = "Rp0.2" if curve.is_stress else "Fp0.2"
         proof = figures.Rp02.value * load.factor
-        marks.append(Mark(strain * e.factor, proof, name, f"{proof:.4g} {load.name}"))
+        marks.append(Mark(strain * e.factor, proof, name, Message("{proof:.4g} {unit}", proof, load.name)))
     if figures.Rm.known:
         marks.append(_highest(curve, e, load))
-    what = "stress" if curve.is_stress else "force"
-    title = f"{what.capitalize()} against strain"
-    return Plot(
-        "stress-strain", title, f"axial strain, {e.name}", f"{what}, {load.name}", tuple(curves), tuple(marks)
-    )
+    title, up = load_labels(load.name, stresses=curve.is_stress)
+    return Plot("stress-strain", title, axial_label(e), up, tuple(curves), tuple(marks))
+
+
+def load_labels(unit: str, *, stresses: bool) -> tuple[str, str]:
+    """The title of a curve of the test, and its upward axis."""
+    if stresses:
+        return Message("Stress against strain"), Message("stress, {unit}", unit)
+    return Message("Force against strain"), Message("force, {unit}", unit)
+
+
+def axial_label(e: Unit) -> str:
+    """The axis of the strain along the load."""
+    return Message("axial strain, {unit}", e.name)
 
 
 def true_stress_strain(curve: EvaluatedCurve) -> Plot | None:
@@ -64,17 +81,16 @@ def true_stress_strain(curve: EvaluatedCurve) -> Plot | None:
     strain, stress = true_curve(curve.axial, curve.load)
     e, unit = strain_unit(strain), load_unit(curve)
     line = PlotLine("", strain * e.factor, stress * unit.factor)
-    heads = (f"true strain, {e.name}", f"true stress, {unit.name}")
-    return Plot(
-        "true-stress-strain", "True stress against true strain up to the highest force", *heads, (line,)
-    )
+    heads = Message("true strain, {unit}", e.name), Message("true stress, {unit}", unit.name)
+    title = Message("True stress against true strain up to the highest force")
+    return Plot("true-stress-strain", title, *heads, (line,))
 
 
 def _highest(curve: EvaluatedCurve, e: Unit, load: Unit) -> Mark:
     """The point of the highest stress or force."""
     top, name = curve.figures.Rm.value * load.factor, "Rm" if curve.is_stress else "Fm"
     strain = curve.axial[int(np.nanargmax(np.where(np.isfinite(curve.axial), curve.load, np.nan)))]
-    return Mark(strain * e.factor, top, name, f"{top:.4g} {load.name}")
+    return Mark(strain * e.factor, top, name, Message("{top:.4g} {unit}", top, load.name))
 
 
 def _straight(curve: EvaluatedCurve, label: str, offset: float, e: Unit, load: Unit) -> PlotLine:
@@ -93,14 +109,8 @@ def mean_strains(run: RunFolder) -> Plot:
         PlotLine(name, t, mean * e.factor, np.asarray(values[f"sigma_{name}"], np.float64) * e.factor, colour)
         for colour, (name, mean) in enumerate(zip(_NAMES, found, strict=True))
     )
-    return Plot(
-        "strain-time",
-        "Strains of the region",
-        "time, s",
-        f"strain, {e.name}",
-        curves,
-        x_range=time_range(run),
-    )
+    title = Message("Strains of the region")
+    return Plot("strain-time", title, TIME, strain_label(e), curves, x_range=time_range(run))
 
 
 def gauge_strains(run: RunFolder) -> Plot | None:
@@ -109,13 +119,13 @@ def gauge_strains(run: RunFolder) -> Plot | None:
     if not found:
         return None
     e = strain_unit(*(gauge.value for gauge in found.values()))
+    colours = gauge_colours({name: gauge.described for name, gauge in found.items()})
     curves = tuple(
-        PlotLine(name, run.strain.time_s, gauge.value * e.factor, gauge.sigma * e.factor, k % COLOURS)
-        for k, (name, gauge) in enumerate(found.items())
+        PlotLine(name, run.strain.time_s, gauge.value * e.factor, gauge.sigma * e.factor, colours[name])
+        for name, gauge in found.items()
     )
-    return Plot(
-        "gauges-time", "Virtual gauges", "time, s", f"strain, {e.name}", curves, x_range=time_range(run)
-    )
+    title = Message("Virtual gauges")
+    return Plot("gauges-time", title, TIME, strain_label(e), curves, x_range=time_range(run))
 
 
 def force(run: RunFolder) -> Plot | None:
@@ -125,7 +135,8 @@ def force(run: RunFolder) -> Plot | None:
         return None
     unit = force_unit(f)
     curve = PlotLine("", t, f * unit.factor)
-    return Plot("force-time", "Force", "time, s", f"force, {unit.name}", (curve,), x_range=time_range(run))
+    up = Message("force, {unit}", unit.name)
+    return Plot("force-time", Message("Force"), TIME, up, (curve,), x_range=time_range(run))
 
 
 def valid_share(run: RunFolder) -> Plot:
@@ -134,8 +145,9 @@ def valid_share(run: RunFolder) -> Plot:
     share = 100.0 * np.asarray(values["n_valid"], np.float64) / np.maximum(values["n_zoi"], 1)
     curve = PlotLine("", run.strain.time_s, share)
     return Plot(
-        "valid-time", "ZOIs with a value", "time, s", "share, %", (curve,), (), time_range(run), (0.0, 100.0)
-    )
+        "valid-time", Message("ZOIs with a value"), TIME, Message("share, %"), (curve,), (), time_range(run),
+        (0.0, 100.0),
+    )  # fmt: skip
 
 
 def parts(run: RunFolder) -> str:
@@ -148,10 +160,11 @@ def parts(run: RunFolder) -> str:
     if not rows.size:
         return ""
     first, last = (float(run.strain.time_s[row]) for row in (rows[0], rows[-1]))
-    return (
-        f"A block of ZOIs had no value at {rows.size} of {len(shares)} instants, between {first:.4g} and {last:.4g} s:"
-        f" the strains there stand for part of their area, {100 * shares.min():.0f} % at the least."
-    )
+    return Message(
+        "A block of ZOIs had no value at {rows} of {all} instants, from {first:.4g} to {last:.4g} s: strains there "
+        "stand for part of their area, at least {least:.0f} %.",
+        rows.size, len(shares), first, last, 100 * shares.min(),
+    )  # fmt: skip
 
 
 def time_range(run: RunFolder) -> tuple[float, float]:

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
+from acquire.text.message import joined
 from analysis.evaluate import TensileFigures, evaluate_test, neck
 from live.results.figures import tensile_options
 from live.results.run_folder import RunFolder
@@ -77,22 +79,22 @@ def intercept_of(axial: Array, load: Array, figures: TensileFigures) -> float:
 
 def time_steps(run: RunFolder, curve: EvaluatedCurve) -> dict[int, str]:
     """Row -> name: first, elastic, yield, highest force, last; each row once, in order of time."""
-    found = {0: ["first"]}
+    found = {0: [Message("first")]}
 
-    def add(row: int, words: str) -> None:
+    def add(row: int, words: Message) -> None:
         found.setdefault(row, []).append(words)
 
     elastic = np.flatnonzero(curve.elastic)
     if len(elastic):
-        add(int(elastic[len(elastic) // 2]), "elastic")
+        add(int(elastic[len(elastic) // 2]), Message("elastic"))
     if curve.figures.Rp02.known:
-        add(_yield_row(curve), "yield (0.2 %)")
+        add(_yield_row(curve), Message("yield ({offset:g} %)", 0.2))
     if curve.has_load:
-        add(int(np.nanargmax(curve.load)), "highest force")
+        add(int(np.nanargmax(curve.load)), Message("highest force"))
     elif np.isfinite(curve.axial).any():
-        add(int(np.nanargmax(np.abs(curve.axial))), "largest strain")
-    add(run.strain.n - 1, "last")
-    return {row: ", ".join(words) for row, words in sorted(found.items())}
+        add(int(np.nanargmax(np.abs(curve.axial))), Message("largest strain"))
+    add(run.strain.n - 1, Message("last"))
+    return {row: joined(", ", words) for row, words in sorted(found.items())}
 
 
 def _yield_row(curve: EvaluatedCurve) -> int:
@@ -112,14 +114,15 @@ def neck_line(run: RunFolder, curve: EvaluatedCurve) -> str:
     if found is None:
         return ""
     scale, (begin, end) = run.mm_per_px, (run.strain.time_s[row] for row in (top, last))
-    mm = f" ({found.x * scale:.1f}, {found.y * scale:.1f} mm)" if scale else ""
-    return (
-        f"neck at x, y = {found.x:.0f}, {found.y:.0f} px{mm}: from the highest force at {begin:.4g} s to {end:.4g} s"
-        f" the strain there grew by {100 * found.growth:.2g} %, elsewhere by {100 * found.elsewhere:.2g} %"
-    )
+    mm = Message(" ({x:.1f}, {y:.1f} mm)", found.x * scale, found.y * scale) if scale else ""
+    return Message(
+        "neck at x, y = {x:.0f}, {y:.0f} px{mm}: from {begin:.4g} s (highest force) to {end:.4g} s the strain grew "
+        "there by {growth:.2g} %, elsewhere by {elsewhere:.2g} %",
+        found.x, found.y, mm, begin, end, 100 * found.growth, 100 * found.elsewhere,
+    )  # fmt: skip
 
 
 def nearest_rows(run: RunFolder, times: Sequence[float]) -> dict[int, str]:
     """Row -> "chosen" of the instants nearest to ``times``, s."""
     t = run.strain.time_s
-    return {int(np.argmin(np.abs(t - time))): "chosen" for time in sorted(times)}
+    return {int(np.argmin(np.abs(t - time))): Message("chosen") for time in sorted(times)}

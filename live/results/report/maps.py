@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from acquire.frame import CameraInfo
+from acquire.text import Message
+from acquire.text.message import about
 from live.results.maps.colours import ticks
 from live.results.maps.painting import Levels, Painter, caption
 from live.results.maps.scale import ColourScale, status_legend
@@ -20,6 +22,7 @@ from live.results.report.page import Html, captioned, element, joined, paragraph
 from live.results.response.stored import FATE
 from live.results.response.words import response_lines, response_title
 from live.results.run_folder import RunFolder
+from live.words.language import of_terminal
 
 _QUALITY = 80
 _STEPS = 48  # colours of the bar
@@ -67,18 +70,17 @@ def maps(
     pairs = []
     for row, words in time_steps.items():
         base = painter.picture(pictures.images[row], pictures.levels)
-        beside = [_picture(painter.over(base, row), f"{name}, {words}")]
+        beside = [_picture(painter.over(base, row), Message("{name}, {words}", name, words))]
         if pictures.images[row] is not None:
-            beside.insert(0, _picture(base, f"picture, {words}"))
+            beside.insert(0, _picture(base, Message("picture, {words}", words)))
         pairs.append(
-            captioned(element("div", joined(beside, "")), f"{words}: {caption(run.strain, row)}", "pair")
+            captioned(element("div", joined(beside, "")), about(words, caption(run.strain, row)), "pair")
         )
-    words = quantity_of(name).words
-    bar = captioned(
-        _bar(name, scale),
-        f"{words}; values beyond the ends have the colour of the end; no colour: no value",
-        "bar",
+    ends = Message(
+        "{words}; values beyond the ends have the colour of the end; no colour: no value",
+        quantity_of(name).words,
     )
+    bar = captioned(_bar(name, scale), ends, "bar")
     return joined(
         [element("h3", f"{name}, {scale.unit}"), bar, element("div", joined(pairs), class_="pairs")]
     )
@@ -94,7 +96,9 @@ def whole_maps(run: RunFolder, row: int, pictures: MapPictures, longest: int) ->
         scale = ColourScale.of_run(run.strain, name, [row])
         painter = Painter(run.strain, name, scale, pictures.size, longest)
         base = painter.picture(pictures.images.get(row), pictures.levels)
-        picture = _picture(painter.over(base, row, values, moved=False), f"{name} of each place")
+        picture = _picture(
+            painter.over(base, row, values, moved=False), Message("{name} of each place", name)
+        )
         words = f"{response_title(run.strain, name)}{f', {scale.unit}' * bool(scale.unit)}; {quantity_of(name).words}"
         shown.append(captioned(joined([picture, _bar(name, scale)], ""), words))
     lines = [paragraph(line) for line in response_lines(run.strain)]
@@ -105,11 +109,11 @@ def statuses(run: RunFolder, row: int, pictures: MapPictures, longest: int) -> H
     """The statuses of the ZOIs at an instant: the map, and how many have each."""
     painter = Painter(run.strain, "status", None, pictures.size, longest)
     base = painter.picture(pictures.images.get(row), pictures.levels)
-    picture = _picture(painter.over(base, row), "status of each ZOI")
+    picture = _picture(painter.over(base, row), Message("status of each ZOI"))
     lines = []
     for one in status_legend(run.strain.maps("status", row)[run.strain.grid.active]):
         key = Html(f'<span class="key" style="background:rgb{one.rgb}"></span>')
-        lines.append(Html(f"<p>{key}{one.count} {safe(f'{one.name}: {one.text}')}</p>"))
+        lines.append(Html(f"<p>{key}{one.count} {safe(about(one.name, one.text))}</p>"))
     return joined([captioned(element("div", picture), caption(run.strain, row), "pair"), *lines])
 
 
@@ -133,10 +137,12 @@ def _bar(name: str, scale: ColourScale) -> Html:
         boxes += '<path class="zero" d="M250 4v14"/>'
     words = "".join(
         f'<text class="word" text-anchor="middle" x="{10 + 480 * (v - scale.low) / (scale.high - scale.low):.1f}"'
-        f' y="34">{safe(scale.mark(v))}</text>'
+        f' y="34">{safe(scale.mark(v, of_terminal()))}</text>'
         for v in ticks(scale.low, scale.high, about=7)
     )
-    label = safe(f"colours of {name} from {scale.low:g} to {scale.high:g} {scale.unit}")
+    ends = Message(
+        "colours of {name} from {low:g} to {high:g} {unit}", name, scale.low, scale.high, scale.unit
+    )
     return Html(
-        f'<svg class="plot" viewBox="0 0 500 40" role="img" aria-label="{label}">{boxes}{words}</svg>'
+        f'<svg class="plot" viewBox="0 0 500 40" role="img" aria-label="{safe(ends)}">{boxes}{words}</svg>'
     )

@@ -8,21 +8,23 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Mapping, Sequence
 
+from acquire.text.message import joined as texts
 from acquire.text.quantity import PLUS_MINUS, Printed
 from live.results.maps.colours import LINES, LINES_ON_DARK
 from live.results.report.svg import STYLE
+from live.words.language import of_terminal, told
 
 # A browser may only apply the page's own styles and show the pictures inside it.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 
 _LIGHT = (
     "--ground:#e9ecef;--panel:#fff;--sunk:#f3f5f7;--ink:#12171d;--soft:#4c5660;--line:#d5dae0;--edge:#76808b;"
-    "--look:#855000;--look-tint:#fcefd6;--bad:#b3261e;--bad-tint:#fce6e4;--grid:#e3e7eb"
+    "--good:#14683a;--look:#855000;--look-tint:#fcefd6;--bad:#b3261e;--bad-tint:#fce6e4;--grid:#e3e7eb"
     + "".join(f";--c{k}:{line}" for k, line in enumerate(LINES, 1))
 )
 _DARK = (
     "--ground:#0d1115;--panel:#171c22;--sunk:#10151a;--ink:#eef2f5;--soft:#abb5bf;--line:#2d353e;--edge:#7c8792;"
-    "--look:#f0b952;--look-tint:#38290c;--bad:#ff9289;--bad-tint:#421a17;--grid:#262d35"
+    "--good:#63cd90;--look:#f0b952;--look-tint:#38290c;--bad:#ff9289;--bad-tint:#421a17;--grid:#262d35"
     + "".join(f";--c{k}:{line}" for k, line in enumerate(LINES_ON_DARK, 1))
 )
 _CSS = (
@@ -41,6 +43,7 @@ p{max-width:62rem;margin:.4rem 0}.dim{color:var(--soft)}body>.dim{margin:.2rem .
 .panel{margin:.5rem 0;padding:.75rem;background:var(--panel);border:1px solid var(--line);border-radius:6px}
 .band{margin:.5rem 0;padding:.5rem .75rem;max-width:none;border:1px solid var(--line);border-left:8px solid var(--edge);
 border-radius:6px;background:var(--panel);font-weight:700}
+.band span{font-weight:400;color:var(--soft)}.band.good{border-left-color:var(--good);color:var(--good)}
 .band.look{border-left-color:var(--look);color:var(--look)}
 .band.bad{border-left-color:var(--bad);background:var(--bad-tint);color:var(--bad)}
 .tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(11rem,1fr));gap:.5rem;margin:.5rem 0}
@@ -74,8 +77,8 @@ class Html(str):
 
 
 def safe(words: object) -> Html:
-    """Text as markup; markup stays as it is."""
-    return words if isinstance(words, Html) else Html(html.escape(str(words)))
+    """Text as markup, messages in the language of the terminal; markup stays as it is."""
+    return words if isinstance(words, Html) else Html(html.escape(told(words)))
 
 
 def joined(parts: Iterable[Html], between: str = "\n") -> Html:
@@ -104,9 +107,10 @@ def fold(title: str, *parts: Html) -> Html:
     return Html(words) if inside else Html("")
 
 
-def band(words: object, kind: str) -> Html:
-    """A message over the whole width: ``look`` or ``bad``."""
-    return element("p", words, class_=f"band {kind}")
+def band(words: object, kind: str, more: str = "") -> Html:
+    """A message over the whole width, ``good``, ``look`` or ``bad``; ``more`` in plain letters."""
+    inside = joined([safe(words), *[element("span", more)] * bool(more)], " ")
+    return element("p", inside, class_=f"band {kind}")
 
 
 def paragraph(words: object, kind: str = "") -> Html:
@@ -143,7 +147,7 @@ def tiles(pairs: Mapping[str, Shown]) -> Html:
 
 def _tile(name: str, shown: Shown) -> str:
     (value, half, unit), remark = (Printed(shown, "", ""), "") if isinstance(shown, str) else shown
-    words = " ".join(filter(None, (f"{PLUS_MINUS} {half}" if half else "", remark)))
+    words = texts(" ", (f"{PLUS_MINUS} {half}" if half else "", remark))
     sigma = f'<p class="sigma">{safe(words)}</p>' if words else ""
     return (
         f'<section class="tile"><h3>{safe(name)}</h3><p class="value"><b>{safe(value)}</b> {safe(unit)}</p>'
@@ -161,7 +165,7 @@ def captioned(inside: Html, caption: str, kind: str = "") -> Html:
 def page(title: str, parts: Iterable[Html]) -> str:
     """The whole file."""
     return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<!DOCTYPE html>\n<html lang="{of_terminal()}">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{html.escape(_POLICY)}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{safe(title)}</title>\n<style>{STYLE}{_CSS}</style>\n</head>\n<body>\n"

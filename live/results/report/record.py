@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
 from acquire.text.quantity import Amount
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.event_log import counted_text
 from live.pipeline.repeats import Repeats
 from live.pipeline.screen import Screen
-from live.results.figures import figure_text
+from live.results.figures import NOT_KNOWN, figure_text
 from live.results.finished.finished_test import FinishedTest
 from live.results.folder import versions
 from live.results.maps.colours import unit_for
@@ -47,13 +48,15 @@ def gauges(run: RunFolder) -> Html:
     for name, gauge in run.gauges.items():
         e = unit_for(_largest(gauge.value))
         known = np.isfinite(gauge.value)
-        last = (
-            str(Amount("strain", gauge.value[-1], gauge.sigma[-1], unit=e.name)) if known[-1] else "not known"
-        )
+        last = Amount("strain", gauge.value[-1], gauge.sigma[-1], unit=e.name) if known[-1] else NOT_KNOWN
         words = "; ".join(f"{key} {_plain(value)}" for key, value in gauge.described.items())
-        largest = f"{_largest(gauge.value) * e.factor:.4g} {e.name}" if known.any() else "not known"
-        rows.append((name, words or "not recorded", largest, last, int(np.count_nonzero(~known))))
-    heads = ("gauge", "definition, px", "largest", "last ± sigma", "instants lost")
+        most = Amount("strain", float(f"{_largest(gauge.value):.4g}"), digits=2, unit=e.name)
+        lost = Amount("count", int(np.count_nonzero(~known)))
+        rows.append((name, words or Message("not recorded"), most if known.any() else NOT_KNOWN, last, lost))
+    heads = (
+        Message("gauge"), Message("definition, px"), Message("largest"), Message("last ± sigma"),
+        Message("instants lost"),
+    )  # fmt: skip
     return table(heads, rows, (2, 3, 4)) if rows else Html("")
 
 
@@ -71,24 +74,34 @@ def _plain(value: object) -> str:
 def times(run: RunFolder, test: FinishedTest) -> Html:
     """The lag of the load behind the frames, and the latency of the results."""
     lag = test.lag
-    words = figure_text(lag, 1e-3, "ms") if lag.known else f"not known: {lag.why}"
-    sign = f" ({CONFIDENCE:.0%} interval; positive: the load is late)" if lag.known else ""
+    words = Message("not known: {why}", lag.why)
+    if lag.known:
+        words = Message(
+            "{lag} ({CONFIDENCE:.0%} interval; positive: the load is late)",
+            figure_text(lag, 1e-3, "ms"),
+            CONFIDENCE,
+        )
     late = np.asarray(run.strain.values.get("latency_s", ()), np.float64) * 1e3
     late = late[np.isfinite(late)]
-    found = {
-        "lag of the load behind the frames": words + sign,
-        "lag corrected in the force": f"{test.corrected_s:g} s" if test.corrected_s else "none",
+    corrected = Message("{lag:g} s", test.corrected_s) if test.corrected_s else Message("none")
+    found: dict[str, object] = {
+        Message("lag of the load behind the frames"): words,
+        Message("lag corrected in the force"): corrected,
     }
     if late.size:
         p50, p95 = np.percentile(late, (50, 95))
-        found["from the last frame of a burst to its result"] = f"p50 {p50:.0f} ms, p95 {p95:.0f} ms"
+        late_text = Message("p50 {p50:.0f} ms, p95 {p95:.0f} ms", p50, p95)
+        found[Message("from the last frame of a burst to its result")] = late_text
     return facts(found)
 
 
 def frame_counts(run: RunFolder) -> Html:
     """The frame counts of the recording."""
     found = run.frame_counts
-    return facts(found) if found else paragraph("No frame counts were recorded.", "dim")
+    if not found:
+        return paragraph(Message("No frame counts were recorded."), "dim")
+    counts = {name: Amount("count", one) if isinstance(one, int) else one for name, one in found.items()}
+    return facts({Message("{what}", name): one for name, one in counts.items()})
 
 
 def events(run: RunFolder) -> Html:
@@ -99,7 +112,7 @@ def events(run: RunFolder) -> Html:
     found = list(repeats)
     rows = [
         (
-            f"{event.t - run.start_monotonic:.3f}",
+            Message("{t:.3f}", event.t - run.start_monotonic),
             element("span", event.level, class_=event.level),
             event.kind.value,
             event.source,
@@ -108,10 +121,11 @@ def events(run: RunFolder) -> Html:
         for event, count in found[:_MAX_EVENTS]
     ]
     if not rows:
-        return paragraph("No events were recorded.", "dim")
+        return paragraph(Message("No events were recorded."), "dim")
     left = len(found) - len(rows)
-    more = paragraph(f"{left} more events are in session.h5.", "warning") if left else Html("")
-    return joined([table(("time, s", "level", "kind", "source", "message"), rows, (0,)), more])
+    more = paragraph(Message("{left} more events are in session.h5.", left), "warning") if left else Html("")
+    heads = Message("time, s"), Message("level"), Message("kind"), Message("source"), Message("message")
+    return joined([table(heads, rows, (0,)), more])
 
 
 def definitions(run: RunFolder) -> Html:
@@ -131,7 +145,7 @@ def version_table(run: RunFolder) -> Html:
     then = {str(key): str(value) for key, value in run.strain.versions.items()}
     now = versions()
     rows = [(name, then.get(name, ""), now.get(name, "")) for name in {**then, **now}]
-    return table(("", "measured with", "report made with"), rows)
+    return table(("", Message("measured with"), Message("report made with")), rows)
 
 
 def hashes(run: RunFolder, screen: Screen) -> Html:
@@ -142,9 +156,9 @@ def hashes(run: RunFolder, screen: Screen) -> Html:
     rows = []
     for path in [*sorted(files), *beside]:
         screen.status(f"reading {path.name} for its hash")
-        size = f"{path.stat().st_size:,}".replace(",", "\u202f")
+        size = Amount("count", path.stat().st_size)
         rows.append((path.name, size, element("span", _sha256(path), class_="code")))
-    return table(("file", "bytes", "SHA-256"), rows, (1,))
+    return table((Message("file"), Message("bytes"), "SHA-256"), rows, (1,))
 
 
 def _sha256(path: Path) -> str:

@@ -10,12 +10,17 @@ import numpy as np
 
 from acquire.errors import DataError
 from acquire.hdf5 import storable
-from analysis.evaluate import CONFIDENCE
+from acquire.text import Message
+from acquire.text.message import joined as joined_texts
+from acquire.text.quantity import Amount
+from analysis.evaluate import AT_LEAST, CONFIDENCE
 from live.pipeline.screen import Screen
 from live.results.budget import CameraView, budget_cells
 from live.results.figures import (
+    NOT_KNOWN,
     TensileRow,
     axis_text,
+    beyond_scatter,
     budget_of,
     figure_lines,
     film_line,
@@ -23,10 +28,10 @@ from live.results.figures import (
     sharpness_line,
 )
 from live.results.finished.answers import MeasuredAgain, checks_line, missing_lines
+from live.results.finished.belief import belief
 from live.results.finished.figures_file import finished_in
-from live.results.finished.findings import doubts, findings
+from live.results.finished.findings import NO_FORCE, doubts, findings
 from live.results.finished.finished_test import FinishedTest
-from live.results.maps.colours import number
 from live.results.report import curves
 from live.results.report.cycles import cycle_plots, cycle_table
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
@@ -52,6 +57,7 @@ from live.results.report.record import definitions, events, frame_counts, gauges
 from live.results.report.svg import Plot, draw
 from live.results.row import LENS
 from live.results.run_folder import RunFolder
+from live.words.language import of_terminal, told
 
 MAX_BYTES = 5_000_000
 _SIDES = (720, 480, 320, 200)  # px, of the pictures: smaller ones where the page would be too large
@@ -110,7 +116,7 @@ def make_report(run: RunFolder, wanted: ReportRequest, screen: Screen) -> Report
         raise DataError("{path}: holds no measurement, there is nothing to report", run.strain.path)
     content = _content(run, wanted, screen)
     for side in _SIDES:
-        text = storable(page(f"{run.title}: phasedic report", _parts(content, wanted, side)))
+        text = storable(page(Message("{title}: phasedic report", run.title), _parts(content, wanted, side)))
         if len(text.encode()) < MAX_BYTES:
             break
     return Report(text, content.figures, content.test)
@@ -144,25 +150,25 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
     known = PracticeValues(run, pictures.camera, reference, content.still.floors, wanted.mm_per_px)
     return [
         _head(run, content.curve, content.test),
-        section("Specimen and rig", facts(_rig(run, pictures))),
-        section("Curves", plots(content.figures), _about_parts(run), _about_curves(content.curve)),
-        section("Figures of the test", *figure_table(run, content.curve)),
-        section("Cycles", plots(cycle_plots(content.test.cycles)), *cycle_table(content.test.cycles))
+        section(Message("Specimen and rig"), facts(_rig(run, pictures))),
+        section(Message("Curves"), plots(content.figures), _about_parts(run), _about_curves(content.curve)),
+        section(Message("Figures of the test"), *figure_table(run, content.curve)),
+        section(Message("Cycles"), plots(cycle_plots(content.test.cycles)), *cycle_table(content.test.cycles))
         if content.test.cycles.any
         else Html(""),
-        section("Budget of E", *budget_table(run, content.curve)),
-        section("Virtual gauges", gauges(run)),
-        section("Lag and latency", times(run, content.test)),
-        section("Maps", *(maps(run, name, chosen, pictures, side) for name in fields)),
-        section("Response of each place", *whole_maps(run, min(chosen), pictures, min(side, 480))),
-        section("Noise floor", *_noise_section(content)),
+        section(Message("Budget of E"), *budget_table(run, content.curve)),
+        section(Message("Virtual gauges"), gauges(run)),
+        section(Message("Lag and latency"), times(run, content.test)),
+        section(Message("Maps"), *(maps(run, name, chosen, pictures, side) for name in fields)),
+        section(Message("Response of each place"), *whole_maps(run, min(chosen), pictures, min(side, 480))),
+        section(Message("Noise floor"), *_noise_section(content)),
         *_sharpness_section(run),
         *_lens_section(run),
-        section("Status of the ZOIs", statuses(run, max(chosen), pictures, min(side, 480))),
-        section("Frame counts and events", frame_counts(run), events(run), *_unreadable(run)),
-        fold("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
-        fold("Definitions", definitions(run)),
-        fold("Versions and files", version_table(run), content.files),
+        section(Message("Status of the ZOIs"), statuses(run, max(chosen), pictures, min(side, 480))),
+        section(Message("Frame counts and events"), frame_counts(run), events(run), *_unreadable(run)),
+        fold(Message("Reporting table (iDICs Good Practices Guide)"), reporting_table(known)),
+        fold(Message("Definitions"), definitions(run)),
+        fold(Message("Versions and files"), version_table(run), content.files),
     ]
 
 
@@ -172,12 +178,16 @@ def _unreadable(run: RunFolder) -> list[Html]:
 
 def _head(run: RunFolder, curve: EvaluatedCurve, test: FinishedTest) -> Html:
     now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
-    words = f"Test of {run.strain.start_utc}: {run.strain.n} measurements in {run.strain.time_s[-1]:.4g} s."
-    unfinished = "The results were not closed by their writer; the report has all complete rows."
+    seconds = float(run.strain.time_s[-1])
+    words = Message(
+        "Test of {start}: {n} measurements in {seconds:.4g} s.", run.strain.start_utc, run.strain.n, seconds
+    )
+    made = Message(" Report made by phasedic on {now}.", now)
+    unfinished = Message("The results were not closed by their writer; the report has all complete rows.")
     return joined(
         [
             element("h1", run.title),
-            paragraph(f"{words} Report made by phasedic on {now}.", "dim"),
+            paragraph(words + made, "dim"),
             band(unfinished, "bad") if run.strain.unfinished else Html(""),
             tiles(_extent(run, curve)),
             *_answers(run, curve, test),
@@ -190,10 +200,14 @@ def _answers(run: RunFolder, curve: EvaluatedCurve, test: FinishedTest) -> list[
     found, counts = findings(test), run.frame_counts or {}
     n_frames = float(np.median(run.strain.values["n_frames"]))
     again = MeasuredAgain.of(run.path, n_frames, int(counts.get("skipped", 0)) * bool(counts.get("recorded")))
-    why = f"E is not known: {test.figures.E.why if test.has_force else 'no force is known'}."
+    why = Message("E is not known: {why}", test.figures.E.why if test.has_force else NO_FORCE)
+    warnings = [event.text for event in run.events if event.level != "info"]
+    rows, held = headline(curve.figures, stresses=curve.is_stress), beyond_scatter(curve.figures)
+    believed = belief(rows, [*doubts(found), *warnings], held)
     return [
-        paragraph(f"{checks_line(found)}."),
+        band(believed.words, believed.kind, believed.more),
         *(band(text, "look") for text in doubts(found)),
+        paragraph(checks_line(found) + "."),
         tiles(_tensile_tiles(curve)) if test.figures.E.known else paragraph(why, "open"),
         *(paragraph(text, "open") for text in missing_lines(test, again)),
     ]
@@ -206,7 +220,13 @@ def tensile(curve: EvaluatedCurve) -> dict[str, str]:
 
 def _tensile_tiles(curve: EvaluatedCurve) -> dict[str, Shown]:
     """``tensile`` in parts."""
-    return {row.name: (row.printed, row.remark) for row in _known(curve)} | _strain_of(curve)
+    language = of_terminal()
+    rows = {row.name: (row, row.quantity.printed(language)) for row in _known(curve)}
+    bound = f"{told(AT_LEAST)} "
+    return {
+        name: (shown._replace(value=bound * row.figure.is_bound + shown.value), row.remark)
+        for name, (row, shown) in rows.items()
+    } | _strain_of(curve)
 
 
 def _known(curve: EvaluatedCurve) -> list[TensileRow]:
@@ -216,16 +236,19 @@ def _known(curve: EvaluatedCurve) -> list[TensileRow]:
 def _strain_of(curve: EvaluatedCurve) -> dict[str, str]:
     """The strain that E and nu are of; nothing where E is not known."""
     modulus = headline(curve.figures, stresses=curve.is_stress)[0]
-    return {f"strain of {modulus.name}, nu": curve.figures.elastic_strain} if modulus.figure.known else {}
+    name = Message("strain of {modulus}, nu", modulus.name)
+    return {name: curve.figures.elastic_strain} if modulus.figure.known else {}
 
 
 def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
     values, e = run.strain.values, curves.strain_unit(curve.axial)
-    found = {"ZOIs with a value, last": f"{int(values['n_valid'][-1])} of {int(values['n_zoi'][-1])}"}
+    valid, zois = (Amount("count", int(values[name][-1])) for name in ("n_valid", "n_zoi"))
+    found: dict[str, str] = {Message("ZOIs with a value, last"): Message("{valid} of {zois}", valid, zois)}
     if np.isfinite(curve.axial).any():
-        largest = curve.axial[np.nanargmax(np.abs(curve.axial))] * e.factor
+        largest = curve.axial[np.nanargmax(np.abs(curve.axial))]
         name = curve.figures.strain or run.axial
-        found[f"largest {name}"] = f"{number(float(f'{largest:.4g}'))} {e.name}"
+        largest_text = joined_texts("", [Amount("strain", float(f"{largest:.4g}"), digits=2, unit=e.name)])
+        found[Message("largest {strain}", name)] = largest_text
     return found
 
 
@@ -233,26 +256,32 @@ def _rig(run: RunFolder, pictures: MapPictures) -> dict[str, object]:
     s, camera, grid = run.specimen, pictures.camera, run.strain.grid
     found: dict[str, object] = {str(key): value for key, value in run.strain.metadata.items()}
     known = s.width_mm is not None and s.thickness_mm is not None
-    found["section"] = (
-        f"{s.width_mm:g} mm x {s.thickness_mm:g} mm" if known else "not known: forces, no stresses"
+    found[Message("section")] = (
+        Message("{width:g} mm x {thickness:g} mm", s.width_mm, s.thickness_mm)
+        if known
+        else Message("not known: forces, no stresses")
     )
-    found["load along"] = f"{run.load_axis.axis} of the picture"
+    found[Message("load along")] = Message("{axis} of the picture", run.load_axis.axis)
     if direction := axis_text(run.load_axis):
-        found["direction of the load"] = direction
+        found[Message("direction of the load")] = direction
     if camera is not None:
-        fps = f", {camera.fps:g} frames/s" if camera.fps else ""
-        size = f"{camera.width} x {camera.height} px, {camera.bits} bits{fps}, clock: {camera.clock}"
-        found["camera"] = f"{camera.name}: {size}"
-    found["camera address"] = run.camera_address or "not recorded"
+        fps = Message(", {fps:g} frames/s", camera.fps) if camera.fps else ""
+        found[Message("camera")] = Message(
+            "{name}: {width} x {height} px, {bits} bits{fps}, clock: {clock}",
+            camera.name, camera.width, camera.height, camera.bits, fps, camera.clock,
+        )  # fmt: skip
+    found[Message("camera address")] = run.camera_address or Message("not recorded")
     cell = run.session.load_cell if run.session is not None else None
     if cell is not None:
-        found["load cell"] = cell.name + (f", capacity {cell.capacity_N:g} N" if cell.capacity_N else "")
+        capacity = Message(", capacity {N:g} N", cell.capacity_N) if cell.capacity_N else ""
+        found[Message("load cell")] = joined_texts("", (cell.name, capacity))
     warnings = [*(camera.warnings if camera else ()), *(cell.warnings if cell else ())]
     if warnings:
-        found["warnings of the devices"] = "; ".join(warnings)
-    found["ZOIs"] = (
-        f"{grid.n_active} of {grid.size} px, {grid.step} px apart, region x,y,w,h = {grid.roi.text} px"
-    )
+        found[Message("warnings of the devices")] = joined_texts("; ", warnings)
+    found["ZOIs"] = Message(
+        "{n} of {size} px, {step} px apart, region x,y,w,h = {roi} px",
+        Amount("count", grid.n_active), grid.size, grid.step, grid.roi.text,
+    )  # fmt: skip
     return found
 
 
@@ -272,18 +301,22 @@ def _about_parts(run: RunFolder) -> Html:
 
 def _about_curves(curve: EvaluatedCurve) -> Html:
     if not curve.has_load:
-        return paragraph("No force is known at any instant, so there is no stress-strain curve.", "dim")
-    words = "Bands: one standard uncertainty on either side."
+        none = Message("No force is known at any instant, so there is no stress-strain curve.")
+        return paragraph(none, "dim")
+    words = [Message("Bands: one standard uncertainty on either side.")]
     figures = curve.figures
     if not figures.E.known:
-        words += f" E is not known: {figures.E.why}."
+        words.append(Message("E is not known: {why}", figures.E.why))
     if figures.span is not None:
         low, high = (100 * strain for strain in figures.span.strain)
-        words += (
-            f" The elastic line has {figures.span.n} instants between the strains {low:.3g} and {high:.3g} %"
-            f" ({figures.standard}, R^2 {figures.r2:.5f}); intervals of E, nu and Rp0.2 are of {CONFIDENCE:.0%}."
-        )
-    return paragraph(words, "dim")
+        words.append(
+            Message(
+                "The elastic line has {n} instants between the strains {low:.3g} and {high:.3g} % ({standard}, R^2 "
+                "{r2:.5f}); intervals of E, nu and Rp0.2 are of {CONFIDENCE:.0%}.",
+                figures.span.n, low, high, figures.standard, figures.r2, CONFIDENCE,
+            )
+        )  # fmt: skip
+    return paragraph(joined_texts(" ", words), "dim")
 
 
 def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
@@ -291,7 +324,7 @@ def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
     if not curve.has_load:
         return []
     lines = [*figure_lines(curve.figures, run.specimen, run.gauge_length_mm), neck_line(run, curve)]
-    return [paragraph(line.strip().replace("  ", ", ")) for line in lines if line]
+    return [paragraph(told(line).replace("  ", ", ")) for line in lines if line]
 
 
 def _sharpness_section(run: RunFolder) -> list[Html]:
@@ -300,7 +333,7 @@ def _sharpness_section(run: RunFolder) -> list[Html]:
     lines = film_line(run.specimen)
     if "blur_px" in values:
         lines += sharpness_line(values["blur_px"].tolist(), values["sigma_blur_px"].tolist())
-    return [section("Sharpness", *(paragraph(line.replace("+-", "±")) for line in lines))] * bool(lines)
+    return [section(Message("Sharpness"), *map(paragraph, lines))] * bool(lines)
 
 
 def _lens_section(run: RunFolder) -> list[Html]:
@@ -312,47 +345,56 @@ def _lens_section(run: RunFolder) -> list[Html]:
     exx, eyy, sigma_exx, sigma_eyy = (
         1e6 * float(np.nanmax(one)) if np.isfinite(one).any() else math.nan for one in columns
     )
-    words = (
-        f"Calibrated {lens.get('date') or 'at a time not stated'}: {lens.get('method') or 'by others'}. Up to"
-        f" {exx:.3g} µm/m of exx and {eyy:.3g} of eyy of the region were the lens, known to"
-        f" {sigma_exx:.2g} and {sigma_eyy:.2g}; they are removed from all values."
-    )
-    return [section("Lens", paragraph(words))]
+    when = lens.get("date") or Message("at a time not stated")
+    words = Message("Calibrated {date}: {method}.", when, lens.get("method") or Message("by others"))
+    words += Message(
+        " Up to {exx:.3g} µm/m of exx and {eyy:.3g} of eyy of the region were the lens, known to {sigma:.2g} and "
+        "{sigma2:.2g}; they are removed from all values.",
+        exx, eyy, sigma_exx, sigma_eyy,
+    )  # fmt: skip
+    return [section(Message("Lens"), paragraph(words))]
 
 
 def budget_table(run: RunFolder, curve: EvaluatedCurve, *, both_sides: bool = False) -> list[Html]:
     """What the interval of E is made of, and what is not stated; ``both_sides``: of the mean of front and back."""
-    sharpness = "no change with the load" if "blur_px" in run.strain.values else "not known"
+    sharpness = Message("no change with the load") if "blur_px" in run.strain.values else NOT_KNOWN
     view = CameraView(run.stand_off_mm, run.readout_ms, bool(run.section("plate")), both_sides, sharpness)
     rows = budget_of(curve.figures, view, stresses=curve.is_stress)
     if not rows:
-        return [paragraph("E is not known, so it has no budget.", "open")]
+        return [paragraph(Message("E is not known, so it has no budget."), "open")]
     heads, *cells = budget_cells(rows, *(("GPa", 1e9) if curve.is_stress else ("kN", 1e3)))
     modulus = headline(curve.figures, stresses=curve.is_stress)[0]
-    words = (
-        "Standard uncertainties, of the strain at the end of the elastic interval and of E, combined as the GUM"
-        " (JCGM 100:2008) has it; limits of error are taken as even distributions. The interval of"
-        f" {CONFIDENCE:.0%} of {modulus.name} = {modulus.text} is that of all together. Rows with words are not in it."
+    words = Message(
+        "Standard uncertainties of strain (at the end of the elastic interval) and of E, combined by the GUM (JCGM "
+        "100:2008); limits of error are even distributions."
     )
-    return [paragraph(words), table(heads, cells, (1, 2, 3))]
+    whole = Message(
+        "The interval of {CONFIDENCE:.0%} of {name} = {text} is that of all together. Rows with words are not in it.",
+        CONFIDENCE, modulus.name, modulus.text,
+    )  # fmt: skip
+    return [paragraph(joined_texts(" ", (words, whole))), table(heads, cells, (1, 2, 3))]
 
 
 def _noise_section(content: _Content) -> list[Html]:
     n = content.still.time_steps
     if not content.still.floors:
-        words = (
-            "No still phase was found: fewer than two instants before anything moves. Keep the specimen at rest"
-            " for a few seconds at the start of a test to measure the noise floor."
+        words = Message(
+            "No still phase was found, so the noise floor is not known: keep the specimen at rest for a few seconds "
+            "at the start of a test."
         )
         return [paragraph(words, "open")]
     rows = []
     for name, noise in content.still.floors.items():
         factor, unit = (1.0, "px") if name in ("u", "v") else (1e6, "µm/m")
-        ratio = f"{noise.measured / noise.predicted:.2f}" if noise.predicted else "not known"
-        rows.append((name, f"{noise.measured * factor:.3g}", f"{noise.predicted * factor:.3g}", unit, ratio))
-    words = (
-        f"Standard deviation of single ZOIs in the first {n} instants (to {content.run.strain.time_s[n - 1]:.4g} s),"
-        " before anything moves: displacements about a plane, strains about their mean. Predicted: sigma of each"
-        " value, from the noise of the pictures."
+        ratio = Message("{ratio:.2f}", noise.measured / noise.predicted) if noise.predicted else NOT_KNOWN
+        both = (Message("{noise:.3g}", one * factor) for one in (noise.measured, noise.predicted))
+        rows.append((name, *both, unit, ratio))
+    words = Message(
+        "Standard deviation of single ZOIs in the first {n} instants (to {t:.4g} s): displacements about a plane, "
+        "strains about their mean.",
+        n,
+        float(content.run.strain.time_s[n - 1]),
     )
-    return [paragraph(words), table(("", "measured", "predicted", "", "ratio"), rows, (1, 2, 4))]
+    words += Message(" Predicted: sigma of each value, from the noise of the pictures.")
+    heads = ("", Message("measured"), Message("predicted"), "", Message("ratio"))
+    return [paragraph(words), table(heads, rows, (1, 2, 4))]

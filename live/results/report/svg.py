@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
 from live.results.maps.colours import LINES, number, ticks
+from live.words.language import of_terminal, told
 
 Array = NDArray[np.float64]
 WIDTH, HEIGHT = 580, 310
@@ -32,7 +34,7 @@ STYLE = """
 .curve{fill:none;stroke-width:2.25;stroke-linejoin:round}
 .d2{stroke-dasharray:9 4} .d3{stroke-dasharray:3 3} .d4{stroke-dasharray:11 3 3 3} .d5{stroke-dasharray:15 4}
 .d6{stroke-dasharray:2 5} .curve.dashed{stroke:var(--ink,#12171d);stroke-dasharray:6 4;stroke-width:1.2}
-.band{stroke:none;opacity:.25} .dot{fill:var(--ink,#12171d);stroke:var(--panel,#fff);stroke-width:2}
+polygon.band{stroke:none;opacity:.25} .dot{fill:var(--ink,#12171d);stroke:var(--panel,#fff);stroke-width:2}
 """
 COLOURS = len(LINES)
 STYLE += "".join(
@@ -123,7 +125,7 @@ def draw(figure: Plot, *, standalone: bool = False) -> str:
     style = (
         f'<style>{STYLE}</style><rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>' if standalone else ""
     )
-    words = html.escape(f"{figure.title}: {figure.y_label} over {figure.x_label}")
+    words = html.escape(": ".join(map(told, (figure.title, figure.y_label, figure.x_label))))
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{words}">',
         style,
@@ -170,11 +172,11 @@ def _frame(figure: Plot, axes: _Axes) -> Iterator[str]:
     for value in _marks(*axes.x):
         x = axes.across(value)
         yield f'<line class="grid" x1="{x:.1f}" y1="{_TOP}" x2="{x:.1f}" y2="{bottom}"/>'
-        yield _word(x, bottom + 16, number(value), "middle")
+        yield _word(x, bottom + 16, number(value, of_terminal()), "middle")
     for value in _marks(*axes.y):
         y = axes.down(value)
         yield f'<line class="grid" x1="{_LEFT}" y1="{y:.1f}" x2="{right}" y2="{y:.1f}"/>'
-        yield _word(_LEFT - 6, y + 4, number(value), "end")
+        yield _word(_LEFT - 6, y + 4, number(value, of_terminal()), "end")
     yield f'<path class="axis" d="M{_LEFT} {_TOP}V{bottom}H{right}"/>'
     yield _word(right, HEIGHT - 6, figure.x_label, "end")
     yield _word(4, 14, figure.y_label, kind="word ink")
@@ -187,7 +189,7 @@ def _marks(low: float, high: float) -> list[float]:
 
 
 def _word(x: float, y: float, words: str, anchor: str = "start", kind: str = "word") -> str:
-    return f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{html.escape(words)}</text>'
+    return f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{html.escape(told(words))}</text>'
 
 
 def _look(curve: PlotLine) -> str:
@@ -240,9 +242,8 @@ def _thinned(y: Array) -> NDArray[np.intp]:
 def _mark(mark: Mark, axes: _Axes) -> str:
     x, y = axes.across(mark.x), axes.down(mark.y)
     left = x > WIDTH - 150
-    words = _word(
-        x + (-8 if left else 8), y + 18, f"{mark.name} = {mark.value}", "end" if left else "start", "word ink"
-    )
+    name = Message("{name} = {value}", mark.name, mark.value)
+    words = _word(x + (-8 if left else 8), y + 18, name, "end" if left else "start", "word ink")
     return f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="5"/>{words}'
 
 
@@ -254,4 +255,4 @@ def _legend(curves: Sequence[PlotLine]) -> Iterator[str]:
             continue
         yield f'<path class="{_look(curve)}" d="M{x:.0f} 30h24"/>'
         yield _word(x + 29, 34, curve.label)
-        x += 44 + 6.6 * len(curve.label)
+        x += 44 + 6.6 * len(told(curve.label))

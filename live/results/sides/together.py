@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
+from acquire.text import Message
+from acquire.text.message import joined
 from analysis.evaluate import (
     CONFIDENCE,
     Course,
@@ -142,10 +144,10 @@ class SidesOfTest:
         """E, nu and strengths by the mean, by the front and by the back; ``stresses``: the section is known."""
         for where in ("both", *SIDES):
             rows = (row for row in headline(getattr(self, where), stresses=stresses) if row.figure.known)
-            known = "  ".join(f"{row.name} = {row.text}" for row in rows) or "no figure is known"
-            yield f"{where + ':':<7}{known}"
+            known = joined("  ", [Message("{name} = {text}", row.name, row.text) for row in rows])
+            yield Message("{where:<7}{known}", f"{where}:", known or Message("no figure is known"))
         if held := beyond_scatter(self.both):
-            yield f"±: {CONFIDENCE:.0%} interval, of E with {held}"
+            yield Message("±: {CONFIDENCE:.0%} interval, of E with {held}", CONFIDENCE, held)
 
 
 def longest_gap(t: NDArray[np.float64]) -> float:

@@ -146,7 +146,9 @@ def setup_of(message: Parcel) -> tuple[ViewSetup, ViewTarget]:
         target = ViewTarget(*(meta.pop(name) for name in ("port", "rrd", "recording")))
         return ViewSetup(grid=_grid(meta.pop("grid"), message), **meta), target
     except (KeyError, TypeError) as error:
-        raise WireError(f"the first message to the view has missing or unknown entries: {error}") from error
+        raise WireError(
+            "the first message to the view has missing or unknown entries: {why}", error
+        ) from error
 
 
 def row_of(measurement: Measurement) -> Row:
@@ -168,7 +170,7 @@ def rows_of(message: Parcel) -> list[Row]:
     """The content of ``rows_message``."""
     rows = _array(message, "rows")
     if rows.ndim != 2 or rows.shape[1] != COLUMNS[message.kind]:
-        raise WireError(f"a message {message.kind.name} to the view has rows {rows.shape}")
+        raise WireError("a message {kind} to the view has rows {shape}", message.kind.name, rows.shape)
     return [tuple(row) for row in rows.tolist()]
 
 
@@ -191,10 +193,13 @@ def field_of(message: Parcel) -> tuple[float, StrainField]:
         grid.shape
     }:
         raise WireError(
-            f"a field to the view has shapes {parameters.shape}, {covariance.shape}, {status.shape}"
+            "a field to the view has shapes {first}, {second}, {third}",
+            parameters.shape,
+            covariance.shape,
+            status.shape,
         )
     if covariance.shape[0] != 21:
-        raise WireError(f"a field to the view has {covariance.shape[0]} covariances")
+        raise WireError("a field to the view has {n} covariances", covariance.shape[0])
     nothing = np.zeros(grid.shape, np.float32)
     none = np.broadcast_to(nothing, covariance.shape)
     field = StrainField(
@@ -215,7 +220,7 @@ def picture_of(message: Parcel) -> PictureMessage:
     """The content of ``picture_message``."""
     image = _array(message, "image")
     if image.ndim != 2 or not image.size or image.dtype.kind != "u":
-        raise WireError(f"a picture to the view is {image.shape} of {image.dtype}")
+        raise WireError("a picture to the view is {shape} of {type}", image.shape, image.dtype)
     bits, step = (int(_number(message, name)) for name in ("bits", "step"))
     return PictureMessage(image, bits, _number(message, "t"), step)
 
@@ -233,7 +238,7 @@ def events_of(message: Parcel) -> list[Event]:
             for t, kind, source, text, level in message.meta["events"]
         ]
     except (KeyError, TypeError, ValueError) as error:
-        raise WireError(f"events to the view are damaged: {error}") from error
+        raise WireError("events to the view are damaged: {why}", error) from error
 
 
 def figures_message(snapshot: Snapshot) -> Parcel:
@@ -269,7 +274,7 @@ def figures_of(message: Parcel) -> Snapshot:
             figures=figures,
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise WireError(f"figures to the view are damaged: {error}") from error
+        raise WireError("figures to the view are damaged: {why}", error) from error
 
 
 def _figure(
@@ -293,25 +298,31 @@ def _measure(message: Parcel) -> Measure:
     for measure in measures:
         if name == measure:
             return measure
-    raise WireError(f"a field to the view has an unknown measure of strain {name!r}")
+    raise WireError("a field to the view has an unknown measure of strain {name}", repr(name))
 
 
 def _grid(description: Any, message: Parcel) -> ZoiGrid:
     try:
         return ZoiGrid.from_dict(description, _array(message, "active"))
     except (KeyError, TypeError, ValueError) as error:
-        raise WireError(f"a message {message.kind.name} to the view has no grid: {error}") from error
+        raise WireError(
+            "a message {kind} to the view has no grid: {why}", message.kind.name, error
+        ) from error
 
 
 def _array(message: Parcel, name: str) -> NDArray[Any]:
     try:
         return message.arrays[name]
     except KeyError:
-        raise WireError(f"a message {message.kind.name} to the view has no array {name!r}") from None
+        raise WireError(
+            "a message {kind} to the view has no array {name}", message.kind.name, repr(name)
+        ) from None
 
 
 def _number(message: Parcel, name: str) -> float:
     try:
         return float(message.meta[name])
     except (KeyError, TypeError, ValueError):
-        raise WireError(f"a message {message.kind.name} to the view has no number {name!r}") from None
+        raise WireError(
+            "a message {kind} to the view has no number {name}", message.kind.name, repr(name)
+        ) from None

@@ -82,7 +82,7 @@ def encoded(message: Parcel) -> list[memoryview]:
     arrays = {name: np.ascontiguousarray(array) for name, array in message.arrays.items()}
     listed = [[name, array.dtype.str, array.shape] for name, array in arrays.items()]
     if unknown := [kind for _, kind, _ in listed if kind not in _TYPES]:
-        raise WireError(f"arrays of {unknown[0]} are not sent to the view")
+        raise WireError("arrays of {type} are not sent to the view", unknown[0])
     meta = json.dumps({**message.meta, "arrays": listed}).encode()
     meta += b" " * _padding(len(meta))
     total = sum(array.nbytes + _padding(array.nbytes) for array in arrays.values())
@@ -147,13 +147,15 @@ class Reader:
 def _checked_header(header: bytes) -> tuple[Kind, int, int]:
     magic, version, number, meta, total = _HEADER.unpack(header)
     if (magic, version) != (MAGIC, VERSION):
-        raise WireError(f"not a message of version {VERSION} to or from the view: {header[:6]!r}")
+        raise WireError(
+            "not a message of version {version} to or from the view: {bytes}", VERSION, repr(header[:6])
+        )
     if meta > MAX_META_BYTES or total > MAX_BYTES:
-        raise WireError(f"a message of {meta} + {total} bytes is too long for the view")
+        raise WireError("a message of {meta} + {total} bytes is too long for the view", meta, total)
     try:
         return Kind(number), meta, total
     except ValueError as error:
-        raise WireError(f"the view has no message {number}") from error
+        raise WireError("the view has no message {number}", number) from error
 
 
 def _message(kind: Kind, body: bytearray, length: int) -> Parcel:
@@ -161,7 +163,9 @@ def _message(kind: Kind, body: bytearray, length: int) -> Parcel:
         meta = json.loads(bytes(body[:length]))
         listed = [(str(name), str(dtype), tuple(shape)) for name, dtype, shape in meta.pop("arrays")]
     except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise WireError(f"a message {kind.name} to or from the view is damaged: {error}") from error
+        raise WireError(
+            "a message {kind} to or from the view is damaged: {error}", kind.name, error
+        ) from error
     return Parcel(kind, meta, _arrays(kind, memoryview(body)[length:], listed))
 
 
@@ -171,14 +175,16 @@ def _arrays(
     arrays, begin = {}, 0
     for name, dtype, shape in listed:
         if dtype not in _TYPES or any(type(n) is not int or n < 0 for n in shape):
-            raise WireError(f"a message {kind.name} to the view has an array of {dtype} {shape}")
+            raise WireError(
+                "a message {kind} to the view has an array of {dtype} {shape}", kind.name, dtype, shape
+            )
         count, length = math.prod(shape), math.prod(shape) * np.dtype(dtype).itemsize
         if begin + length > len(body):
-            raise WireError(f"a message {kind.name} to the view is shorter than its arrays")
+            raise WireError("a message {kind} to the view is shorter than its arrays", kind.name)
         arrays[name] = (
             np.frombuffer(body, dtype, count, begin).reshape(shape) if count else np.empty(shape, dtype)
         )
         begin += length + _padding(length)
     if begin != len(body):
-        raise WireError(f"a message {kind.name} to the view is longer than its arrays")
+        raise WireError("a message {kind} to the view is longer than its arrays", kind.name)
     return arrays

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from acquire.text import Message
 from acquire.text.printable import counted
+from acquire.text.quantity import Amount
 from live.pipeline.consumer import ConsumerReport
 from live.pipeline.event_log import sentence
 from live.pipeline.history import History
@@ -17,11 +19,11 @@ from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.results.figures import alignment_line, elastic_lines, figure_lines, tare_line
 from live.results.finished.answers import MeasuredAgain, missing_lines
+from live.results.finished.findings import NO_FORCE
 from live.results.finished.finished_test import FinishedTest
 from live.results.summary import belief_lines, file_lines, noise_line, summary_lines, valid_line, why_nothing
 from live.ui.terminal.status_line import strain_text
 
-SMALL_MB = 10.0  # below it with a decimal
 TURNED = math.radians(5)  # off the axis of the load, from which on the summary shows it
 
 
@@ -41,7 +43,8 @@ def print_summary(
     if verbose:
         shown = [*summary_lines(run_state, test), *missing, *lines, *file_lines(folder)]
     else:
-        following = "" if with_report else f"; next: phasedic report {shlex.quote(str(folder))}"
+        quoted = shlex.quote(str(folder))
+        following = "" if with_report else Message("; next: phasedic report {folder}", quoted)
         shown = [*brief_lines(run_state, test), *missing, *lines, _files(folder) + following]
     for line in shown:
         screen.print(line)
@@ -58,7 +61,7 @@ def brief_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     history = run_state.history
     if not history.has_values:
         return [why_nothing(run_state)]
-    lines = [
+    return [
         valid_line(history),
         *_at_end(history, test.axis.axis),
         noise_line(history),
@@ -67,7 +70,6 @@ def brief_lines(run_state: RunState, test: FinishedTest) -> list[str]:
         *test.cycles.lines(),
         *_remarks(run_state, test),
     ]
-    return [line.strip() for line in lines]
 
 
 def _at_end(history: History, axis: str) -> list[str]:
@@ -75,11 +77,16 @@ def _at_end(history: History, axis: str) -> list[str]:
     n, known = len(history.time_steps), np.flatnonzero(np.isfinite(history.along(axis)[0]))
     texts = [strain_text(*history.time_steps[int(k)].axial(axis)) for k in known[-1:]]
     if n - 1 in known[-1:]:
-        return [f"strain along {axis} at the end: {texts[0]}"]
+        return [Message("strain along {axis} at the end: {text}", axis, texts[0])]
     last = history.time_steps[-1]
-    why = last.apart or f"{last.n_valid} of {last.n_zoi} valid"
-    none = f"strain along {axis} at the end: no value, {why}"
-    return [none, *(f"the last burst with a value is {known[-1] + 1} of {n}: {text}" for text in texts)]
+    why = last.apart or Message("{n_valid} of {n_zoi} valid", last.n_valid, last.n_zoi)
+    none = Message("strain along {axis} at the end: no value, {why}", axis, why)
+    newest = (
+        Message("the last burst with a value is {k} of {n}: {text}", known[-1] + 1, n, texts[0])
+        if texts
+        else ""
+    )
+    return [line for line in (none, newest) if line]
 
 
 def _figures(run_state: RunState, test: FinishedTest) -> list[str]:
@@ -88,13 +95,13 @@ def _figures(run_state: RunState, test: FinishedTest) -> list[str]:
         return [*elastic_lines(figures, specimen), *figures.notes]
     why = figures.E.why
     if not run_state.with_load:
-        why = "no force is known"
+        why = NO_FORCE
     elif not test.has_force:
         last_t = run_state.history.time_steps[-1].t
-        why = f"no burst has a force: {run_state.loads.why_none_at(last_t)}"
+        why = Message("no burst has a force: {why}", run_state.loads.why_none_at(last_t))
     strengths = figure_lines(figures, specimen)[:1] if test.has_force else []
     notes = figures.notes if test.has_force else ()
-    return list(dict.fromkeys([f"E is not known: {why}", *strengths, *notes]))
+    return list(dict.fromkeys([Message("E is not known: {why}", why), *strengths, *notes]))
 
 
 def _remarks(run_state: RunState, test: FinishedTest) -> Iterator[str]:
@@ -110,18 +117,23 @@ def trouble_lines(
     """The frame counts, the outputs that lost something (all if ``verbose``), and the last warning or error."""
     yield run_state.frame_counts.line()
     yield from (
-        f"  {one.line()}" for one in reports if verbose or one.failed or one.lost or any(one.dropped.values())
+        Message("  {line}", one.line())
+        for one in reports
+        if verbose or one.failed or one.lost or any(one.dropped.values())
     )
     warnings = run_state.event_log.events("warning", "error")
     if warnings:
         last = sentence(warnings[-1], run_state.event_log.names)
         numbers = {level: run_state.event_log.count(level) for level in ("warning", "error")}
         counts = [counted(n, level) for level, n in numbers.items() if n]
-        yield f"{' and '.join(counts)}, the last: {last}"
+        both = Message("{warnings} and {errors}", *counts) if len(counts) > 1 else counts[0]
+        yield Message("{counts}, the last: {last}", both, last)
 
 
 def _files(folder: Path) -> str:
     """Where the files are."""
     files = [path for path in sorted(folder.iterdir()) if path.is_file() and path.stat().st_size]
-    total = sum(path.stat().st_size for path in files) / 1e6
-    return f"files: {folder} ({', '.join(path.name for path in files)}; {total:,.{0 if total >= SMALL_MB else 1}f} MB)"
+    total = Amount("size", sum(path.stat().st_size for path in files))
+    return Message(
+        "files: {folder} ({names}; {total})", folder, ", ".join(path.name for path in files), total
+    )

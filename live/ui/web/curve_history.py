@@ -19,10 +19,12 @@ class CurveHistory:
     ----------
     names : sequence of str
         Of the columns.
+    colours : sequence of int or None
+        Stored indices of the colours of those after the third; None: by their place.
     """
 
-    def __init__(self, names: Sequence[str]) -> None:
-        self._names = list(names)
+    def __init__(self, names: Sequence[str], colours: Sequence[int | None] = ()) -> None:
+        self._names, self._colours = list(names), list(colours)
         self._rows: Thinned[Sequence[float]] = Thinned(MAX_POINTS)
         self._lock = threading.Lock()
 
@@ -54,6 +56,7 @@ class CurveHistory:
             first = count if edition == self._rows.halvings else 0
             return {
                 "names": self._names,
+                "colours": self._colours,
                 "edition": self._rows.halvings,
                 "first": first,
                 "rows": self._rows.kept[first:],

@@ -54,6 +54,16 @@ class FigureLimits:
         found = [self._one(k, name, value, axial_name) for k in range(len(self._alarms))]
         return max((one for one in found if one), key=lambda one: float(one["share"]), default=None)
 
+    @staticmethod
+    def of_range(force: float, range_N: float) -> dict[str, Any] | None:
+        """The range of the load cell in place of a limit; None where force or range is not known."""
+        share = abs(force) / range_N
+        if not math.isfinite(share):
+            return None
+        return {
+            "value": range_N, "share": share, "near": share >= NEAR, "beyond": False, "ends": False, "range": True,
+        }  # fmt: skip
+
     def _one(self, k: int, name: str, value: float, axial_name: str) -> dict[str, Any] | None:
         alarm = self._alarms[k]
         own = {axial_name, f"gauge_{axial_name}"} if axial_name else set()

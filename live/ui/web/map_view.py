@@ -15,7 +15,7 @@ from live.pipeline.measurement import Measurement
 from live.results.maps.colours import MICROSTRAIN, PERCENT
 from live.results.maps.field_maps import FIELD_MAPS, FieldMaps, Painted
 from live.results.maps.painting import overlay_cells
-from live.ui.web.painting import Bytes, as_jpeg, cells_png, shrunk
+from live.ui.web.painting import as_jpeg, cells_box, cells_png, grey_levels, shrunk
 
 RANGES = ("automatic", "symmetric", "fixed")
 BARS = 24
@@ -57,7 +57,7 @@ class MapView:
     def __init__(self, config: Config) -> None:
         self._config, self._axis = config, config.specimen.first_axis
         limit = config.view.strain_range
-        self._painted: tuple[Measurement, Painted] | None = None
+        self._painted: tuple[Measurement, Painted, str] | None = None
         self._take(MapChoice(f"e{self._axis * 2}", "automatic" if limit is None else "fixed", limit))
 
     def _take(self, choice: MapChoice) -> None:
@@ -81,30 +81,32 @@ class MapView:
 
     def draw(self, m: Measurement) -> tuple[bytes, dict[str, Any]]:
         """The picture of ``m`` with its map, as JPEG, and its scale as the page shows it."""
-        picture, zoom, painted, shown = self._drawn(m)
+        picture, zoom = shrunk(m.burst.mean, m.burst.bits)
+        painted, shown = self._drawn(m)
         overlay_cells(picture, zoom, m.field.grid, painted.rgba, (m.time_step.u, m.time_step.v))
         return as_jpeg(picture), shown
 
     def layers(self, m: Measurement) -> tuple[bytes, bytes, dict[str, Any]]:
         """The picture of ``m`` as JPEG, its map as PNG to lay over it, and its scale as the page shows it."""
-        picture, zoom, painted, shown = self._drawn(m)
-        size, moved = (picture.shape[1], picture.shape[0]), (m.time_step.u, m.time_step.v)
-        return as_jpeg(picture), cells_png(size, zoom, m.field.grid, painted.rgba, moved), shown
+        grey, _ = grey_levels(m.burst.mean, m.burst.bits)
+        painted, shown = self._drawn(m)
+        place = cells_box(m.field.grid, (m.time_step.u, m.time_step.v))
+        return as_jpeg(grey), cells_png(painted.rgba), shown | {"cells": place}
 
-    def _drawn(self, m: Measurement) -> tuple[Bytes, float, Painted, dict[str, Any]]:
-        picture, zoom = shrunk(m.burst.mean, m.burst.bits)
-        painted = self._maps.paint(m.field, (self.choice.name,))[self.choice.name]
-        self._painted = m, painted
+    def _drawn(self, m: Measurement) -> tuple[Painted, dict[str, Any]]:
+        choice = self.choice  # another may be chosen meanwhile
+        painted = self._maps.paint(m.field, (choice.name,))[choice.name]
+        self._painted = m, painted, choice.name
         height, width = m.burst.mean.shape
-        shown = {"of": self.choice.name, "range": self.choice.span, "width": width, "height": height}
+        shown = {"of": choice.name, "range": choice.span, "width": width, "height": height}
         shapes = gauge_shapes(self._config) | plate_shapes(self._config)
-        return picture, zoom, painted, shown | _scale_of(painted) | {"gauges": shapes}
+        return painted, shown | _scale_of(painted) | {"gauges": shapes}
 
     def value_at(self, x: float, y: float) -> dict[str, Any]:
         """Value, sigma and status of the ZOI that is shown at a place of the picture, px."""
         if self._painted is None:
             return {"value": None, "status": OUTSIDE}
-        m, painted = self._painted
+        m, painted, name = self._painted
         grid, moved = m.field.grid, np.nan_to_num([m.time_step.u, m.time_step.v])
         column, row = (
             int(np.argmin(np.abs(c - p))) for c, p in ((grid.x, x - moved[0]), (grid.y, y - moved[1]))
@@ -115,7 +117,6 @@ class MapView:
         status = Status(int(m.field.status[row, column]))
         if painted.values is None or not np.isfinite(painted.values[row, column]):
             return {"value": None, "status": status.text}
-        name = self.choice.name
         sigma = float(m.field.sigma(name)[row, column]) if name in VALUES else None
         return {"value": float(painted.values[row, column]), "sigma": sigma, "status": status.text}
 

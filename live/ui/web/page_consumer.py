@@ -19,7 +19,7 @@ from acquire.frame import Frame
 from acquire.text import Message
 from acquire.text.printable import printable, share_text
 from analysis.evaluate import ExtensionGauge, LineGauge
-from live.config.gauges import complete_gauges
+from live.config.gauges import complete_gauges, gauge_colours
 from live.config.loading import Config
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
@@ -112,8 +112,9 @@ class PageConsumer(Consumer):
         self._broadcaster, self._config, self._now = broadcaster, config, now
         self.map = MapView(config)
         names = list(config.gauges) or ["exx", "eyy", "exy"]
-        self.curve = CurveHistory(["t", "stress" if config.specimen.area_m2 else "force", "axial", *names])
-        self._names = names
+        load = "stress" if config.specimen.area_m2 else "force"
+        self._names, self._colours = names, gauge_colours(config.gauges)
+        self.curve = CurveHistory(["t", load, "axial", *names], [self._colours.get(name) for name in names])
         self.picture = picture
         self.layers: dict[str, bytes] = {}
         self._limits = FigureLimits(config.alarm)
@@ -225,7 +226,7 @@ class PageConsumer(Consumer):
         return found | {
             "peak": self._shown_after(m, shown),
             "atpeak": words,
-            "gauges": _gauges(m.time_step, {}),
+            "gauges": _gauges(m.time_step, {}, self._colours),
             "points": self.curve.position,
         }
 
@@ -271,7 +272,7 @@ class PageConsumer(Consumer):
             "disk_min": s.figure(DISK).value / 60,
             "sides": None if self._cameras is None else self._cameras.state(),
         }
-        return values | _measured(s)
+        return values | _measured(s, self._colours)
 
     def _snapshot(self, running: Running, now: float) -> Snapshot:
         """The state of the test; of a recording all figures are of one instant, and nothing is late."""
@@ -282,7 +283,10 @@ class PageConsumer(Consumer):
 
     def _figure(self, s: Snapshot, name: str) -> dict[str, Any]:
         figure = s.figure(name)
-        return shown(figure) | {"limit": self._limits.of(name, figure.value, s.axial_name)}
+        limit = self._limits.of(name, figure.value, s.axial_name)
+        if limit is None and name == FORCE and self._running is not None:
+            limit = self._limits.of_range(figure.value, self._running.run_state.health.load_range_N)
+        return shown(figure) | {"limit": limit}
 
     def _elongation(self, s: Snapshot) -> float | None:
         if self._length_mm is None:
@@ -337,19 +341,24 @@ def shown(figure: TimedFigure) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _gauges(step: TimeStep, figures: Mapping[str, TimedFigure]) -> list[dict[str, Any]]:
+def _gauges(
+    step: TimeStep, figures: Mapping[str, TimedFigure], colours: Mapping[str, int]
+) -> list[dict[str, Any]]:
     """The gauges of a time step, without the values of those whose figure is not live."""
     found = []
     for name, gauge in step.gauges.items():
         figure = figures.get(f"gauge_{name}", TimedFigure(gauge.value, gauge.sigma))
         part, reason = share_text(gauge.share), gauge.reason
         found.append(
-            {"name": name, "value": figure.value, "sigma": figure.sigma, "reason": reason, "part": part}
-        )
+            {
+                "name": name, "value": figure.value, "sigma": figure.sigma, "reason": reason, "part": part,
+                "colour": colours.get(name),
+            }
+        )  # fmt: skip
     return found
 
 
-def _measured(s: Snapshot) -> dict[str, Any]:
+def _measured(s: Snapshot, colours: Mapping[str, int]) -> dict[str, Any]:
     i = s.time_step
     if i is None:
         return {}
@@ -360,7 +369,7 @@ def _measured(s: Snapshot) -> dict[str, Any]:
             "sigma": s.figure(AXIAL).sigma,
             "assumed": Message("axis assumed") if s.axis_assumed else "",
         },
-        "gauges": _gauges(i, s.figures),
+        "gauges": _gauges(i, s.figures, colours),
         "valid": s.valid,
         "zois": s.zois if s.figure(BURST).known else None,
         "refused": i.refused,

@@ -331,4 +331,5 @@ def _described(config: Config) -> dict[str, Any]:
         "thickness_mm": specimen.thickness_mm,
         "diameter_mm": specimen.diameter_mm,
         "area_mm2": None if specimen.area_m2 is None else specimen.area_m2 * 1e6,
+        "along": f"e{2 * specimen.first_axis}",
     }

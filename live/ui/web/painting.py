@@ -20,16 +20,21 @@ RED = (40, 40, 255)  # blue, green, red
 Bytes = NDArray[np.uint8]
 
 
-def shrunk(image: NDArray[Any], bits: int, max_side_px: int = MAX_SIDE_PX) -> tuple[Bytes, float]:
-    """Grey levels as (h, w, 3) uint8, and the scale: its px for one of ``image``."""
+def grey_levels(image: NDArray[Any], bits: int, max_side_px: int = MAX_SIDE_PX) -> tuple[Bytes, float]:
+    """(h, w) uint8, and the scale: its px for one of ``image``."""
     height, width = image.shape
     scale = min(1.0, max_side_px / max(height, width))
     size = max(1, round(width * scale)), max(1, round(height * scale))
-    cv2 = load_cv2()
     levels = np.asarray(image, np.float32)
     if scale < 1:
+        cv2 = load_cv2()
         levels = cv2.resize(levels, size, interpolation=cv2.INTER_AREA)
-    grey = np.clip(levels * (255 / (2**bits - 1)), 0, 255).astype(np.uint8)
+    return np.clip(levels * (255 / (2**bits - 1)), 0, 255).astype(np.uint8), scale
+
+
+def shrunk(image: NDArray[Any], bits: int, max_side_px: int = MAX_SIDE_PX) -> tuple[Bytes, float]:
+    """Grey levels as (h, w, 3) uint8, to be painted on, and the scale of ``grey_levels``."""
+    grey, scale = grey_levels(image, bits, max_side_px)
     return np.repeat(grey[..., None], 3, axis=2), scale
 
 
@@ -44,7 +49,7 @@ def mark_saturated(picture: Bytes, scale: float, image: NDArray[Any], saturation
 
 
 def as_jpeg(picture: Bytes) -> bytes:
-    """(h, w, 3), blue, green, red, as the bytes of a file."""
+    """(h, w, 3), blue, green, red, or (h, w) grey levels, as the bytes of a file."""
     cv2 = load_cv2()
     _, content = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
     return bytes(content)
@@ -56,28 +61,20 @@ def as_png(picture: NDArray[Any]) -> bytes:
     return bytes(content)
 
 
-def cells_png(
-    size: tuple[int, int], zoom: float, grid: ZoiGrid, cells: Bytes, moved: tuple[float, float]
-) -> bytes:
-    """RGBA ``cells`` (R, C, 4) of ``grid``, moved by (x, y) px, as a PNG of (width, height) px to lay over a picture.
+def cells_png(cells: Bytes) -> bytes:
+    """RGBA ``cells`` (R, C, 4), a pixel each, to lay over a picture; the page has size and opacity."""
+    alpha = np.where(cells[..., 3:] > 0, 255, 0).astype(np.uint8)
+    return as_png(np.concatenate([cells[..., 2::-1], alpha], axis=-1))
 
-    Where there is a colour it is full: the page has the opacity. ``zoom``: px of the PNG for one of the camera.
-    """
-    step = grid.step * zoom
-    at = [
-        (start + (m if math.isfinite(m) else 0.0) + 0.5) * zoom - 0.5
+
+def cells_box(grid: ZoiGrid, moved: tuple[float, float]) -> list[float]:
+    """Where the cells of ``grid``, moved by (x, y) px, lie: left, top, width, height, px from the picture's corner."""
+    rows, columns = grid.shape
+    starts = (
+        float(start) - grid.step / 2 + 0.5 + (m if math.isfinite(m) else 0.0)
         for start, m in zip((grid.x[0], grid.y[0]), moved, strict=True)
-    ]
-    full = np.concatenate([cells[..., 2::-1], np.where(cells[..., 3:] > 0, 255, 0).astype(np.uint8)], axis=-1)
-    cv2 = load_cv2()
-    place = np.array([[step, 0, at[0]], [0, step, at[1]]], np.float64)
-    layer = cv2.warpAffine(full, place, size, flags=cv2.INTER_NEAREST, borderValue=(0, 0, 0, 0))
-    _, content = cv2.imencode(
-        ".png",
-        layer,
-        [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE],
     )
-    return bytes(content)
+    return [*starts, columns * grid.step, rows * grid.step]
 
 
 def traffic_light(values: NDArray[Any], good: float, bad: float) -> Bytes:

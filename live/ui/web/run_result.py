@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from analysis.evaluate import TensileFigures
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import sentence
 from live.pipeline.run_state import RunState
-from live.results.figures import TensileRow, headline, tensile_table
+from live.results.figures import TensileRow, beyond_scatter, headline, tensile_table
+from live.results.finished.belief import belief
 from live.results.finished.cycles import shown_figures
 from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
@@ -51,9 +53,7 @@ def run_result(run_state: RunState, test: FinishedTest, folder: Path, words: str
         "folder": str(folder),
         "words": words,
         "figures": [] if figures is None else [*_figures(figures, specimen), *shown_figures(test.cycles)],
-        "belief": None
-        if figures is None
-        else belief(headline(figures, stresses=specimen.area_m2 is not None), troubles),
+        "belief": None if figures is None else _belief(figures, specimen, troubles),
         "lines": [] if figures is None else list(_lines(run_state, specimen, figures)),
         "ledger": run_state.frame_counts.line(),
         "troubles": troubles if measured else [*troubles, why_nothing(run_state)],
@@ -81,7 +81,7 @@ def cameras_result(
         **next(iter(results.values())),
         "folder": str(folder),
         "figures": figures,
-        "belief": belief(headline(found[first], stresses=stresses), troubles) if found else None,
+        "belief": _belief(found[first], specimen, troubles) if found else None,
         "troubles": troubles,
     }
 
@@ -97,29 +97,9 @@ def peaks(consumers: Mapping[str, PageConsumer]) -> dict[str, Any]:
     return {**first, "gauges": gauges, "side": name, "second": {**others[0][1], "side": others[0][0]}}
 
 
-def belief(rows: Sequence[TensileRow], troubles: Sequence[str]) -> dict[str, Any]:
-    """One sentence on whether the first figures can be believed, each exception named; good, look or bad.
-
-    What the data say against a test (``troubles``) stands against all of its figures.
-    """
-    known = [row for row in rows if row.figure.known]
-    doubtful = [row.name for row in known if row.remark]
-    sure = [row.name for row in known if not row.remark]
-    if not known:
-        return {"kind": "bad", "words": Message("No figure is known; the list says why.")}
-    if troubles:
-        names = ", ".join(row.name for row in known)
-        return {"kind": "look", "words": Message("Look at the remarks before you believe {names}.", names)}
-    if doubtful and sure:
-        words = Message("{sure} can be believed; look at {doubtful}.", ", ".join(sure), ", ".join(doubtful))
-        return {"kind": "look", "words": words}
-    if doubtful:
-        return {
-            "kind": "look",
-            "words": Message("Look at {doubtful}: each has a remark.", ", ".join(doubtful)),
-        }
-    more = Message("The data say nothing against them; the intervals (95 %) hold the scatter.")
-    return {"kind": "good", "words": Message("{sure} can be believed.", ", ".join(sure)), "more": more}
+def _belief(figures: TensileFigures, specimen: SpecimenConfig, troubles: Sequence[str]) -> dict[str, Any]:
+    rows = headline(figures, stresses=specimen.area_m2 is not None)
+    return asdict(belief(rows, troubles, beyond_scatter(figures)))
 
 
 def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str, Any]]:

@@ -153,10 +153,14 @@ def test_what_is_skipped_of_floods_is_counted_and_leaves_a_hole() -> None:
 @pytest.mark.parametrize(
     ("stamps", "words"),
     [
-        ([(0.0, 0.0), (1000.0, 1.022)], "device clock: arrivals 1.4 ms late on average (rms)"),
+        (
+            [(0.0, 0.0), (1000.0, 1.022)],
+            "load times are those of the device's clock; readings came 1.4 ms late (rms)",
+        ),
         (
             [(1000.0 * k * (1 + 1e-4), float(k)) for k in range(21)],
-            "device clock: arrivals 0.0 ms late on average (rms), drift 100 us/s against this machine",
+            "load times are those of the device's clock; readings came 0.0 ms late (rms), drift 100 us/s against this"
+            " machine",
         ),
     ],
 )

@@ -116,7 +116,7 @@ def test_what_is_stored_of_a_load_cell() -> None:
         "calibration": None, "mass_reads_force": True, "max_step_N": 20.0, "byte_time_s": 0.0,
         "usb": "0403:6001:A1",
     }  # fmt: skip
-    assert info.warnings == ("no check digit: a changed digit reads as another value",)
+    assert info.warnings == ("transmission errors are not detected: a changed digit reads as another value",)
 
 
 def test_an_address_opens_a_serial_load_cell() -> None:

@@ -393,6 +393,29 @@ def test_options_without_effect_are_not_accepted(
 
 
 @pytest.mark.parametrize(
+    ("language", "usage", "missing", "unknown"),
+    [
+        ("en", "usage: ", "the following arguments are required: ", "unrecognized arguments: --no"),
+        ("de", "Aufruf: ", "diese Argumente fehlen: ", "unbekannte Argumente: --no"),
+        ("fr", "usage : ", "arguments manquants : ", "arguments inconnus : --no"),
+    ],
+)
+def test_the_words_of_argparse_are_in_the_language_of_the_terminal(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    language: str,
+    usage: str,
+    missing: str,
+    unknown: str,
+) -> None:
+    monkeypatch.setenv("LC_ALL", f"{language}_XX.UTF-8")
+    code, said = refused(capsys, "map")
+    assert code == 2 and usage in said and missing in said
+    code, said = refused(capsys, "devices", "--no")
+    assert code == 2 and unknown in said
+
+
+@pytest.mark.parametrize(
     ("to", "option"),
     [("npz", "--layout=wide"), ("csv", "--fps=5"), ("vtk", "--limit=1"), ("mat", "--no-picture")],
 )

@@ -22,7 +22,7 @@ def test_they_add_up() -> None:
 def test_one_frame_too_many_or_too_few(name: str, more: int) -> None:
     counts = FrameCounts(**SOUND)
     counts.add(**{name: more})
-    assert not counts.adds_up and "DOES NOT ADD UP" in counts.line()
+    assert not counts.adds_up and "NOT EVERY FRAME IS ACCOUNTED FOR" in counts.line()
 
 
 @pytest.mark.parametrize(

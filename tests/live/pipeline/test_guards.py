@@ -31,7 +31,7 @@ def field(sigma_xx: float = 30e-6, sigma_yy: float = 40e-6, **values: float) -> 
 def test_the_cost_of_a_picture_is_of_both_directions() -> None:
     assert _usual_sigma(field()) == pytest.approx(50e-6 / math.sqrt(2))
     costly = replace(field(), picture=PictureError(2.0, (1.0, 4.0), "bands"))
-    assert picture_words(costly).endswith("uncertain by 35 µm/m in place of 9 µm/m")
+    assert picture_words(costly).endswith("uncertain by 35 µm/m, usually 9 µm/m")
     cheap = replace(field(), picture=PictureError(1.0, (1.0, 1.0), "filter"))
     assert picture_words(cheap).endswith("strain of a ZOI is uncertain by 35 µm/m")
     assert (

@@ -233,7 +233,7 @@ def test_a_blur_that_costs_is_told_once_and_with_its_cost() -> None:
     step = replace(make_measurement(0).time_step, blur=0.7, sigma_blur=0.02)
     BlurGuard(told.append).check(field, step)
     assert [event.source for event in told] == ["sharpness"]
-    assert "by 120 µm/m in place of 60" in told[0].text
+    assert "by 120 µm/m, usually 60" in told[0].text
 
 
 def test_what_the_picture_has_become_is_told_once_with_its_cost_and_when_it_ends(speckle: Speckle) -> None:

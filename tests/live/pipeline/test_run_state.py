@@ -13,10 +13,11 @@ def test_the_counts_of_frames_in_a_line() -> None:
                          left_out=12, lost=3, load_lost=2)  # fmt: skip
     assert counts.line() == (
         "grabbed 100 / recorded 90 / measured 60 / skipped 20 (25.0%) / lost 3 / load samples lost 2"
-        "  (reference 8, left over 12, not recorded 4 and 6 on purpose; adds up)"
+        "  (reference 8, left over 12, not recorded 4 and 6 on purpose; every frame is accounted for)"
     )
     assert FrameCounts(grabbed=2, recorded=2, measured=2).line() == (
-        "grabbed 2 / recorded 2 / measured 2 / skipped 0 / lost 0  (reference 0, left over 0, not recorded 0; adds up)"
+        "grabbed 2 / recorded 2 / measured 2 / skipped 0 / lost 0  (reference 0, left over 0, not recorded 0;"
+        " every frame is accounted for)"
     )
     assert FrameCounts(load_lost=1).loss and not FrameCounts(skipped=1).loss
     assert list(counts.as_dict()) == [

@@ -52,7 +52,7 @@ def test_what_has_two_readings_is_refused_with_its_option(name: str) -> None:
 def test_what_was_taken_is_said() -> None:
     found = read(EXPORTS["testXpert .txt, preamble and footer"].data)
     assert found.taken == (
-        "column Kraft, kN, 80 rows, 0.25 to 7,204 N against Zeit (s); CP1252, semicolons, decimal comma"
+        "column Kraft, kN, 80 rows, 0.25 to 7 204 N against Zeit (s); CP1252, semicolons, decimal comma"
     )
     assert found.remarks == ("1 line of text left out",)
     found = read(EXPORTS["footer of results"].data)

@@ -82,7 +82,7 @@ def test_a_reference_of_ones_own(
         (["--from", "-5"], 2, "--from -5.0 is not possible"),
         (["--from", "3", "--to", "2"], 2, "--from 3.0 must be before --to 2.0"),
         (["--from", "1000"], 4, "the last one is at 5.000 s"),
-        (["--burst", "200"], 4, "no whole burst after the reference"),
+        (["--burst", "200"], 4, "no whole burst follows"),
     ],
 )
 def test_what_is_refused(

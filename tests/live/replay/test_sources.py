@@ -181,7 +181,7 @@ def test_the_summary_has_the_speed_and_the_share_of_the_kernel() -> None:
         step = make_measurement(k).time_step
         state.history.add(replace(step, measure_s=0.125, n_zoi=1000))
     line = speed_line(state.history, 2.0)
-    assert line == "4 bursts in 2 s: 2 bursts/s, 2,000 ZOI/s, of that time 25% in the kernel"
+    assert line == "4 bursts in 2 s: 2 bursts/s, 2 000 ZOI/s, of that time 25% in the kernel"
 
 
 @pytest.mark.parametrize(

@@ -104,7 +104,7 @@ def test_a_signal_closes_everything(tmp_path: Path, number: signal.Signals, mome
     assert "Traceback" not in seen + rest
     if moment == "opening":
         return  # nothing need have been recorded yet
-    assert "adds up" in rest
+    assert "every frame is accounted for" in rest
     with Session.open(tmp_path / "run" / "session.h5") as session:
         assert session.recovered is None
         assert session.frame_counts is not None

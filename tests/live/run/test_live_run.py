@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -278,3 +280,9 @@ def test_the_first_reason_to_stop_counts_and_whoever_asks_late_is_told_at_once()
     assert stop.requested and stop.reason == "an alarm" and told == ["early", "early"]
     stop.on_request(lambda: told.append("late"))
     assert told[2:] == ["late"]
+
+
+def test_a_run_tells_the_range_of_its_load_cell(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert math.isnan(run().state.health.load_range_N), "no load cell, no range"
+    monkeypatch.setattr(NoLoadCell, "info", replace(NoLoadCell.info, capacity_N=2000.0))
+    assert run().state.health.load_range_N == 2000.0

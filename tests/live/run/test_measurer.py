@@ -72,7 +72,7 @@ class References:
         return [(event.level, event.text) for event in self.state.event_log.events("warning", "error")]
 
 
-MOVED = "the reference moved by {:.3f} px; keep the specimen still when strains must be absolute"
+MOVED = "the specimen moved by {:.3f} px while the reference was taken: keep it still for these frames"
 AGAIN = "the picture moved by {:.3f} px during the reference burst; taking another"
 IS_BLANK = (
     "the reference burst cannot be measured (picture 3 of 8 is blank or has less than half the contrast of another; "

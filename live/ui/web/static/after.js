@@ -23,7 +23,7 @@ function show() {
   fill($("tiles"), heads, tile);
   fill($("results"), others.filter((one) => one.text != null), row);
   showFold("unknown", others.filter((one) => one.text == null), unknown, `${t("Figures that are not known")}: `);
-  showFold("gauge", result.gauges.map((one, k) => ({ k, ...one })), gauge, `${t("Gauges")}, ${t(result.atpeak ?? "")}: `);
+  showFold("gauge", result.gauges.map((one, k) => ({ ...one, k: one.colour ?? k })), gauge, `${t("Gauges")}, ${t(result.atpeak ?? "")}: `);
   put($("folder"), result.folder);
   put($("ledger"), t(result.ledger));
   put($("next"), result.next ?? "");

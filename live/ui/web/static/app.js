@@ -2,7 +2,7 @@
 import { $, change, command, el, post, put } from "./base.js";
 import { addIcons } from "./icons.js";
 import { ask, pause } from "./press.js";
-import { language, setLanguage, t } from "./words.js";
+import { isExpert, language, setExpert, setLanguage, t } from "./words.js";
 import { themeChanged } from "./curves.js";
 import { fixed } from "./numbers.js";
 import { beginRun, linkLost, showRun, showSecond } from "./run.js";
@@ -128,6 +128,17 @@ function theme(name) {
 }
 $("theme").addEventListener("click", () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
 $("language").addEventListener("change", (event) => setLanguage(event.target.value));
+$("expert").checked = isExpert();
+document.body.classList.toggle("expert", isExpert());
+$("expert").addEventListener("change", () => setExpert($("expert").checked));
+
+// The menu closes where anything else is pressed, or with Escape.
+const showMenu = (isOpen) => $("menu").setAttribute("aria-expanded", String(isOpen));
+document.addEventListener("click", ({ target }) => {
+  if (target.closest("#menu")) showMenu($("menu").getAttribute("aria-expanded") !== "true");
+  else if (!target.closest("#more")) showMenu(false);
+});
+document.addEventListener("keydown", (event) => { if (event.key === "Escape") showMenu(false); });
 theme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
 await setLanguage(language());
 connect();

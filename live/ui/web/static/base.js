@@ -25,7 +25,7 @@ export function el(tag, properties = {}, ...children) {
 
 // Replaces the children of a list only where its values have changed; make gives an element for a value.
 export function fill(list, values, make) {
-  const mark = `${document.documentElement.lang} ${localStorage.getItem("strain")} ${JSON.stringify(values)}`;
+  const mark = `${document.documentElement.lang} ${localStorage.getItem("strain")} ${localStorage.getItem("expert")} ${JSON.stringify(values)}`;
   if (list.dataset.mark === mark) return;
   list.dataset.mark = mark;
   list.replaceChildren(...values.map(make));

@@ -4,7 +4,7 @@
 import { $, el, fill, put } from "./base.js";
 import { key } from "./icons.js";
 import { fixed, short, strainUnit, time } from "./numbers.js";
-import { t } from "./words.js";
+import { nameOfStrain, t } from "./words.js";
 
 const REQUEST_MS = 200, DASHES = [[], [9, 4], [3, 3], [11, 3, 3, 3], [15, 4], [2, 5]];
 const FONT = '"Liberation Sans", Arial, "Helvetica Neue", "Noto Sans", "DejaVu Sans", sans-serif';
@@ -30,6 +30,7 @@ class Plot {
     this.ghost = null;     // [x, y] of the specimen before
     this.age = "";         // where the newest point is old: since when
     this.within = null;    // ends of both axes, or those of the data
+    this.colours = [];     // indices that are stored with the curves, or null: by their place
     place.addEventListener("dblclick", () => this.showAll());
     place.addEventListener("keydown", (event) => { if (this.drawn && this.key(event)) event.preventDefault(); });
   }
@@ -91,7 +92,7 @@ class Plot {
       cursor: { points: { show: false }, drag: { x: true, y: true, uni: 20 } },
       scales: { x: { time: false, range: range("x") }, y: { range: range("y") } },
       axes: [axis(26), axis(54)],
-      series: [{ sorted: 0 }, ...data.slice(1).map((_, k) => ({ stroke: colour(`c${(k % 6) + 1}`), dash: dashed(k), width: 2.25, points: { show: false } }))],
+      series: [{ sorted: 0 }, ...data.slice(1).map((_, i) => this.colours[i] ?? i).map((k) => ({ stroke: colour(`c${(k % 6) + 1}`), dash: dashed(k), width: 2.25, points: { show: false } }))],
       hooks: {
         setCursor: [(u) => this.read(u)], setSelect: [(u) => { if (u.select.width > 0 || u.select.height > 0) this.isZoomed = true; }],
         drawAxes: [(u) => before(u, this)], draw: [(u) => over(u, this)],
@@ -227,6 +228,7 @@ async function request() {
     data.rows = [...data.rows.slice(0, received.first), ...received.rows];
     data.edition = received.edition;
     data.names = received.names;
+    second.colours = received.colours ?? [];
     draw();
   } catch { /* no link: the page says so */ }
 }
@@ -244,14 +246,14 @@ export function showAges(figures, value) {
 
 function limitLines(name, axis, factor, unit) {
   const limit = data.limits?.[name];
-  if (!limit) return [];
+  if (!limit || limit.range) return [];
   return [{ at: limit.value * factor, axis, isBeyond: limit.beyond, words: `${t("limit")} ${short(limit.value * factor)} ${unit}` }];
 }
 
 function draw() {
   if (!data.rows.length) return;
   const names = data.names.slice(3), unit = strainUnit(), curve = [strains(2).map((v) => v ?? NaN), inUnit(column(1), loadFactor())];
-  second.names = names;
+  second.names = names.map(nameOfStrain);
   if (document.body.dataset.stage === "after") return drawAfter(curve);
   const previous = data.stage.before, isSame = previous && previous.stress === isStress();
   first.ghost = isSame ? [inUnit(previous.strain, unit.factor), inUnit(previous.load, loadFactor())] : null;

@@ -71,27 +71,43 @@ export function showCross(svg, at) {
   svg.append(make("path", { class: "cross", d: `M${x - r} ${y}h${2 * r}M${x} ${y - r}v${2 * r}` }));
 }
 
-// The wheel zooms a picture about the pointer, a trackpad by as much as it is moved, + and - about the place that the
-// keyboard has; a double click shows all of it again.
+// The wheel zooms a picture about the pointer, a trackpad by as much as it is moved, two fingers by their distance, + and
+// - about the place that the keyboard has; one finger moves what is zoomed; a double click shows all of it again.
 const NOTCH_PX = 100, PINCH_PX = 10, LINE_PX = 33;
 function wheelFactor({ deltaY, deltaMode, ctrlKey }) {
   const moved = (deltaY * (deltaMode ? LINE_PX : 1)) / (ctrlKey ? PINCH_PX : NOTCH_PX);
   return 0.8 ** Math.min(Math.max(moved, -1), 1);
 }
 
-export function zoomable(content, place) {
+export function zoomable(content, place, isMoved = () => true) {
   const frame = content.parentElement, svg = content.querySelector("svg");
   let scale = 1, x = 0, y = 0;
+  const fingers = new Map();
   const show = () => { content.style.transform = scale === 1 ? "" : `translate(${x}px, ${y}px) scale(${scale})`; };
   const reset = () => { scale = 1; x = y = 0; show(); };
   const zoom = (factor, clientX, clientY) => {
     const box = frame.getBoundingClientRect(), px = clientX - box.left, py = clientY - box.top;
     const next = Math.min(Math.max(scale * factor, 1), 16), of = next / scale;
-    x = Math.min(0, Math.max(px - (px - x) * of, box.width * (1 - next)));
-    y = Math.min(0, Math.max(py - (py - y) * of, box.height * (1 - next)));
     scale = next;
+    move(px - (px - x) * of - x, py - (py - y) * of - y);
+  };
+  const move = (right, down) => {
+    x = Math.min(0, Math.max(x + right, frame.clientWidth * (1 - scale)));
+    y = Math.min(0, Math.max(y + down, frame.clientHeight * (1 - scale)));
     show();
   };
+  frame.addEventListener("pointerdown", ({ pointerType, pointerId, clientX, clientY }) => { if (pointerType === "touch") fingers.set(pointerId, [clientX, clientY]); });
+  frame.addEventListener("pointermove", ({ pointerId, clientX, clientY }) => {
+    const was = fingers.get(pointerId), other = [...fingers].find(([id]) => id !== pointerId)?.[1];
+    if (!was) return;
+    fingers.set(pointerId, [clientX, clientY]);
+    const share = other ? 0.5 : isMoved() ? 1 : 0;
+    if (share) move(share * (clientX - was[0]), share * (clientY - was[1]));
+    if (!other) return;
+    const far = ([a, b]) => Math.max(Math.hypot(a - other[0], b - other[1]), 1);
+    zoom(far([clientX, clientY]) / far(was), (clientX + other[0]) / 2, (clientY + other[1]) / 2);
+  });
+  for (const kind of ["pointerup", "pointercancel"]) addEventListener(kind, ({ pointerId }) => fingers.delete(pointerId));
   svg.addEventListener("fit", reset);
   frame.addEventListener("wheel", (event) => {
     if (Math.abs(event.deltaY) <= Math.abs(event.deltaX)) return;

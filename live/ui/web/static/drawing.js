@@ -5,6 +5,7 @@ import { $, change, el, put } from "./base.js";
 import { ask } from "./press.js";
 import { drawGauges, make, moved, position, showCross, zoomable } from "./draw.js";
 import { numberField, onEscape } from "./fields.js";
+import { fixed } from "./numbers.js";
 import { t } from "./words.js";
 
 const svg = $("drawing"), LEAST_PX = 12, REACH_PX = 22, pointers = new Set();
@@ -23,7 +24,7 @@ const HINTS = {
 };
 const isDragged = () => tool === "rectangle" || ["line", "box"].includes(kinds[tool]?.gesture);
 const isClicked = () => kinds[tool]?.gesture === "click";
-zoomable(svg.parentElement, () => cross);
+zoomable(svg.parentElement, () => cross, () => tool === "move" && !drag);
 
 function choose(name) {
   tool = name;
@@ -250,7 +251,7 @@ const labelled = (input, words) => el("label", {}, el("span", { t: words }), inp
 function showScale() {
   if (scaled || asking) return;
   const s = state.scale;
-  put($("scale"), s?.px_per_mm ? `${s.px_per_mm.toFixed(2)} px/mm${s.sigma ? ` ± ${(100 * s.sigma * s.px_per_mm).toFixed(2)} %` : ""}${state.remarks.map((one) => ` · ${t(one)}`).join("")}` : "");
+  put($("scale"), s?.px_per_mm ? `${fixed(s.px_per_mm, 2)} px/mm${s.sigma ? ` ± ${fixed(100 * s.sigma * s.px_per_mm, 2)} %` : ""}${state.remarks.map((one) => ` · ${t(one)}`).join("")}` : "");
 }
 
 // -- display -----------------------------------------------------------------------------------

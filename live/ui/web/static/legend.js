@@ -1,7 +1,7 @@
 // The colours of a map: title with unit, bar, marks and histogram, beside an upright picture and below a wide one.
 import { el, fill, put } from "./base.js";
 import { make } from "./draw.js";
-import { short, strainUnit } from "./numbers.js";
+import { fixed, short, strainUnit } from "./numbers.js";
 import { t } from "./words.js";
 
 export const factorOf = (picture) => (picture?.strain ? strainUnit().factor : 1);
@@ -23,7 +23,7 @@ export function showLegend(element, picture) {
   fill(statuses, picture.legend ?? [], (one) => {
     const key = el("i", { class: "key box-key" });
     key.style.background = one.colour;
-    return el("li", {}, key, `${one.count} ${t(one.text)}`);
+    return el("li", {}, key, `${fixed(one.count)} ${t(one.text)}`);
   });
 }
 

@@ -21,7 +21,7 @@ export function beginMap(stage) {
   if (!$("component").children.length) {
     for (const name of stage.components) $("component").append(el("option", { value: name, t: name }));
   }
-  load("1");
+  load({ n: 1 });
 }
 
 // Of the map only; at 0 the picture. The choice stays with the browser.
@@ -46,19 +46,25 @@ function choose(value) {
 const showLimit = () => { $("limit").closest(".field").hidden = $("range").value !== "fixed"; };
 
 // The next picture is requested when the last has arrived: a slow page gets fewer pictures, never old ones.
-function load(n) {
+function load({ n, cells, width, height }) {
   for (const [id, layer] of [["shot", "picture"], ["map", "map"]]) {
     const image = $(id);
     loading += 1;
-    image.onload = image.onerror = () => { loading -= 1; };
+    image.onload = image.onerror = () => { loading -= 1; if (layer === "map" && cells) place(image, cells, width, height); };
     image.src = `/picture?side=${side}&run=${n}&layer=${layer}`;
   }
+}
+
+// A pixel of the map is a point: it lies over its cells of the picture.
+function place(image, [x, y, across, down], width, height) {
+  const shares = { left: x / width, top: y / height, width: across / width, height: down / height };
+  for (const [name, share] of Object.entries(shares)) image.style.setProperty(name, `${100 * share}%`);
 }
 
 export function showMap(value, of) {
   const name = `${of} ${value.n}`, isNew = name !== `${side} ${picture?.n}`;
   side = of;
-  if (name !== shownPicture && loading <= 0) { shownPicture = name; load(value.n); }
+  if (name !== shownPicture && loading <= 0) { shownPicture = name; load(value); }
   picture = value;
   if (isNew) showChoice();
   if (!value.width) return;
@@ -89,7 +95,7 @@ async function read(x, y) {
     found = await response.json();
   } catch { return; } // no link: the page says so
   if (!cross && !pointed) return;
-  const place = `x ${x.toFixed(0)}, y ${y.toFixed(0)} px`;
+  const place = `x ${fixed(x)}, y ${fixed(y)} px`;
   put($("readout"), found.value == null ? `${place}: ${t(found.status)}` : `${place}: ${picture.strain ? strainText(found.value, found.sigma) : `${fixed(found.value, 4)} ${unitOf(picture)}`}`);
 }
 for (const kind of ["pointerdown", "pointermove"]) svg.addEventListener(kind, (event) => { pointed = position(svg, event); read(...pointed); });

@@ -9,6 +9,10 @@ const UNITS = {
   force: [["N", 1, 0, 1], ["kN", 1e3, 1e4, 3]],
   stress: [["MPa", 1e6, 0, 1], ["GPa", 1e9, 1e10, 2]],
   time: [["s", 1, 0, 1], ["min", 60, 120, 1]],
+  delay: [["ms", 1e-3, 0, 0]],
+  length: [["mm", 1e-3, 0, 2]],
+  size: [["MB", 1e6, 0, 1], ["GB", 1e9, 1e9, 2]],
+  count: [["", 1, 0, 0]],
 };
 
 export function unitOf(kind, size, name) {
@@ -76,11 +80,19 @@ export function time(seconds) {
   return `${hours ? `${hours}:` : ""}${two(Math.floor(whole / 60) % 60)}:${two(whole % 60)}`;
 }
 
+// 2.5·10⁻⁴: one form for all rates.
+export function powered(value) {
+  if (value === 0) return "0";
+  const power = Math.floor(Math.log10(Math.abs(value)));
+  const above = [...String(power)].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("");
+  return `${fixed(value / 10 ** power, 1)}·10${above}`;
+}
+
 // As short as four digits allow, without an exponent for what a person reads.
 export function short(value) {
   if (!Number.isFinite(value)) return DASH;
   const size = Math.abs(value);
-  if (size !== 0 && (size < 1e-3 || size >= 1e6)) return value.toExponential(1).replace(/-/g, MINUS);
+  if (size !== 0 && (size < 1e-3 || size >= 1e6)) return powered(value);
   return fixed(value, (String(Number(value.toPrecision(4))).split(".")[1] ?? "").length);
 }
 

@@ -3,9 +3,9 @@ import { $, el, fill, put } from "./base.js";
 import { clearCurves, showAges, updateCurves } from "./curves.js";
 import { key, putIcon } from "./icons.js";
 import { beginMap, showMap } from "./map.js";
-import { chooseStrainUnit, fixed, quantityText, short, strainText, strainUnit, time, unitOf, withSigma } from "./numbers.js";
+import { chooseStrainUnit, fixed, powered, quantityText, short, strainText, strainUnit, time, unitOf, withSigma } from "./numbers.js";
 import { beginViews, noteFailed, received } from "./views.js";
-import { t } from "./words.js";
+import { nameOfRegion, setAlong, t } from "./words.js";
 
 const WORDS = {
   opening: "opening", reference: "reference: keep still", measuring: "measuring", paused: "paused", ended: "closing the files",
@@ -23,6 +23,7 @@ for (const kind of ["unit", "language"]) addEventListener(kind, () => { if (stat
 export function beginRun(value) {
   stage = value;
   secondGoesOn = false;
+  setAlong(value.what?.along);
   regrow();
   clearCurves(value);
   beginMap(value);
@@ -59,7 +60,7 @@ function show(value) {
   if (!$("pause").classList.contains("armed")) put(word, t(word.dataset.t));
   showFigures(value);
   put($("elongation"), value.elongation_mm == null ? "–" : fixed(value.elongation_mm, 4));
-  put($("strainrate"), value.strain_rate == null ? "–" : rate(value.strain_rate));
+  put($("strainrate"), value.strain_rate == null ? "–" : powered(value.strain_rate));
   showGauges(value);
   showSides(value.sides);
   showMachine(value);
@@ -70,12 +71,12 @@ function show(value) {
 // -- figures -----------------------------------------------------------------------------------------
 
 function showFigures(value) {
-  const unit = strainUnit(), axial = value.axial, figures = value.figures;
-  const name = value.side ? `${axial?.name ?? ""}, ${t(value.side)}` : axial?.name;
+  const unit = strainUnit(), axial = value.axial, figures = value.figures, of = nameOfRegion(axial?.name ?? "");
+  const name = value.side ? `${of}, ${t(value.side)}` : of;
   const N = unitOf("force", value.peak_N ?? 0), MPa = unitOf("stress", 0); // that of a test, whatever the force is now
   showTile("force", figures.force, N, value.peak_N == null ? "" : `${t("highest")} ${quantityText({ kind: "force", value: value.peak_N })}`);
   showTile("stress", figures.stress, MPa, stage.what?.area_mm2 ? `${t("over")} ${fixed(stage.what.area_mm2, 2)} mm²` : "");
-  showTile("axial", figures.axial, unit, withPart(withPart(name ?? "", axial?.assumed), value.part));
+  showTile("axial", figures.axial, unit, withPart(withPart(name, axial?.assumed), value.part));
   const isPictureOld = silentS || ["old", "unknown"].includes(figures.axial?.state);
   $("gaugemap").closest(".frame").classList.toggle("old", Boolean(isPictureOld));
   put($("pictureage"), isPictureOld && figures.axial?.age_s != null ? time(value.elapsed_s - figures.axial.age_s) : "");
@@ -126,8 +127,9 @@ function showLimit(place, limit, unit) {
   place.hidden = !limit;
   if (!limit) return;
   place.querySelector(".fill").setAttribute("width", `${Math.min(Math.max(limit.share, 0), 1) * 100}%`);
-  put(place.lastElementChild, `${fixed(100 * limit.share)} % ${t("of the limit")}, ${short(limit.value * unit.factor)} ${unit.name}`);
+  put(place.lastElementChild, `${ofLimit(limit)}, ${short(limit.value * unit.factor)} ${unit.name}`);
 }
+const ofLimit = (limit) => `${fixed(100 * limit.share)} % ${t(limit.range ? "of the range" : "of the limit")}`;
 
 // All figures of a screen have one size, that of the longest number; its digits only become more during a test.
 function regrow() {
@@ -140,14 +142,6 @@ function grow(text) {
   if (n <= digits) return;
   digits = n;
   document.querySelector(".figures").style.setProperty("--n", String(n));
-}
-
-// 2.5·10⁻⁴: one form for all rates.
-function rate(value) {
-  if (value === 0) return "0";
-  const power = Math.floor(Math.log10(Math.abs(value)));
-  const above = [...String(power)].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("");
-  return `${fixed(value / 10 ** power, 1)}·10${above}`;
 }
 
 // A value whose area lost a block stands for a part of it.
@@ -173,7 +167,7 @@ function showSides(sides) {
     rows.push([t("front minus mean"), strainText(one.bending, one.sigma)]);
   }
   for (const one of sides?.cameras ?? []) {
-    rows.push([t(one.side), `${one.valid} / ${one.zois}, ${t("skipped")} ${one.skipped}, ${t("lost")} ${one.lost}`]);
+    rows.push([t(one.side), `${fixed(one.valid)} / ${fixed(one.zois)}, ${t("skipped")} ${fixed(one.skipped)}, ${t("lost")} ${fixed(one.lost)}`]);
   }
   for (const one of sides?.figures ?? []) rows.push([`${one.name}, ${t(one.side)}`, one.text]);
   $("sides").hidden = !rows.length;
@@ -218,7 +212,7 @@ function showState(value) {
   const cause = force?.state === "old" ? "silent" : axial?.state === "old" && value.state === "measuring" ? "blind" : value.state;
   put($("word"), t(WORDS[cause] ?? cause));
   const limit = near && value.figures[near].limit;
-  put($("alarm"), troubles[0] ?? (near ? `${t(LABELLED[near])}: ${fixed(100 * limit.share)} % ${t("of the limit")}` : ""));
+  put($("alarm"), troubles[0] ?? (near ? `${t(LABELLED[near])}: ${ofLimit(limit)}` : ""));
   put($("alarmmore"), troubles.slice(1).join(" · ") || (near && limit.ends && !troubles.length ? t("At the limit the test ends by itself.") : ""));
   $("alarm").parentElement.title = troubles.join(" · "); // whole, where the bar has no room for it
   $("silence").hidden = !troubles.length;
@@ -234,7 +228,7 @@ function showMachine(value) {
     "frames/s": [fixed(value.fps), false], recorded: [fixed(l.recorded), false], lost: [fixed(lost), lost > 0],
     skipped: l.skipped ? [fixed(l.skipped), true] : null, delay: value.late_s == null ? null : [`${fixed(value.late_s * 1e3)} ms`, value.late_s > DELAY_S],
     disk: value.disk_min == null ? null : [disk(value.disk_min), value.disk_min < DISK_MIN],
-    ZOIs: value.zois == null ? null : [`${value.valid} / ${value.zois}`, Boolean(value.part)],
+    ZOIs: value.zois == null ? null : [`${fixed(value.valid)} / ${fixed(value.zois)}`, Boolean(value.part)],
     "without a force": l.without_force ? [fixed(l.without_force), true] : null,
   };
   const shown = CELLS.filter((name) => facts[name]);

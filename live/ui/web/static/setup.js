@@ -77,7 +77,7 @@ export function showSetup(state, isSecond) {
   const c = value.camera;
   put($("camera"), c ? `${t(c.name)}, ${c.width} × ${c.height} px, ${c.bits} ${t("bits")}${c.fps ? `, ${short(c.fps)} 1/s` : ""}` : "");
   put($("loadsum"), value.load.rate == null ? "" : `${t("Load cell")} ${fixed(value.load.rate)} 1/s`);
-  put($("region"), value.region ? `${t(value.region.words)}${value.zois == null ? "" : ` · ${value.zois} ${t("ZOIs")}`}` : "");
+  put($("region"), value.region ? `${t(value.region.words)}${value.zois == null ? "" : ` · ${fixed(value.zois)} ${t("ZOIs")}`}` : "");
   put($("specimen"), value.metadata.specimen ?? "");
   put($("file"), `· ${value.file} · ${t(value.unsaved.length ? "not saved" : "saved")}`);
   showPicture(value);
@@ -148,7 +148,7 @@ function showSliders(settings) {
     const input = el("input", { type: "range", min: 0, max: 1000, step: 1 }), value = el("output", { class: "num" });
     input.dataset.key = key;
     input.addEventListener("change", () => change({ do: "camera", key, value: sliderValue(input) }));
-    input.addEventListener("input", () => put(value, number(sliderValue(input))));
+    input.addEventListener("input", () => put(value, short(sliderValue(input))));
     return el("label", { class: "slider" }, el("span", { class: "label small", ...(key in SIZES ? { t: SIZES[key] } : { text: key }) }), value, input);
   });
   settings.forEach((one, i) => {
@@ -157,7 +157,7 @@ function showSliders(settings) {
     if (input === document.activeElement && input.matches(":active")) return;
     const share = one.log ? Math.log(one.value / one.low) / Math.log(one.high / one.low) : (one.value - one.low) / (one.high - one.low);
     input.value = Math.round(1000 * share);
-    put(value, number(one.value));
+    put(value, short(one.value));
   });
 }
 
@@ -166,7 +166,6 @@ function sliderValue(input) {
   const value = input.dataset.log === "true" ? low * (high / low) ** share : low + share * (high - low), step = Number(input.dataset.step);
   return step ? low + Math.min(Math.round((value - low) / step), Math.floor((high - low) / step)) * step : Number(value.toPrecision(3));
 }
-const number = (value) => (value >= 100 ? value.toFixed(0) : value.toPrecision(3));
 
 const numbers = new Map();
 for (const input of document.querySelectorAll("[data-set]")) {

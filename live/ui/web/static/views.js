@@ -1,6 +1,6 @@
 // Two cameras: a card for each, with its picture and what it does. The chosen one is shown large.
 import { $, el, put } from "./base.js";
-import { strainText } from "./numbers.js";
+import { fixed, strainText } from "./numbers.js";
 import { t } from "./words.js";
 
 const latest = { setup: {}, run: {} }, failed = new Set();
@@ -71,5 +71,5 @@ const verdict = (value) => t(value.trouble) || (value.checking ? t("checking …
 function running(value) {
   if (failed.has(value.side)) return t("the camera has failed");
   if (value.zois == null) return "–";
-  return `${strainText(value.axial?.value, value.axial?.sigma)} · ${value.valid} / ${value.zois} ${t("ZOIs")}`;
+  return `${strainText(value.axial?.value, value.axial?.sigma)} · ${fixed(value.valid)} / ${fixed(value.zois)} ${t("ZOIs")}`;
 }

@@ -17,11 +17,40 @@ export function t(text) {
   return text ? own(String(text)) : "";
 }
 
-function own(text) {
+function own(code) {
+  const text = isExpert() ? code : WORDS[code] ?? code;
   if (chosen === "en") return text;
   if (!(text in entries) && isSentence(text)) missing.add(text);
   return entries[text] ?? text;
 }
+
+// What an operator reads in place of codes; "Expert" in the menu shows these. The choice stays with the browser.
+const WORDS = {
+  ZOIs: "points", "noise of one ZOI": "noise of one point", "Quality of the ZOIs": "Quality of the points",
+  eyy: "Strain along the load", exx: "Strain across the load", exy: "Shear strain",
+  e1: "Largest principal strain", e2: "Smallest principal strain", u: "Displacement to the right", v: "Displacement downwards",
+  sigma: "Uncertainty of a point", residual: "Misfit of a point", status: "State of the points",
+};
+export const isExpert = () => localStorage.getItem("expert") === "1";
+
+export function setExpert(on) {
+  localStorage.setItem("expert", on ? "1" : "0");
+  document.body.classList.toggle("expert", on);
+  translate();
+  dispatchEvent(new Event("language"));
+}
+
+// Which normal strain is that along the load.
+export function setAlong(name = "eyy") {
+  const other = name === "exx" ? "eyy" : "exx";
+  [WORDS[name], WORDS[other]] = ["Strain along the load", "Strain across the load"];
+  translate();
+}
+
+// A strain of the region has a code as its name, a gauge the one that it was given.
+const isCode = (name) => /^e[xy]{2}$/.test(name);
+export const nameOfStrain = (name) => (isCode(name) ? t(name) : name);
+export const nameOfRegion = (name) => (isCode(name) && !isExpert() ? t("region") : name);
 
 // Not the name of a file, a device or a setting, nor a list of them.
 const isSentence = (text) => text.split(", ").some((one) => one.includes(" ")) && /[a-z]{2,}[,;]? [a-z]{2,}/i.test(text.replace(/\{.*?\}/g, "")) && !/^[\w.-]*[:/]/.test(text);
@@ -51,7 +80,8 @@ export function number(value, format) {
 function general(value, digits) {
   if (value === 0) return "0";
   const power = Number(value.toExponential(digits - 1).split("e")[1]);
-  if (power < -4 || power >= digits) return exponent(value.toExponential(digits - 1).replace(/\.?0+e/, "e"));
+  if (power < -4 || power > 9) return exponent(value.toExponential(digits - 1).replace(/\.?0+e/, "e"));
+  if (power >= digits) return Number(value.toPrecision(digits)).toFixed(0);
   const text = value.toFixed(Math.max(digits - 1 - power, 0));
   return text.includes(".") ? text.replace(/\.?0+$/, "") : text;
 }

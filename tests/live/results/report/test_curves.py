@@ -73,8 +73,8 @@ def test_strains_for_a_part_of_their_area_are_told() -> None:
     whole = [1.0, 1.0, 1.0, 1.0]
     assert told(area_share=whole) == told(eyy=whole) == ""
     words = told(area_share=[1.0, 0.9, 1.0, 1.0], share_gauge_a=[1.0, 1.0, 0.625, 1.0])
-    assert words.startswith("A block of ZOIs had no value at 2 of 4 instants, between 1.5 and 2.5 s:")
-    assert words.endswith("62 % at the least.")
+    assert words.startswith("A block of ZOIs had no value at 2 of 4 instants, from 1.5 to 2.5 s:")
+    assert words.endswith("at least 62 %.")
 
 
 def test_units_of_strain_and_load() -> None:
@@ -163,7 +163,7 @@ def test_the_neck_is_told_between_the_highest_force_and_the_break(
         assert neck_line(run, replace(past, load=load)) == ""
     assert asked == [(50, 89, "y")] * 2
     assert words == (
-        "neck at x, y = 80, 41 px: from the highest force at 5 s to 8.9 s the strain there grew by 12 %,"
+        "neck at x, y = 80, 41 px: from 5 s (highest force) to 8.9 s the strain grew there by 12 %,"
         " elsewhere by 0.45 %"
     )
     assert "80, 41 px (8.0, 4.1 mm): " in with_scale

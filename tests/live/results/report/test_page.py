@@ -278,3 +278,28 @@ def test_the_reporting_table_has_the_camera_in_the_units_it_names(run_dir: Path)
     for shown in ("1280 x 960 px, 12 bits", "64 x 48 mm", "0.05 mm/px", "25 frames/s", "8 ms"):
         assert f"|{shown}|" in text, shown
     assert "|u 0.004 px (1 standard deviation" in text and "|exx 40 µm/m (1 standard deviation" in text
+
+
+@pytest.mark.parametrize(
+    ("language", "belief", "head"),
+    [
+        ("en", "E, nu, Rp0.2, Rm can be believed.", "Figures of the test"),
+        ("de", "E, nu, Rp0.2, Rm sind glaubhaft.", "Werte des Versuchs"),
+        ("fr", "E, nu, Rp0.2, Rm sont fiables.", "Valeurs de l’essai"),
+    ],
+)
+def test_the_report_is_in_the_language_of_the_terminal(
+    language: str, belief: str, head: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The sentence of belief is its first band, as on the page; the decimal mark is that of the language."""
+    monkeypatch.setenv("LC_ALL", f"{language}_XX.UTF-8")
+    with open_run(make_run(tmp_path / "run", PULLED)) as run:
+        warned = make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html
+        run.__dict__["events"] = [one for one in run.events if one.level == "info"]
+        text = make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html
+    assert '<p class="band look">' in warned, "a warning stands against the figures, as on the page"
+    bands = re.findall(r'<p class="band (\w+)">(.*?)</p>', text)
+    assert bands[0][0] == "good" and bands[0][1].startswith(belief), bands
+    assert f"<h2>{head}</h2>" in text and f'<html lang="{language}">' in text
+    modulus = re.search(r'<h3>E</h3><p class="value"><b>(.*?)</b> GPa', text)
+    assert modulus and ("," in modulus[1]) == (language != "en"), modulus

@@ -168,7 +168,7 @@ def test_where_the_files_are(tmp_path: Path) -> None:
     screen = Said()
     state = RunState.new(1.0)
     print_summary(screen, state, finished(state), tmp_path, ["a line"], with_report=True)
-    assert screen.lines[0] == "" and screen.lines[-2:] == ["a line", f"files: {tmp_path} (a.h5; 12 MB)"]
+    assert screen.lines[0] == "" and screen.lines[-2:] == ["a line", f"files: {tmp_path} (a.h5; 12.3 MB)"]
     assert file_lines(tmp_path) == [f"  {tmp_path / 'a.h5'}  (12.3 MB)"]
 
 
@@ -179,6 +179,6 @@ def test_the_card_of_the_view() -> None:
     step = replace(make_measurement(1).time_step, zoi_sigma=30e-6, sigma_eyy=4.2e-6, area_share=0.5)
     state.history.add(step)
     text = card.written(shot(axis="x", axis_assumed=True, counts={"recorded": 7, "lost": 1}), state.history)
-    assert "**33 of 34** ZOIs valid" in text and "one ZOI **30** µm/m, region **4.2** µm/m (1 σ)" in text
+    assert "**33 of 34** ZOIs valid" in text and "one ZOI **30 µm/m**, region **4.2 µm/m** (1 σ)" in text
     assert "strain **of 50 % of the area**" in text and "axis of the load **x**, assumed" in text
     assert text.endswith("recorded 7, measured 9, skipped 2, lost **1**")

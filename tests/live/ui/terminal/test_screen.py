@@ -179,7 +179,7 @@ def test_the_frame_counts_show_when_they_do_not_add_up() -> None:
     assert not frame_counts.loss
     frame_counts.add(grabbed=1)
     assert not frame_counts.adds_up
-    assert "DOES NOT ADD UP" in frame_counts.line()
+    assert "NOT EVERY FRAME IS ACCOUNTED FOR" in frame_counts.line()
     frame_counts.add(left_out=1, unrecorded=1)
     assert frame_counts.adds_up
     assert frame_counts.loss

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import re
 from collections.abc import Sequence
@@ -16,7 +17,9 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.results.summary import summary_lines
+from live.ui.terminal.screen import TerminalScreen
 from live.ui.terminal.summary import brief_lines, print_summary, trouble_lines
+from live.words.language import LANGUAGES
 from tests.live.made_run import PULLED, finished, force_of
 from tests.live.made_up import in_ascii, make_measurement
 
@@ -59,7 +62,7 @@ def test_what_a_test_gave_in_a_dozen_lines(tmp_path: Path) -> None:
     assert re.search(r"^E = (70\.0|69\.9|70)\d* ± (< )?[\d.]+ GPa  nu = 0\.[23]", text, re.MULTILINE), text
     assert "Rp0.2 = " in text and "Rm = " in text
     assert "strain along y at the end: 8000.0 +- " in in_ascii(text) and "µm/m" in text
-    assert "noise: " in text and "adds up" in text
+    assert "noise: " in text and "every frame is accounted for" in text
     assert f"files: {tmp_path} (strain.h5; 2.0 MB); next: phasedic report {tmp_path}" in text
     assert "--lag" not in text and "um/m" not in text
 
@@ -78,7 +81,7 @@ def test_verbose_has_all(tmp_path: Path) -> None:
         (
             (0.0, 1e-5, 2e-5),
             True,
-            "strain and a tensile stress are known together at 3 points, 8 are needed",
+            "only 3 measurements have strain and a tensile force, 8 are needed",
         ),
     ],
 )
@@ -138,3 +141,21 @@ def test_the_end_is_that_of_the_last_burst() -> None:
     back = without_values(whole, 1, 2)
     found_again = brief_lines(back, finished(back))
     assert in_ascii(found_again[1]).startswith("strain along y at the end: 3000.0 +- ")
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("loads", [True, False])
+def test_the_summary_in_another_language(
+    language: str, loads: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No line of it stays English, and its decimal mark is the comma."""
+    monkeypatch.setenv("LC_ALL", f"{language}_XX.UTF-8")
+    run_state, out = run_of(PULLED, loads=loads), io.StringIO()
+    (tmp_path / "strain.h5").write_bytes(bytes(2_000_000))
+    test, troubles = finished(run_state), [*trouble_lines(run_state, ())]
+    for verbose in (False, True):
+        print_summary(TerminalScreen(out), run_state, test, tmp_path, troubles, verbose=verbose)
+    text = out.getvalue().replace(str(tmp_path), "FOLDER")
+    assert not re.search(r"\b(the|of|is|are|and|with|missing|not known|along|to)\b", text), text
+    assert not re.search(r"\d\.\d", text.replace("Rp0.", "").replace("Rp0.2", "")), text
+    assert ("Prüfungen der Daten: " if language == "de" else "contrôles des données : ") in text

@@ -116,7 +116,7 @@ class Page:
     def goto(self, address: str) -> None:
         """Open the page; the one that takes the token leads to it."""
         self.page.goto(address)
-        self.page.wait_for_selector("#language")
+        self.page.wait_for_selector("#language", state="attached")
 
     def text(self, id_: str) -> str:
         """The text of an element."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -113,9 +113,15 @@ def result(**more: Any) -> dict[str, Any]:
 
 
 @contextmanager
-def opened(browser: Any, change: Callable[[Any], None] = lambda page: None, **wanted: Any) -> Iterator[Page]:
+def opened(
+    browser: Any,
+    change: Callable[[Any], None] = lambda page: None,
+    colours: Sequence[int | None] = (None,),
+    **wanted: Any,
+) -> Iterator[Page]:
     """A page of a program that has nothing to show; ``change`` is made before it opens."""
-    points = {"names": ["t", "stress", "axial", "width"], "edition": 1, "first": 0, "rows": POINTS}
+    names = ["t", "stress", "axial", "width"]
+    points = {"names": names, "colours": [*colours], "edition": 1, "first": 0, "rows": POINTS}
     viewport = {"width": 1280, "height": 800}
     with PageController(None, port=0) as controller:
         controller.begin({"": load_config(None, {})})

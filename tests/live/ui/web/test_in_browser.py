@@ -260,9 +260,11 @@ def test_a_page_that_is_killed_changes_nothing(browser: Any, start: Callable[...
     assert page.stage() == "run", "what ends the test is asked for"
     page.confirm()
     page.until(lambda: page.page.evaluate("() => document.body.classList.contains('ended')"), "it ends")
-    assert page.stage() == "after" and "adds up" in page.text("ledger"), "what came out stays on the page"
+    assert page.stage() == "after" and "every frame is accounted for" in page.text("ledger"), (
+        "what came out stays on the page"
+    )
     assert program.end() == 0, program.output
-    assert "adds up" in program.output and "STOPPED" not in program.output
+    assert "every frame is accounted for" in program.output and "STOPPED" not in program.output
 
 
 def test_another_site_gets_nothing(browser: Any, start: Callable[..., Program]) -> None:

@@ -12,10 +12,10 @@ from analysis.evaluate import Figure
 from analysis.field import Roi, ZoiGrid
 from live.config.sections import AlarmConfig
 from live.results.figures import TensileRow
+from live.results.finished.belief import belief
 from live.ui.web.curve_history import CurveHistory
 from live.ui.web.limits import FigureLimits
-from live.ui.web.painting import cells_png
-from live.ui.web.run_result import belief
+from live.ui.web.painting import cells_box, cells_png
 
 
 def of(
@@ -82,20 +82,19 @@ def test_a_limit_that_comes_soon_is_near_and_one_that_was_passed_stays_by_its_hy
     ]
 
 
-def test_a_map_as_a_layer_has_its_cells_where_they_are() -> None:
+def test_a_map_as_a_layer_has_a_pixel_for_each_cell_and_the_place_of_all() -> None:
     grid = ZoiGrid.cover(Roi(0, 0, 80, 60), 12, 10)
     cells = np.zeros((*grid.shape, 4), np.uint8)
     cells[1, 2] = 10, 20, 30, 180  # a value; the others have none
-    x, y = grid.x[2] + 6.0, grid.y[1] - 4.0  # its centre as it is moved
-    content = cells_png((40, 30), 0.5, grid, cells, (6.0, -4.0))
-    layer = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
-    assert layer.shape == (30, 40, 4)
-    rows, columns = np.nonzero(layer[..., 3])
-    assert (
-        np.mean(columns) == pytest.approx((x + 0.5) / 2 - 0.5, abs=0.5) and abs(np.ptp(columns) - 4) <= 1
-    ), "10 px at half size"
-    assert np.mean(rows) == pytest.approx((y + 0.5) / 2 - 0.5, abs=0.5) and abs(np.ptp(rows) - 4) <= 1
-    assert layer[rows[0], columns[0]].tolist() == [30, 20, 10, 255], "the page has the opacity"
+    layer = cv2.imdecode(np.frombuffer(cells_png(cells), np.uint8), cv2.IMREAD_UNCHANGED)
+    assert layer.shape == (*grid.shape, 4)
+    assert [one.tolist() for one in np.nonzero(layer[..., 3])] == [[1], [2]]
+    assert layer[1, 2].tolist() == [30, 20, 10, 255], "the page has the opacity"
+    left, top, across, down = cells_box(grid, (6.0, -4.0))
+    # The middle of a cell, from the corner of the first pixel, whose own middle is 0, 0.
+    middle = left + 2.5 / grid.shape[1] * across, top + 1.5 / grid.shape[0] * down
+    assert middle == (grid.x[2] + 6.0 + 0.5, grid.y[1] - 4.0 + 0.5)
+    assert cells_box(grid, (math.nan, 0.0))[0] == grid.x[0] - 5 + 0.5, "not moved where that is not known"
 
 
 def test_the_curve_kept_for_the_next_specimen() -> None:
@@ -128,4 +127,18 @@ def test_whether_the_figures_can_be_believed(
     rows: list[TensileRow], troubles: list[str], kind: str, words: str
 ) -> None:
     found = belief(rows, troubles)
-    assert (found["kind"], str(found["words"])) == (kind, words)
+    assert (found.kind, found.words) == (kind, words)
+    held = "The intervals (95 %) hold the scatter"
+    clear = "The data say nothing against them. " * (kind == "good")
+    assert found.more == ("" if kind == "bad" else f"{clear}{held}.")
+    stated = belief(rows, troubles, "limits of load cell, section").more
+    assert stated == (
+        "" if kind == "bad" else f"{clear}{held}, that of E also the limits of load cell, section."
+    )
+
+
+def test_the_range_of_a_load_cell_is_a_limit_that_ends_nothing() -> None:
+    low, high = (FigureLimits.of_range(force, 10e3) for force in (-8e3, 9.5e3))
+    assert low is not None and low["share"] == 0.8 and not low["near"] and not low["ends"]
+    assert high is not None and high["near"] and not high["beyond"] and high["value"] == 10e3
+    assert FigureLimits.of_range(math.nan, 10e3) is None and FigureLimits.of_range(1.0, math.nan) is None

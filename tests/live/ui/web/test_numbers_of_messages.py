@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from acquire.text import Message
-from acquire.text.message import about
+from acquire.text.message import about, formatted
 from acquire.text.quantity import Amount
 from live.words.language import said
 from tests.acquire.test_quantity import CASES, quantity_of
@@ -32,7 +32,7 @@ def test_numbers_are_those_of_python(start: Start) -> None:
     # JSON knows no difference between 1.0 and 1, and JavaScript shows the latter.
     cases = [(value, spec) for value in VALUES for spec in FORMATS if spec or value != int(value)]
     shown = page.page.evaluate(NUMBERS, cases)
-    assert shown == [format(value, spec) for value, spec in cases]
+    assert shown == [formatted(value, spec) for value, spec in cases]
     whole = [(7, "02"), (255, "04x"), (5, "03d"), (12, "d")]
     assert page.page.evaluate(NUMBERS, whole) == [format(value, spec) for value, spec in whole]
 

@@ -35,6 +35,8 @@ from tests.live.streaming import record_of
 from tests.live.ui.waiting import until
 from tests.live.ui.web.page_texts import STATIC
 
+COLOURS = [("left", 3), ("right", 1)]
+
 
 def measurement() -> Measurement:
     m = make_measurement(0)
@@ -95,13 +97,14 @@ def test_the_state_of_a_run(config: Config) -> None:
     assert isinstance(state, dict)
     assert state["force_N"] == -400 and state["peak_N"] == 500 and state["stress_Pa"] == pytest.approx(-1e7)
     assert state["axial"] == {"name": "axial", "value": 0.001, "sigma": 2e-6, "assumed": ""}
-    assert state["gauges"][1] == {"name": "b", "value": None, "sigma": None, "reason": "lost", "part": ""}
+    lost = {"name": "b", "value": None, "sigma": None, "reason": "lost", "part": "", "colour": None}
+    assert state["gauges"][1] == lost
     assert state["part"] == state["gauges"][0]["part"] == Message("of {share} % of the area", 83).to_json()
     assert state["events"][0]["level"] == "error" and "\x1b" not in state["events"][0]["text"]
     for k in range(4555):
         consumer.event(Event(0.0, EventKind.ALARM, "alarm", f"force is {k} N", "warning"))
     shown = consumer.state()["events"]
-    assert len(shown) == 5 and shown[-1]["text"] == "alarm: force is 4554 N (4,555 times)"
+    assert len(shown) == 5 and shown[-1]["text"] == "alarm: force is 4554 N (4\u202f555 times)"
 
 
 def test_the_map_is_drawn_only_while_a_page_is_open(config: Config) -> None:
@@ -139,6 +142,7 @@ def test_points_are_bounded_and_a_page_gets_what_it_lacks() -> None:
         curve.add([n, n])
     assert curve.since(0, 7) == {
         "names": ["t", "x"],
+        "colours": [],
         "edition": 0,
         "first": 7,
         "rows": [[7, 7], [8, 8], [9, 9]],
@@ -251,6 +255,23 @@ def test_the_value_is_that_of_the_zoi_that_has_moved_to_the_place(config: Config
         assert (view.value_at(grid.x[-1] + 20.0 + off, grid.y[2] - 13.0)["value"] is not None) == there
 
 
+def test_a_map_that_is_chosen_while_another_is_drawn_is_the_next_one(config: Config) -> None:
+    view, m = MapView(config), measurement()
+    paint = view._maps.paint
+
+    def painted(*given: Any) -> Any:
+        assert not view.choose("status", "automatic", None)
+        return paint(*given)
+
+    view._maps.paint = painted  # type: ignore[method-assign]
+    assert view.layers(m)[2]["of"] == "eyy"
+    read = [view.value_at(float(x), float(y)) for x in m.field.grid.x for y in m.field.grid.y]
+    assert any(one.get("sigma") is not None for one in read), (
+        "what is read is eyy with its sigma, not a status"
+    )
+    assert view.layers(m)[2]["of"] == "status"
+
+
 def test_a_recording_shows_figures_of_one_instant(config: Config) -> None:
     """Its load samples come far ahead of its pictures: the newest force is of another instant."""
     broadcaster, run = Broadcaster(), Run(config)
@@ -269,6 +290,32 @@ def test_a_recording_shows_figures_of_one_instant(config: Config) -> None:
     assert state["force_N"] == state["peak_N"] == 1234.0 and state["stress_Pa"] == pytest.approx(1234 / 40e-6)
     assert math.isnan(state["late_s"])
     assert consumer.curve.since(0, 0)["rows"][-1][1] == pytest.approx(state["stress_Pa"])
+
+
+def test_a_gauge_has_its_stored_colour_and_the_force_the_range_of_its_cell() -> None:
+    """The colours of the map are those of lists and curves, also where a gauge before was removed."""
+    gauges = {
+        f"gauges.{name}": {"kind": "line", "start": [1, 2], "end": [3, 40], "colour": k}
+        for name, k in COLOURS
+    }
+    config = load_config(None, {"specimen.area_mm2": 40.0, **gauges})
+    run, consumer = Run(config), ready(PageConsumer(Broadcaster(), config, lambda: 0.5))
+    consumer.attach(run)  # type: ignore[arg-type]
+    m = measurement()
+    m = replace(
+        m, time_step=replace(m.time_step, gauges={name: GaugeValue(0.001, 2e-6) for name, _ in COLOURS})
+    )
+    consumer.matched(m)
+    run.run_state.history.add(m.time_step)
+    run.run_state.loads.append(LoadSample(0.4, -8000.0))
+    run.run_state.health.loaded(0.4, -8000.0)
+    assert [(one["name"], one["colour"]) for one in consumer.state()["gauges"]] == COLOURS
+    assert [(one["name"], one["colour"]) for one in consumer.at_peak()["gauges"]] == COLOURS
+    assert consumer.curve.since(0, 0)["colours"] == [k for _, k in COLOURS]
+    assert consumer.state()["figures"]["force"]["limit"] is None, "the range is not known"
+    run.run_state.health.load_range_N = 10e3
+    limit = consumer.state()["figures"]["force"]["limit"]
+    assert (limit["share"], limit["value"], limit["range"], limit["near"]) == (0.8, 10e3, True, False)
 
 
 def test_the_map_at_the_highest_force(config: Config) -> None:

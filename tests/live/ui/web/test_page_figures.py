@@ -253,6 +253,18 @@ def test_the_specimen_before_and_the_one_in_hand(browser: Any) -> None:
         assert "no section" in page.text("section")
 
 
+def test_the_map_lies_over_its_points(browser: Any) -> None:
+    box = """id => { const q = document.getElementById(id).getBoundingClientRect();
+        return [q.x, q.y, q.width, q.height]; }"""
+    with opened(browser) as page:
+        show_run(page, picture=MAP | {"cells": [32, 48, 128, 96]})
+        x, y, width, height = page.page.evaluate(box, "gaugemap")
+        wanted = [x + width / 8, y + height / 4, width / 2, height / 2]
+        page.until(
+            lambda: page.page.evaluate(box, "map") == pytest.approx(wanted, abs=0.5), "where the server says"
+        )
+
+
 def test_the_opacity_of_the_map_stays_with_the_browser(browser: Any) -> None:
     with opened(browser) as page:
         show_run(page)

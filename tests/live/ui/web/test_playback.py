@@ -51,7 +51,7 @@ def test_a_recording_shows_force_strain_and_curve_of_one_instant(
         page.confirm()
     page.until(lambda: page.stage() == "after", "the recording is over")
     assert check_every_instant(page) >= 3
-    assert "adds up" in page.text("ledger") and not page.errors
+    assert "every frame is accounted for" in page.text("ledger") and not page.errors
 
 
 def check_every_instant(page: Page) -> int:

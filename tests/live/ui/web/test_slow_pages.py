@@ -55,7 +55,7 @@ def ended_well(program: Program) -> None:
     """A busy machine may lose frames of the simulated camera, with a page or without; all else is in order."""
     code, output = program.end(), program.output
     assert code == 0 or (code == 5 and "lost, the last before frame" in output), output
-    assert "adds up" in output and "STOPPED" not in output
+    assert "every frame is accounted for" in output and "STOPPED" not in output
 
 
 def assert_untouched(folder: Path) -> None:

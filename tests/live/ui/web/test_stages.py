@@ -249,7 +249,7 @@ def test_after_a_test(start: Start) -> None:
     assert max(heights, default=0) < 34, "a figure and its interval are one line"
     assert page.page.locator("#gaugeresults li").count() == 3 and "µm/m" in page.text("gaugeresults")
     assert page.text("believed"), "whether they can be believed"
-    assert "adds up" in page.text("ledger")
+    assert "every frame is accounted for" in page.text("ledger")
     page.until(
         lambda: page.page.evaluate("() => document.getElementById('peakmap').naturalWidth") > 0, "a map"
     )
