@@ -8,6 +8,7 @@ a tenth of that of one affine fit over the pixels.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,13 +16,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.evaluate.area.affine import AffineFit, Places, affine_fit
 from analysis.evaluate.area.unevenness import strain_shapes, variation
-from analysis.field import PAIR_INDEX, CommonError, StrainField, combination, fixed_sums, strain_tensor
+from analysis.field import (
+    PAIR_INDEX,
+    CommonError,
+    Measure,
+    StrainField,
+    combination,
+    fixed_sums,
+    strain_tensor,
+)
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy", "exx", "eyy", "exy", "gamma_xy", "omega")
+GRADIENT = ("du_dx", "du_dy", "dv_dx", "dv_dy")
+GRADIENTS = (*GRADIENT, "exx", "eyy", "exy", "gamma_xy", "omega")
 """Values that an area has by its affine field; its u and v are means."""
+STRAINS = ("exx", "eyy", "exy", "gamma_xy")
+"""Of these, those that a measure of strain is of."""
+_AMONG = {1: 0, 2: 1, 4: 2, 5: 3}  # of the affine values, the gradients
 _DISPLACEMENTS = [PAIR_INDEX[0, 0], PAIR_INDEX[3, 3]]  # variances of u and v among the 21 pairs
 
 
@@ -56,16 +69,12 @@ class AreaStrain:
         if not valid.any() or field.n_parts(valid) > 1:
             return None
         fit = affine_fit(field, area, valid)
-        fitted = fit.fitted(_affine(field)[:, fit.at], valid.ravel()[fit.at])
+        fitted = fit.fitted(affine_values(field)[:, fit.at], valid.ravel()[fit.at])
         return cls(field, area, valid, fit, fitted.reshape(2, 3))
 
     def value(self, name: str) -> float:
         """A strain, in the measure of the field, or a gradient, by its name; one of ``GRADIENTS``."""
-        (_, du_dx, du_dy), (_, dv_dx, dv_dy) = self.fitted
-        if self.field.measure != "small" and name in ("exx", "eyy", "exy", "gamma_xy"):
-            strain = strain_tensor(self.field.measure, *np.array([[du_dx], [du_dy], [dv_dx], [dv_dy]]))
-            return float(2 * strain.exy[0] if name == "gamma_xy" else getattr(strain, name)[0])
-        return math.fsum(share * self.fitted[divmod(i, 3)] for i, share in combination(name).items())
+        return strain_of(name, self.field.measure, self.fitted[:, 1:].ravel().tolist())
 
     def sigma(self, name: str) -> float:
         """Standard uncertainty of ``value`` (of the small strain), the noise of the reference included."""
@@ -94,7 +103,7 @@ class AreaStrain:
         plane = np.stack([np.ones(len(at)), self.fit.x, self.fit.y])
         left = np.zeros((2, self.valid.size))
         left[:, at] = np.where(
-            self.valid.ravel()[at], _affine(self.field)[::3, at] - self.fitted @ plane, 0.0
+            self.valid.ravel()[at], affine_values(self.field)[::3, at] - self.fitted @ plane, 0.0
         )
         here = np.where(self.valid, self.field.covariance[_DISPLACEMENTS], 0).reshape(2, -1)
         exx, eyy = variation(shapes.along_x, left[0]), variation(shapes.along_y, left[1])
@@ -119,7 +128,15 @@ class Unevenness:
     misfit: float
 
 
-def _affine(field: StrainField) -> Floats:
+def affine_values(field: StrainField) -> Floats:
     """Displacement and gradients, of u and then of v, (6, R C)."""
     half = len(field.parameters) // 2
     return np.asarray(field.parameters.reshape(2, half, -1)[:, :3].reshape(6, -1))
+
+
+def strain_of(name: str, measure: Measure, gradient: Sequence[float]) -> float:
+    """One of ``GRADIENTS`` of a field with the ``gradient`` du_dx, du_dy, dv_dx, dv_dy."""
+    if measure != "small" and name in STRAINS:
+        strain = strain_tensor(measure, *np.array(gradient)[:, None])
+        return float(2 * strain.exy[0] if name == "gamma_xy" else getattr(strain, name)[0])
+    return math.fsum(share * gradient[_AMONG[i]] for i, share in combination(name).items())
