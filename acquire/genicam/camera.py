@@ -1,10 +1,6 @@
 """GigE Vision and USB3 Vision cameras: ``genicam:SERIAL?format=Mono12p&fps=30&exposure_us=5000``.
 
 The target is identifier, serial number, model or IP address; none: the only camera.
-
-Settings: ``format``, ``fps``, ``exposure_us``, ``gain``, ``x``, ``y``, ``width``, ``height``,
-``trigger=no|Software|Line0``, ``bits``, ``white``, ``packet_size``, ``buffers``, ``stall_s``, ``stamp=start|end``, and
-any feature of the camera by its name (``BlackLevel=64``).
 """
 
 from __future__ import annotations
@@ -27,9 +23,10 @@ from acquire.genicam.device import CameraIdentity, GenicamDevice, Received
 from acquire.genicam.finding import name_of
 from acquire.genicam.formats import decode
 from acquire.genicam.library import Aravis, GenicamError, load_aravis
-from acquire.genicam.settings import GenicamSettings, genicam_settings
+from acquire.genicam.settings import GenicamSettings
 from acquire.genicam.setup import set_up
 from acquire.genicam.trigger import SoftwareTrigger
+from acquire.settings import read_settings
 from acquire.text import Message
 
 log = logging.getLogger(__name__)
@@ -152,14 +149,14 @@ class GenicamDriver:
 
 
 def open_genicam(address: Address, on_event: EventSink, library: Aravis | None = None) -> LiveCamera:
-    """Open ``genicam:...``; the module's text names the settings.
+    """Open ``genicam:...``; ``GenicamSettings`` are its settings.
 
     Raises
     ------
     ConfigError, DeviceError
         See ``acquire.camera.open_camera``.
     """
-    settings, library = genicam_settings(address), library or load_aravis()
+    settings, library = read_settings(GenicamSettings, address), library or load_aravis()
     name = name_of(library, address.target, address.text)
 
     def opened(before: Driver | None) -> GenicamDriver:
