@@ -253,23 +253,9 @@ def _gauges() -> None:
     from analysis.compiled.loops import read_only
     from analysis.compiled.sparse_sums import overlapping, row_sums
 
-    first, none, maps, triples = (
-        np.zeros(1, np.intp),
-        np.empty(0, np.intp),
-        np.empty((0, 0)),
-        np.empty((0, 3)),
-    )
-    row_sums(first, none, np.empty(0), maps, maps)
+    first, no, none, triples = np.zeros(1, np.intp), np.empty(0, np.intp), np.empty(0), np.empty((0, 3))
     covariance = read_only(np.empty((21, 0), np.float32))
+    row_sums(first, no, none, triples, triples)
     overlapping(
-        first,
-        none,
-        np.empty(0),
-        triples.astype(np.intp),
-        triples,
-        none,
-        np.empty((4, 1, 1)),
-        1,
-        covariance,
-        np.empty(0),
+        first, no, none, triples.astype(np.intp), triples, no, np.empty((4, 1, 1)), 1, covariance, none
     )

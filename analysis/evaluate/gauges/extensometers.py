@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -25,7 +24,7 @@ from analysis.evaluate.gauges.geometry import (
     zois_near,
 )
 from analysis.evaluate.gauges.readings import GaugeReading
-from analysis.field import Roi, ZoiGrid
+from analysis.field import ZoiGrid
 
 BOX = Parameter("box", "x, y, width, height of an area, extension or transverse gauge")
 START, END = Parameter("point", "x, y of one end of a line"), Parameter("point", "x, y of the other")
@@ -174,22 +173,13 @@ class RegionStrips:
 
     def zois(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         """The two strips, (R, C) bool each."""
-        return _strips(grid.roi, grid.size, grid.step, grid.shape, grid.active.tobytes(), self.along)
+        rows, columns = (np.flatnonzero(grid.active.any(axis=axis)) for axis in (1, 0))
+        if not rows.size:
+            return grid.active, grid.active
+        x, y = grid.x[columns[0]] - grid.step / 2, grid.y[rows[0]] - grid.step / 2
+        width, height = (float(np.ptp(found) + 1) * grid.step for found in (columns, rows))
+        return ExtensionGauge("", (float(x), float(y), width, height), self.along).zois(grid)
 
 
 REGION = RegionStrips("x"), RegionStrips("y")
 """The extensions of a region, ``extension_x`` and ``extension_y``."""
-
-
-@lru_cache(maxsize=8)
-def _strips(
-    roi: Roi, size: int, step: int, shape: tuple[int, int], active: bytes, along: Literal["x", "y"]
-) -> tuple[Mask, ...]:
-    inside = np.frombuffer(active, np.bool_).reshape(shape)
-    grid = ZoiGrid(roi, size, step, inside)
-    rows, columns = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
-    if not rows.size:
-        return inside, inside
-    x, y = grid.x[columns[0]] - grid.step / 2, grid.y[rows[0]] - grid.step / 2
-    width, height = (float(np.ptp(found) + 1) * grid.step for found in (columns, rows))
-    return ExtensionGauge("", (float(x), float(y), width, height), along).zois(grid)
