@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import math
+import threading
 import time
 from typing import Any
 
@@ -25,7 +26,6 @@ from acquire.genicam.formats import decode
 from acquire.genicam.library import Aravis, GenicamError, load_aravis
 from acquire.genicam.settings import GenicamSettings
 from acquire.genicam.setup import set_up
-from acquire.genicam.trigger import SoftwareTrigger
 from acquire.settings import read_settings
 from acquire.text import Message
 
@@ -146,6 +146,42 @@ class GenicamDriver:
         if self._trigger is not None:
             self._trigger.stop()
         self._device.close()
+
+
+class SoftwareTrigger:
+    """Triggers one picture each period, until ``stop``; by a thread: a request to a camera that is gone blocks.
+
+    Parameters
+    ----------
+    device : GenicamDevice
+        Streaming.
+    period_s : float, s
+
+    Attributes
+    ----------
+    refused : str
+        Why the camera takes no more triggers; "" while all is well.
+    """
+
+    def __init__(self, device: GenicamDevice, period_s: float) -> None:
+        self._device, self._period_s, self.refused = device, period_s, ""
+        self._stopped = threading.Event()
+        threading.Thread(target=self._work, name="genicam-trigger", daemon=True).start()
+
+    def _work(self) -> None:
+        due = time.monotonic()
+        while not self._stopped.wait(max(0.0, due - time.monotonic())):
+            try:
+                self._device.ask("arv_camera_software_trigger")
+            except GenicamError as error:
+                if not self._stopped.is_set():
+                    self.refused = error.text
+                return
+            due = max(due + self._period_s, time.monotonic())
+
+    def stop(self) -> None:
+        """No more triggers."""
+        self._stopped.set()
 
 
 def open_genicam(address: Address, on_event: EventSink, library: Aravis | None = None) -> LiveCamera:

@@ -193,7 +193,9 @@ def other_engines(report: Report) -> None:
         kernel = PhaseKernel(frames[0], grid, None, SIGMA)
         seconds, now, before = track(kernel, frames)
         cpu = machine.processor_s(lambda k=kernel, b=before: k.measure(frames[-1], start=b, noise=SIGMA), 9)
-        _engine(report, f"phasedic, ZOI {size}", note, (seconds, cpu), Points(*np.meshgrid(grid.x, grid.y), now.u))
+        _engine(
+            report, f"phasedic, ZOI {size}", note, (seconds, cpu), Points(*np.meshgrid(grid.x, grid.y), now.u)
+        )
     for peer in peers(frames[0], frames[-1], zois(33, margin=32)):
         _peer(report, peer)
     if missing():
