@@ -177,13 +177,13 @@ class GaugeSet:
         ends_of = np.cumsum([0, *(len(one.sums) for one in taken)]).tolist()
         self._own = [slice(first, end) for first, end in pairwise(ends_of)]
         self._pairs, self._kinds = (
-            np.array([getattr(one, name) for one in taken]) for name in ("pairs", "kind")
+            np.array([getattr(one, name) for one in taken], np.intp) for name in ("pairs", "kind")
         )
 
 
 def _rows(rows: Sequence[Row]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
     """Rows one behind the other: where each begins, places and weights."""
-    first = np.cumsum([0, *(len(row.at) for row in rows)])
+    first = np.cumsum([0, *(len(row.at) for row in rows)], dtype=np.intp)
     at, weights = (np.concatenate(column) for column in zip(NOTHING, *rows, strict=True))
     return first, at, weights
 
