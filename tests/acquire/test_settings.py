@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import pytest
 
@@ -10,6 +11,7 @@ from acquire.addresses import parse_address
 from acquire.camera import CAMERAS
 from acquire.errors import ConfigError
 from acquire.settings import read_settings, settings_of
+from live.cli import main
 
 KINDS = dict(CAMERAS.settings())
 SIDE, POSITIVE = "a whole number from 1 to 65535", "a number from 0.1"
@@ -83,3 +85,22 @@ def test_others_are_taken_by_a_camera_with_features() -> None:
     ):
         found = read_settings(KINDS[scheme], parse_address(address(scheme, "BlackLevel=4&white=9")))
         assert getattr(found, field) == {"BlackLevel": value} and found.white == 9
+
+
+def test_those_of_another_package_are_listed_behind_ours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    info = tmp_path / "other-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: other\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[phasedic.camera_settings]\nfilm = acquire.opencv.video:VideoSettings\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert [scheme for scheme, _ in CAMERAS.settings()] == [*KINDS, "film"]
+    assert main(["devices", "--settings"]) == 0
+    told = capsys.readouterr().out
+    assert told.endswith(
+        "film:\n  gray: what is grey in a colour picture (one of luma, r, g, b; default luma)\n"
+    )
+    assert "  fps: pictures a second (a number from 1e-06 to 1e+06; 1/s; default 1.0)\n" in told
