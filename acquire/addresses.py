@@ -18,10 +18,9 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar, overload
 from urllib.parse import quote, unquote
 
-from acquire.bounds import NotAllowed, as_integer, as_number
+from acquire.bounds import NotAllowed, integer_of, number_of, one_of, yes_or_no
 from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
-from acquire.text import Message
 
 # A glob may hold a question mark too: settings are the last one followed by key=value pairs, whose values have none
 # unless they are a pattern or what a device says and takes.
@@ -29,8 +28,8 @@ _PAIR = r"(?:(?:pattern|unstable|overload|underload|error|poll)=[^&]*|[A-Za-z_]\
 _SETTINGS = re.compile(rf"\?({_PAIR}(?:&{_PAIR})*)$")
 _SCHEME = re.compile(r"^([A-Za-z][\w+.-]+):")
 
+Value = TypeVar("Value")
 _SAFE = "/:,@+-_.*~"  # in the value of a setting
-TRUE_WORDS, FALSE_WORDS = ("1", "yes", "true", "on"), ("0", "no", "false", "off")
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,10 +162,7 @@ class Options:
 
     def choice(self, key: str, allowed: tuple[str, ...], default: str) -> str:
         """One of ``allowed``."""
-        value = self.text(key, default)
-        if value not in allowed:
-            raise self._wrong(key, value, Message("one of ") + ", ".join(allowed))
-        return value
+        return self.read(key, default, lambda word: one_of(word, allowed))
 
     @overload
     def number(self, key: str, default: float, *, minimum: float = ..., maximum: float = ...) -> float: ...
@@ -183,17 +179,7 @@ class Options:
         maximum: float = math.inf,
     ) -> float | None:
         """A finite number within bounds, or ``default`` where it is not given."""
-        value = self.text(key)
-        if value is None:
-            return default
-        try:
-            number = float(value)
-        except ValueError:
-            number = math.nan
-        try:
-            return as_number(math.nan if math.isinf(number) else number, minimum, maximum)
-        except NotAllowed as allowed:
-            raise self._wrong(key, value, str(allowed)) from None
+        return self.read(key, default, lambda word: number_of(word, minimum, maximum))
 
     @overload
     def integer(self, key: str, default: int, *, minimum: int = ..., maximum: int = ...) -> int: ...
@@ -210,26 +196,27 @@ class Options:
         maximum: float = math.inf,
     ) -> int | None:
         """A whole number within bounds, or ``default`` where it is not given."""
-        value = self.text(key)
-        if value is None:
-            return default
-        try:
-            number: int | None = int(value)
-        except ValueError:
-            number = None
-        try:
-            return as_integer(number, minimum, maximum)
-        except NotAllowed as allowed:
-            raise self._wrong(key, value, str(allowed)) from None
+        return self.read(key, default, lambda word: integer_of(word, minimum, maximum))
 
     def flag(self, key: str, default: bool = False) -> bool:
         """Yes or no."""
-        value = self.text(key)
-        if value is None:
+        return self.read(key, default, yes_or_no)
+
+    def read(self, key: str, default: Value, check: Callable[[str], Value]) -> Value:
+        """What ``check`` makes of the setting, or ``default``; the ``NotAllowed`` that it raises names the setting."""
+        word = self.text(key)
+        if word is None:
             return default
-        if value.lower() not in TRUE_WORDS + FALSE_WORDS:
-            raise self._wrong(key, value, Message("yes or no"))
-        return value.lower() in TRUE_WORDS
+        try:
+            return check(word)
+        except NotAllowed as allowed:
+            raise ConfigError(
+                "{text}: {key}={value} is not possible; allowed: {allowed}",
+                self.address.text,
+                key,
+                word,
+                str(allowed),
+            ) from None
 
     def rest(self) -> dict[str, str]:
         """All settings not taken yet, for a scheme with keys of its own choosing."""
@@ -253,15 +240,6 @@ class Options:
                 known,
             )
 
-    def _wrong(self, key: str, value: object, allowed: str) -> ConfigError:
-        return ConfigError(
-            "{text}: {key}={value} is not possible; allowed: {allowed}",
-            self.address.text,
-            key,
-            value,
-            allowed,
-        )
-
 
 Device = TypeVar("Device")
 Opener = Callable[[Address, EventSink], Device]
@@ -284,6 +262,10 @@ class Registry(Generic[Device]):
         Entry point group of what lists the devices that are there, by scheme; "": none.
     lists : mapping of scheme to "module:function"
         Those of our own; a function without arguments that gives a list.
+    settings_group : str
+        Entry point group of the classes of settings (``acquire.settings``), by scheme; "": none.
+    settings : mapping of scheme to "module:class"
+        Those of our own.
     elsewhere : sequence of str
         Schemes that the program opens without this registry; for messages.
     """
@@ -297,11 +279,14 @@ class Registry(Generic[Device]):
         *,
         lists_group: str = "",
         lists: Mapping[str, str] | None = None,
+        settings_group: str = "",
+        settings: Mapping[str, str] | None = None,
         elsewhere: Sequence[str] = (),
     ) -> None:
         self._elsewhere = elsewhere
         self._what, self._group, self._fallback = what, group, fallback
         self._lists_group, self._lists = lists_group, dict(lists or {})
+        self._settings_group, self._settings = settings_group, dict(settings or {})
         self._openers: dict[str, str | Opener[Device]] = dict(builtin)
 
     def register(self, scheme: str, opener: Opener[Device]) -> None:
@@ -318,6 +303,13 @@ class Registry(Generic[Device]):
             yield scheme, lambda path=path: _load(path)()  # type: ignore[misc]
         for entry in sorted(entry_points(group=self._lists_group)):
             yield entry.name, lambda entry=entry: entry.load()()  # type: ignore[misc]
+
+    def settings(self) -> Iterator[tuple[str, type]]:
+        """Scheme, and the class of its settings; our own first."""
+        for scheme, path in self._settings.items():
+            yield scheme, _load(path)
+        for entry in sorted(entry_points(group=self._settings_group)):
+            yield entry.name, entry.load()
 
     def open(self, text: str, on_event: EventSink = ignore_event) -> Device:
         """Open what ``text`` names; see ``Camera`` and ``LoadCell`` for what is raised."""
@@ -345,7 +337,6 @@ class Registry(Generic[Device]):
         return _load(opener) if isinstance(opener, str) else opener
 
 
-def _load(path: str) -> Callable[..., Device]:
+def _load(path: str) -> Any:
     module, _, name = path.partition(":")
-    found: Callable[..., Device] = getattr(importlib.import_module(module), name)
-    return found
+    return getattr(importlib.import_module(module), name)

@@ -1,11 +1,14 @@
-"""Numbers within bounds, wherever they come from: an address, a configuration, the page, a profile."""
+"""Values within bounds, wherever they come from: an address, a configuration, the page, a profile."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from acquire.errors import Spoken
 from acquire.text import Message
+
+TRUE_WORDS, FALSE_WORDS = ("1", "yes", "true", "on"), ("0", "no", "false", "off")
 
 
 class NotAllowed(Spoken, ValueError):
@@ -27,6 +30,38 @@ def as_integer(value: object, low: float = -math.inf, high: float = math.inf) ->
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
         raise NotAllowed("a whole number{between}", _between(low, high))
     return value
+
+
+def number_of(word: str, low: float = -math.inf, high: float = math.inf) -> float:
+    """The finite number that ``word`` is, within bounds; raises ``NotAllowed``."""
+    try:
+        number = float(word)
+    except ValueError:
+        number = math.nan
+    return as_number(math.nan if math.isinf(number) else number, low, high)
+
+
+def integer_of(word: str, low: float = -math.inf, high: float = math.inf) -> int:
+    """The whole number that ``word`` is, within bounds; raises ``NotAllowed``."""
+    try:
+        number: int | None = int(word)
+    except ValueError:
+        number = None
+    return as_integer(number, low, high)
+
+
+def one_of(word: str, allowed: Sequence[str]) -> str:
+    """``word``, where it is one of ``allowed``; raises ``NotAllowed``."""
+    if word not in allowed:
+        raise NotAllowed(Message("one of ") + ", ".join(allowed))
+    return word
+
+
+def yes_or_no(word: str) -> bool:
+    """Whether ``word`` says yes; raises ``NotAllowed``."""
+    if word.lower() not in TRUE_WORDS + FALSE_WORDS:
+        raise NotAllowed("yes or no")
+    return word.lower() in TRUE_WORDS
 
 
 def same_value(got: str, asked: str) -> bool:

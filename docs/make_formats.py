@@ -1,8 +1,8 @@
-"""Fills the tables of docs/session-format.md and docs/strain-format.md: ``python -m docs.make_formats``.
+"""Fills the tables of formats and of the settings of cameras: ``python -m docs.make_formats``.
 
-The writers of the program make a new file of each kind, which is listed; the definitions come from the file or from
-``live.results.quantities``. A page holds each table between ``<!-- table NAME ... -->`` and ``<!-- end -->``. The tests
-compare the pages with these tables.
+The writers of the program make a new file of each kind, which is listed; the definitions come from the file, from
+``live.results.quantities``, or from the declared settings. A page holds each table between ``<!-- table NAME ... -->``
+and ``<!-- end -->``. The tests compare the pages with these tables.
 """
 
 from __future__ import annotations
@@ -12,17 +12,20 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
 import h5py
 import numpy as np
 
+from acquire.camera import CAMERAS
 from acquire.clock import ClockPair
 from acquire.events import EventKind
 from acquire.frame import CameraInfo
 from acquire.load_sample import LoadFlag
 from acquire.session import SessionInfo, SessionWriter
+from acquire.settings import settings_of
 from analysis import Roi, ZoiGrid
 from analysis.field import Status
 from live.results.finished.cycles import COLUMNS as CYCLES
@@ -127,6 +130,20 @@ def flags() -> str:
     return f"Bits of `load/flags`: {bits}.\n\nKinds of events: {', '.join(EventKind)}."
 
 
+def camera_settings(scheme: str) -> str:
+    """The settings of an address of a kind of camera."""
+    rows = (
+        (
+            f"`{one.key}`" if one.key else "others",
+            one.unit,
+            one.allowed,
+            one.words + f"; {one.stands}" * bool(one.stands),
+        )
+        for one in settings_of(dict(CAMERAS.settings())[scheme])
+    )
+    return table(("setting", "unit", "allowed", "meaning"), rows)
+
+
 def _listed(group: h5py.Group, place: str = "") -> Iterator[Row]:
     for name, item in group.items():
         path = f"{place}{name}"
@@ -162,8 +179,11 @@ def _text(value: object) -> str:
 TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
     "session": session_layout, "flags": flags, "maps": strain_maps, "means": means, "status": statuses,
     "response": response, "cycles": cycles,
+    **{name or "v4l2": partial(camera_settings, name) for name, _ in CAMERAS.settings()},
 })  # fmt: skip
-PAGES = (DOCS / "session-format.md", DOCS / "strain-format.md")
+PAGES = tuple(
+    DOCS / f"{name}.md" for name in ("session-format", "strain-format", "cameras", "machine-vision")
+)
 _TABLE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)
 
 

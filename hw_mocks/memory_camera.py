@@ -15,9 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import Address, Options
+from acquire.addresses import Address
+from acquire.bounds import one_of
 from acquire.camera import CameraBase
 from acquire.frame import CameraInfo, Frame, frozen
+from acquire.settings import number, read_settings, setting, whole
 from hw_mocks.deformation import Affine
 from hw_mocks.scene import Exposer, Sensor
 from hw_mocks.speckle import Speckle
@@ -30,33 +32,24 @@ SHIFT_PX, STRAIN = (0.11, -0.07), (-3e-5, 1e-4)
 """Motion of the middle (x, y), and strain (exx, eyy), from one picture to the next."""
 
 
+def _bits(word: str) -> int:
+    return int(one_of(word, ("8", "10", "12")))
+
+
+# fmt: off
 @dataclass(frozen=True, slots=True)
 class MemorySettings:
-    """What comes, and how fast.
+    """Of ``bench:``: what comes, and how fast."""
 
-    Attributes
-    ----------
-    width, height : int, px
-    bits : int
-    fps : float, 1/s
-    seconds : float, s
-        Then the camera ends.
-    pictures : int
-        Rendered, shown to and fro.
-    buffers : int
-        Of the ring.
-    saturated : float
-        Share of the pixels that are at saturation, in spots.
-    """
-
-    width: int = 1280
-    height: int = 1024
-    bits: int = 8
-    fps: float = 30.0
-    seconds: float = 20.0
-    pictures: int = 24
-    buffers: int = 8
-    saturated: float = 0.0
+    width: int = setting(whole(64, 8192), 1280, "of the pictures", "px")
+    height: int = setting(whole(64, 8192), 1024, "of the pictures", "px")
+    bits: int = setting(_bits, 8, "of a sample")
+    fps: float = setting(number(0.1, 10_000), 30.0, "frames a second", "1/s")
+    seconds: float = setting(number(0.1), 20.0, "after which the camera ends", "s")
+    pictures: int = setting(whole(4, 1000), 24, "that are rendered, and shown to and fro")
+    buffers: int = setting(whole(1, 1000), 8, "of the ring")
+    saturated: float = setting(number(0, 0.5), 0.0, "share of the pixels that are at saturation, in spots")
+# fmt: on
 
 
 class MemoryCamera(CameraBase):
@@ -149,23 +142,11 @@ def glare(shape: tuple[int, int], share: float) -> NDArray[np.bool_]:
 
 
 def open_memory_camera(address: Address) -> MemoryCamera:
-    """Open ``bench:?width=&height=&bits=&fps=&seconds=&pictures=&buffers=&saturated=``.
+    """Open ``bench:?...``; ``MemorySettings`` are its settings.
 
     Raises
     ------
     ConfigError
         An unknown key or an impossible value.
     """
-    options = Options(address)
-    settings = MemorySettings(
-        width=options.integer("width", 1280, minimum=64, maximum=8192),
-        height=options.integer("height", 1024, minimum=64, maximum=8192),
-        bits=int(options.choice("bits", ("8", "10", "12"), "8")),
-        fps=options.number("fps", 30.0, minimum=0.1, maximum=10_000),
-        seconds=options.number("seconds", 20.0, minimum=0.1),
-        pictures=options.integer("pictures", 24, minimum=4, maximum=1000),
-        buffers=options.integer("buffers", 8, minimum=1, maximum=1000),
-        saturated=options.number("saturated", 0.0, minimum=0, maximum=0.5),
-    )
-    options.done()
-    return MemoryCamera(settings, address.text)
+    return MemoryCamera(read_settings(MemorySettings, address), address.text)

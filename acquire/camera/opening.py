@@ -50,6 +50,15 @@ CAMERAS: Registry[Camera] = Registry(
     elsewhere=["sim"],
     lists=({"": "acquire.v4l2.listing:list_cameras"} if HAS_V4L2 else {})
     | {"genicam": "acquire.genicam.listing:list_cameras", "pylon": "acquire.pylon.camera:list_cameras"},
+    settings_group="phasedic.camera_settings",
+    settings={
+        "": "acquire.v4l2.settings:V4L2Settings",
+        "genicam": "acquire.genicam.settings:GenicamSettings",
+        "pylon": "acquire.pylon.camera:PylonSettings",
+        "opencv": "acquire.opencv.webcam:OpenCVSettings",
+        "video": "acquire.opencv.video:VideoSettings",
+        "files": "acquire.opencv.images:FileSettings",
+    },
 )
 
 

@@ -1,16 +1,13 @@
 """GigE Vision and USB3 Vision cameras: ``genicam:SERIAL?format=Mono12p&fps=30&exposure_us=5000``.
 
 The target is identifier, serial number, model or IP address; none: the only camera.
-
-Settings: ``format``, ``fps``, ``exposure_us``, ``gain``, ``x``, ``y``, ``width``, ``height``,
-``trigger=no|Software|Line0``, ``bits``, ``white``, ``packet_size``, ``buffers``, ``stall_s``, ``stamp=start|end``, and
-any feature of the camera by its name (``BlackLevel=64``).
 """
 
 from __future__ import annotations
 
 import logging
 import math
+import threading
 import time
 from typing import Any
 
@@ -27,9 +24,9 @@ from acquire.genicam.device import CameraIdentity, GenicamDevice, Received
 from acquire.genicam.finding import name_of
 from acquire.genicam.formats import decode
 from acquire.genicam.library import Aravis, GenicamError, load_aravis
-from acquire.genicam.settings import GenicamSettings, genicam_settings
+from acquire.genicam.settings import GenicamSettings
 from acquire.genicam.setup import set_up
-from acquire.genicam.trigger import SoftwareTrigger
+from acquire.settings import read_settings
 from acquire.text import Message
 
 log = logging.getLogger(__name__)
@@ -151,15 +148,51 @@ class GenicamDriver:
         self._device.close()
 
 
+class SoftwareTrigger:
+    """Triggers one picture each period, until ``stop``; by a thread: a request to a camera that is gone blocks.
+
+    Parameters
+    ----------
+    device : GenicamDevice
+        Streaming.
+    period_s : float, s
+
+    Attributes
+    ----------
+    refused : str
+        Why the camera takes no more triggers; "" while all is well.
+    """
+
+    def __init__(self, device: GenicamDevice, period_s: float) -> None:
+        self._device, self._period_s, self.refused = device, period_s, ""
+        self._stopped = threading.Event()
+        threading.Thread(target=self._work, name="genicam-trigger", daemon=True).start()
+
+    def _work(self) -> None:
+        due = time.monotonic()
+        while not self._stopped.wait(max(0.0, due - time.monotonic())):
+            try:
+                self._device.ask("arv_camera_software_trigger")
+            except GenicamError as error:
+                if not self._stopped.is_set():
+                    self.refused = error.text
+                return
+            due = max(due + self._period_s, time.monotonic())
+
+    def stop(self) -> None:
+        """No more triggers."""
+        self._stopped.set()
+
+
 def open_genicam(address: Address, on_event: EventSink, library: Aravis | None = None) -> LiveCamera:
-    """Open ``genicam:...``; the module's text names the settings.
+    """Open ``genicam:...``; ``GenicamSettings`` are its settings.
 
     Raises
     ------
     ConfigError, DeviceError
         See ``acquire.camera.open_camera``.
     """
-    settings, library = genicam_settings(address), library or load_aravis()
+    settings, library = read_settings(GenicamSettings, address), library or load_aravis()
     name = name_of(library, address.target, address.text)
 
     def opened(before: Driver | None) -> GenicamDriver:

@@ -14,7 +14,8 @@ from acquire.frame import CameraSetting
 from acquire.genicam.device import NO_ADJUSTMENT, GenicamDevice
 from acquire.genicam.formats import FORMATS, MonoFormat, preferred, readable
 from acquire.genicam.library import GenicamError
-from acquire.genicam.settings import KEYS, NO_TRIGGER, GenicamSettings
+from acquire.genicam.settings import NO_TRIGGER, GenicamSettings
+from acquire.settings import keys_of
 from acquire.text import Message
 
 # Set to "Off", so that nothing changes by itself during a test.
@@ -135,7 +136,7 @@ def _set_feature(device: GenicamDevice, feature: str, value: str, where: str) ->
             "{where}: this camera has no feature {feature}; known settings: {listed}",
             where,
             repr(feature),
-            ", ".join(KEYS),
+            keys_of(GenicamSettings),
         )
     kind = device.kind(feature)
     if kind == "Enumeration" and value not in device.choices(feature):

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import Address, Options
+from acquire.addresses import Address
 from acquire.camera import CameraBase
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import EventSink, device_event, ignore_event
@@ -40,6 +40,7 @@ from acquire.files.tiff import full_pages, tiff_pages
 from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, to_gray
 from acquire.opencv.image_metadata import read_stamps, taken_times
+from acquire.settings import choice, number, read_settings, setting, whole
 from acquire.text import Message
 from acquire.text.printable import counted
 
@@ -97,32 +98,19 @@ def read_image(path: str | Path, gray: str | None = None, page: int = 0) -> NDAr
     return to_gray(read_picture_page(path, picture_source(path), page), gray, str(path))
 
 
+# fmt: off
 @dataclass(frozen=True, slots=True)
 class FileSettings:
-    """The settings in an address of image files.
+    """Of ``files:shots/*.tif``."""
 
-    Attributes
-    ----------
-    fps : float, 1/s
-    gray : str or None
-    bits : int or None
-        Significant bits; None: those of the file's samples.
-    white : int or None, GL
-        Where a sample is saturated; None: at the highest of its bits.
-    stamps : str or None
-        CSV with the time of each picture.
-    order : "auto" | "name" | "time"
-    first : str or None
-        Of ``find_images``.
-    """
-
-    fps: float = 1.0
-    gray: str | None = None
-    bits: int | None = None
-    white: int | None = None
-    stamps: str | None = None
-    order: str = AUTO
-    first: str | None = None
+    fps: float = setting(number(1e-6, 1e6), 1.0, "pictures a second", "1/s")
+    gray: str | None = setting(choice(*GRAYS), None, "what is grey in a colour picture")
+    bits: int | None = setting(whole(1, 16), None, "significant bits; default those of the file's samples")
+    white: int | None = setting(whole(1, 65535), None, "grey level of saturation, where it is not the highest", "GL")
+    stamps: str | None = setting(str, None, "CSV with the time of each picture")
+    order: str = setting(choice(*BY), AUTO, "of the pictures")
+    first: str | None = setting(str, None, "name of the first one")
+# fmt: on
 
 
 class ImageFiles(CameraBase):
@@ -325,7 +313,7 @@ def picture_times(address: Address) -> dict[str, float]:
     DataError
         No picture, or stamps that do not fit.
     """
-    paths, settings = _found(address), _settings(address)
+    paths, settings = _found(address), read_settings(FileSettings, address)
     stamps = _stamps(settings, paths)
     ends = masks([path.name for path in paths])
     times = {path.name: stamps[k] if stamps else k / settings.fps for k, path in enumerate(paths)}
@@ -345,7 +333,7 @@ def open_files(address: Address, on_event: EventSink) -> ImageFiles:
     ConfigError, DataError
         See ``acquire.camera.open_camera``.
     """
-    return ImageFiles(address.text, _found(address), _settings(address), on_event)
+    return ImageFiles(address.text, _found(address), read_settings(FileSettings, address), on_event)
 
 
 def _stamps(settings: FileSettings, paths: list[Path]) -> list[float] | None:
@@ -358,25 +346,5 @@ def _stamps(settings: FileSettings, paths: list[Path]) -> list[float] | None:
 
 
 def _found(address: Address) -> list[Path]:
-    settings = _settings(address)
+    settings = read_settings(FileSettings, address)
     return find_images(address.target, settings.order, settings.first)
-
-
-def _settings(address: Address) -> FileSettings:
-    options = Options(address)
-    gray = options.text("gray")
-    if gray is not None and gray not in GRAYS:
-        raise ConfigError(
-            "{text}: gray={gray} is not possible; allowed: {listed}", address.text, gray, ", ".join(GRAYS)
-        )
-    settings = FileSettings(
-        fps=options.number("fps", 1.0, minimum=1e-6, maximum=1e6),
-        gray=gray,
-        bits=options.integer("bits", minimum=1, maximum=16),
-        white=options.integer("white", minimum=1, maximum=65535),
-        stamps=options.text("stamps"),
-        order=options.choice("order", BY, AUTO),
-        first=options.text("first"),
-    )
-    options.done()
-    return settings

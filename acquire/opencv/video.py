@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
-from acquire.addresses import Address, Options, expanded
+from acquire.addresses import Address, expanded
 from acquire.camera import CameraBase
 from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
@@ -22,6 +23,7 @@ from acquire.files.jpeg import quantisation
 from acquire.files.picture import check_regular, is_utf8
 from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
+from acquire.settings import choice, read_settings, setting
 from acquire.text import Message
 
 INTRA = {
@@ -35,6 +37,13 @@ _AS_JPEG = ("mjpg", "jpeg", "mjpa", "avrn")
 _HEAD = 1 << 20  # bytes, with the tables of the first picture
 _COUNTED = ((0, b"RIFF"), (4, b"ftyp"))  # containers with the number of frames; others have but a duration
 _MOST_COUNTED = 50_000_000  # bytes that are read through to count frames
+
+
+@dataclass(frozen=True, slots=True)
+class VideoSettings:
+    """Of ``video:test.mp4``."""
+
+    gray: str = setting(choice(*GRAYS), "luma", "what is grey in a colour picture")
 
 
 class VideoFile(CameraBase):
@@ -135,14 +144,12 @@ def _fourcc(code: int) -> str:
 
 
 def open_video(address: Address, on_event: EventSink) -> VideoFile:
-    """Open ``video:test.mp4?gray=``.
+    """Open ``video:test.mp4``; ``VideoSettings`` are its settings.
 
     Raises
     ------
     ConfigError, DataError
         See ``acquire.camera.open_camera``.
     """
-    options = Options(address)
-    gray = options.choice("gray", GRAYS, "luma")
-    options.done()
+    gray = read_settings(VideoSettings, address).gray
     return VideoFile(address.text, expanded(address.target), gray, on_event)

@@ -1,4 +1,4 @@
-"""Cameras through OpenCV: ``opencv:0?width=&height=&fps=&exposure=&gain=&gray=``.
+"""Cameras through OpenCV: ``opencv:0?width=1280&height=720``.
 
 For cameras of other systems; on Linux ``acquire.v4l2`` has stamps and losses too. Pictures are 8-bit colour made
 grey. A thread of its own drains a live camera, since OpenCV's read may block for seconds.
@@ -17,13 +17,14 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import Address, Options
+from acquire.addresses import Address
 from acquire.camera.live import DeviceFault, LiveCamera, Picture
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import EventSink
 from acquire.frame import CameraInfo, Clock, frozen
 from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
+from acquire.settings import choice, number, read_settings, setting
 from acquire.text import Message
 
 STALL_S, INSTANT_S = 2.0, 0.005
@@ -39,30 +40,23 @@ class Capture(Protocol):
     def release(self) -> None: ...
 
 
+# fmt: off
 @dataclass(frozen=True, slots=True)
 class OpenCVSettings:
-    """What is asked of the camera; None: whatever it has.
+    """Of ``opencv:0``; None: whatever the camera has."""
 
-    Attributes
-    ----------
-    width, height : float or None, px
-    fps : float or None, 1/s
-    exposure, gain : float or None
-        In the units of the system's backend.
-    gray : str
-    """
-
-    width: float | None = None
-    height: float | None = None
-    fps: float | None = None
-    exposure: float | None = None
-    gain: float | None = None
-    gray: str = "luma"
+    width: float | None = setting(number(1), None, "of the picture", "px")
+    height: float | None = setting(number(1), None, "of the picture", "px")
+    fps: float | None = setting(number(1e-3), None, "frames a second", "1/s")
+    exposure: float | None = setting(number(), None, "in the unit of the system's driver")
+    gain: float | None = setting(number(), None, "in the unit of the system's driver")
+    gray: str = setting(choice(*GRAYS), "luma", "what is grey in a colour picture")
 
     def asked(self) -> dict[str, float]:
         """The settings that were given, in the order in which drivers want them."""
         names = ("width", "height", "fps", "exposure", "gain")
         return {name: value for name in names if (value := getattr(self, name)) is not None}
+# fmt: on
 
 
 def _properties() -> dict[str, int]:
@@ -289,7 +283,7 @@ def _verdict(took_s: float) -> str:
 
 
 def open_opencv(address: Address, on_event: EventSink) -> LiveCamera:
-    """Open ``opencv:0?width=&height=&fps=&exposure=&gain=&gray=``.
+    """Open ``opencv:0?...``; ``OpenCVSettings`` are its settings.
 
     Raises
     ------
@@ -298,16 +292,7 @@ def open_opencv(address: Address, on_event: EventSink) -> LiveCamera:
     """
     if not address.target.isdecimal():
         raise ConfigError("{text}: give the number of the camera, as in opencv:0", address.text)
-    options = Options(address)
-    settings = OpenCVSettings(
-        width=options.number("width", minimum=1),
-        height=options.number("height", minimum=1),
-        fps=options.number("fps", minimum=1e-3),
-        exposure=options.number("exposure"),
-        gain=options.number("gain"),
-        gray=options.choice("gray", GRAYS, "luma"),
-    )
-    options.done()
+    settings = read_settings(OpenCVSettings, address)
     return live_camera(address.text, lambda: capture(int(address.target)), settings, on_event)
 
 

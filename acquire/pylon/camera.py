@@ -1,18 +1,17 @@
 """Basler cameras through pypylon: ``pylon:SERIAL?format=Mono12&fps=30&exposure_us=5000``; no target: the only one.
 
-For those who have the maker's drivers anyway. Settings: ``format``, ``fps``, ``exposure_us``, ``gain``, ``x``, ``y``,
-``width``, ``height``, ``white``, ``buffers``, ``stall_s``, and any feature of the camera by its name. Times are those
-of arrival.
+For those who have the maker's drivers anyway. Times are those of arrival.
 """
 
 from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from acquire.addresses import Address, Options
+from acquire.addresses import Address
 from acquire.bounds import same_value
 from acquire.camera import CameraListing
 from acquire.camera.live import DeviceFault, LiveCamera, Picture
@@ -21,6 +20,7 @@ from acquire.errors import ConfigError, DataError, DeviceError
 from acquire.events import EventSink
 from acquire.frame import CameraInfo
 from acquire.genicam.formats import FORMATS, decode, preferred, readable
+from acquire.settings import keys_of, number, others, read_settings, setting, whole
 from acquire.text import Message
 
 # Set before all others, where the camera has them: nothing changes by itself, grey levels are proportional to light,
@@ -48,6 +48,31 @@ def _pylon() -> tuple[Any, Any]:
     return pylon, genicam
 
 
+# fmt: off
+@dataclass(frozen=True, slots=True)
+class PylonSettings:
+    """Of ``pylon:...``; None: whatever the camera has."""
+
+    format: str | None = setting(str, None, "as of `genicam:`")
+    width: str | None = setting(str, None, "region of the sensor", "px")
+    height: str | None = setting(str, None, "region of the sensor", "px")
+    x: str | None = setting(str, None, "region of the sensor", "px")
+    y: str | None = setting(str, None, "region of the sensor", "px")
+    exposure_us: str | None = setting(str, None, "exposure, within the bounds of the camera", "us")
+    gain: str | None = setting(str, None, "in the camera's own unit, within its bounds")
+    fps: str | None = setting(str, None, "frames a second, within the bounds of the camera", "1/s")
+    white: int | None = setting(whole(1, 65535), None, "grey level of saturation, where it is not the highest", "GL")
+    buffers: int = setting(whole(2, 1000), 16, "pictures that the library holds")
+    stall_s: float | None = setting(number(0.1), None, "time without a picture that counts as a stall", "s")
+    features: Mapping[str, str] = others(str, "any feature by its name")
+
+    def asked(self) -> dict[str, str]:
+        """What the camera is asked for, by the keys of the address."""
+        given = {key: getattr(self, key) for key in FEATURES}
+        return {**self.features, **{key: value for key, value in given.items() if value is not None}}
+# fmt: on
+
+
 class PylonDriver:
     """An open Basler camera; see ``acquire.camera.live.Driver``.
 
@@ -68,11 +93,8 @@ class PylonDriver:
         self._pylon, self._genicam = _pylon()
         self.name = self._address = address.text
         self._serial = serial
-        options = Options(address)
-        self._white = options.integer("white", minimum=1, maximum=65535)
-        self._buffers = options.integer("buffers", 16, minimum=2, maximum=1000)
-        self._stall_s = options.number("stall_s", minimum=0.1)
-        self._asked = options.rest()
+        self._settings = read_settings(PylonSettings, address)
+        self._asked = self._settings.asked()
         with self._faults():
             self._camera = self._open()
             try:
@@ -130,7 +152,7 @@ class PylonDriver:
                 "{address}: this camera has no {key}; known settings: {listed}",
                 self._address,
                 key,
-                ", ".join(FEATURES),
+                keys_of(PylonSettings),
             )
         try:
             node.FromString(value)
@@ -172,15 +194,15 @@ class PylonDriver:
             controls={key: node.ToString() for key, node in nodes.items() if node is not None} | self._asked,
             settings=exposure_and_gain(_bounded(exposure), _bounded(nodes["gain"]), fps),
             formats=tuple(readable(list(camera.PixelFormat.Symbolics))),
-            white_level=self._white,
-            pause_s=self._stall_s or longest_pause_s(fps, exposure_s),
+            white_level=self._settings.white,
+            pause_s=self._settings.stall_s or longest_pause_s(fps, exposure_s),
         )
 
     def start(self) -> None:
         """Stream."""
         with self._faults():
             if not self._camera.IsGrabbing():
-                self._camera.MaxNumBuffer.Value = self._buffers
+                self._camera.MaxNumBuffer.Value = self._settings.buffers
                 self._camera.StartGrabbing(self._pylon.GrabStrategy_OneByOne)
 
     def fetch(self, timeout_s: float) -> Picture | None:
@@ -215,7 +237,7 @@ class PylonDriver:
 
 
 def open_pylon(address: Address, on_event: EventSink) -> LiveCamera:
-    """Open ``pylon:...``; the module's text names the settings.
+    """Open ``pylon:...``; ``PylonSettings`` are its settings.
 
     Raises
     ------

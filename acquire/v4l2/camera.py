@@ -2,10 +2,6 @@
 
 Our own reader: raw grey levels, the driver's sequence numbers and stamps, settings read back. A camera that was away
 is known again by its identity, also under another name.
-
-Settings: ``format``, ``width``, ``height``, ``fps``, ``input``, ``plane=raw|r|g|b`` (Bayer),
-``white``, ``buffers``, ``stall_s``, ``manual=yes|no``, ``exposure_us``, ``gain``, and every control of the
-camera by its name (``brightness=10``).
 """
 
 from __future__ import annotations
@@ -16,19 +12,20 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from acquire.addresses import Address, Options
+from acquire.addresses import Address
 from acquire.camera.live import DeviceFault, Driver, LiveCamera, Picture
 from acquire.camera.timing import StampOf, longest_pause_s
-from acquire.errors import ConfigError, DataError, DeviceError
+from acquire.errors import DataError, DeviceError
 from acquire.events import EventSink
 from acquire.frame import CameraInfo
+from acquire.settings import read_settings
 from acquire.text import Message
 from acquire.v4l2.api import Kernel
-from acquire.v4l2.controls import ControlWishes
 from acquire.v4l2.device import Identity, Mode, NotACamera, Stamp, V4L2Device
 from acquire.v4l2.faults import cameras_here, fault_in_words, find_again, identities, why_not_open
-from acquire.v4l2.formats import PLANES, decode, picture_size
-from acquire.v4l2.setup import V4L2Settings, set_up
+from acquire.v4l2.formats import decode, picture_size
+from acquire.v4l2.settings import V4L2Settings
+from acquire.v4l2.setup import set_up
 
 log = logging.getLogger(__name__)
 
@@ -157,7 +154,7 @@ class V4L2Opener:
 
     def __init__(self, address: Address, kernel: Kernel) -> None:
         self._address, self._kernel = address, kernel
-        self._settings = v4l2_settings(address)
+        self._settings = read_settings(V4L2Settings, address)
         self._others: frozenset[Identity] = frozenset()
 
     def __call__(self, before: Driver | None) -> V4L2Driver:
@@ -190,7 +187,7 @@ class V4L2Opener:
 
 
 def open_v4l2(address: Address, on_event: EventSink, kernel: Kernel | None = None) -> LiveCamera:
-    """Open ``/dev/video0?...``; the module's text names the settings.
+    """Open ``/dev/video0?...``; ``V4L2Settings`` are its settings.
 
     Raises
     ------
@@ -199,43 +196,3 @@ def open_v4l2(address: Address, on_event: EventSink, kernel: Kernel | None = Non
     """
     kernel = kernel or Kernel()
     return LiveCamera(address.text, V4L2Opener(address, kernel), on_event, kernel.now)
-
-
-def v4l2_settings(address: Address) -> V4L2Settings:
-    """The settings of the address.
-
-    Raises
-    ------
-    ConfigError
-        An impossible value. Unknown keys are taken for controls, and refused with their
-        list once the camera is open.
-    """
-    options = Options(address)
-    plane = options.choice("plane", PLANES, "raw")
-    fourcc = options.text("format")
-    return V4L2Settings(
-        format=fourcc.strip().upper() if fourcc else None,
-        width=options.integer("width", minimum=1, maximum=65536),
-        height=options.integer("height", minimum=1, maximum=65536),
-        fps=options.number("fps", minimum=1e-3, maximum=1e5),
-        input=options.integer("input", minimum=0),
-        plane=next(name for name in PLANES if name == plane),
-        white=options.integer("white", minimum=1, maximum=65535),
-        buffers=options.integer("buffers", 8, minimum=2, maximum=32),
-        stall_s=options.number("stall_s", minimum=0.1),
-        controls=ControlWishes(
-            manual=options.flag("manual", True),
-            exposure_us=options.number("exposure_us", minimum=1),
-            gain=options.integer("gain"),
-            named={key: _whole(address, key, value) for key, value in options.rest().items()},
-        ),
-    )
-
-
-def _whole(address: Address, key: str, value: str) -> int:
-    try:
-        return int(value, 0)
-    except ValueError as error:
-        raise ConfigError(
-            "{text}: {key}={value} is not possible; controls take whole numbers", address.text, key, value
-        ) from error

@@ -13,9 +13,11 @@ from dataclasses import dataclass, field
 
 from acquire.errors import ConfigError
 from acquire.frame import CameraSetting
+from acquire.settings import keys_of
 from acquire.text import Message
 from acquire.v4l2 import api
 from acquire.v4l2.device import V4L2Device
+from acquire.v4l2.settings import V4L2Settings
 
 INTEGER, BOOLEAN, MENU, BUTTON, INTEGER64, CLASS, STRING, BITMASK, INTEGER_MENU = range(1, 10)
 _VALUED = (INTEGER, BOOLEAN, MENU, BITMASK, INTEGER_MENU)
@@ -41,12 +43,6 @@ MANUAL: dict[int, int] = {
     0x9A0918: 0,  # sensitivity, automatic
 }
 _POWER_LINE_AUTO, _POWER_LINE_OFF = 3, 0
-
-# The settings of an address that are no controls, for messages.
-SETTINGS = (
-    *("format", "width", "height", "fps", "input", "plane", "white", "buffers", "stall_s"),
-    *("manual", "exposure_us", "gain"),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,28 +164,7 @@ def write_control(device: V4L2Device, number: int, value: int) -> int | None:
     return read_control(device, number)
 
 
-@dataclass(frozen=True, slots=True)
-class ControlWishes:
-    """What the address asks of the controls.
-
-    Attributes
-    ----------
-    manual : bool
-        Put everything automatic on manual first.
-    exposure_us : float or None, us
-    gain : int or None
-        In the driver's own steps.
-    named : mapping of str to int
-        Further controls by name.
-    """
-
-    manual: bool = True
-    exposure_us: float | None = None
-    gain: int | None = None
-    named: Mapping[str, int] = field(default_factory=dict)
-
-
-def apply_controls(device: V4L2Device, wishes: ControlWishes, where: str) -> dict[int, Control]:
+def apply_controls(device: V4L2Device, wishes: V4L2Settings, where: str) -> dict[int, Control]:
     """Put on manual, set what was asked, and list what is in force.
 
     Raises
@@ -215,7 +190,7 @@ def _put_on_manual(device: V4L2Device) -> None:
         write_control(device, POWER_LINE, _POWER_LINE_OFF)
 
 
-def _asked(controls: Mapping[int, Control], wishes: ControlWishes, where: str) -> list[tuple[int, int, str]]:
+def _asked(controls: Mapping[int, Control], wishes: V4L2Settings, where: str) -> list[tuple[int, int, str]]:
     asked: list[tuple[int, int, str]] = []
     if wishes.exposure_us is not None:
         _need(controls, EXPOSURE_100US, Message("an exposure in microseconds"), where)
@@ -227,7 +202,7 @@ def _asked(controls: Mapping[int, Control], wishes: ControlWishes, where: str) -
         _need(controls, number, "a gain", where)
         asked.append((number, wishes.gain, ""))
     by_name = {control.name: control for control in controls.values()}
-    for name, value in wishes.named.items():
+    for name, value in wishes.controls.items():
         if name not in by_name:
             raise ConfigError("{where}: unknown setting {name}; {known}", where, repr(name), _known(controls))
         asked.append((by_name[name].id, value, ""))
@@ -243,7 +218,7 @@ def _need(controls: Mapping[int, Control], number: int, what: str, where: str) -
 
 def _known(controls: Mapping[int, Control]) -> str:
     names = ", ".join(sorted(control.name for control in controls.values())) or "none"
-    return Message("known: {listed}; controls of this camera: {names}", ", ".join(SETTINGS), names)
+    return Message("known: {listed}; controls of this camera: {names}", keys_of(V4L2Settings), names)
 
 
 def _set(device: V4L2Device, control: Control, value: int, unit: str, where: str) -> None:

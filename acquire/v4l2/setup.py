@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from acquire.errors import ConfigError, DeviceError
@@ -11,47 +11,14 @@ from acquire.text import Message
 from acquire.v4l2 import api
 from acquire.v4l2.controls import (
     Control,
-    ControlWishes,
     apply_controls,
     changeable,
     exposure_s,
     still_automatic,
 )
 from acquire.v4l2.device import Mode, V4L2Device
-from acquire.v4l2.formats import FORMATS, PixelFormat, Plane, preferred, warning_of
-
-
-@dataclass(frozen=True, slots=True)
-class V4L2Settings:
-    """What an address asks of a V4L2 camera; None: whatever it has.
-
-    Attributes
-    ----------
-    format : str or None
-        Four-character code; None: the best grey one there is.
-    width, height : int or None, px
-    fps : float or None, 1/s
-    input : int or None
-    plane : "raw" | "r" | "g" | "b"
-        Of a Bayer mosaic.
-    white : int or None, GL
-        Where a sample is saturated; None: at the highest of its bits.
-    buffers : int
-    stall_s : float or None, s
-        Time without a picture that counts as a stall; None: from frame rate and exposure.
-    controls : ControlWishes
-    """
-
-    format: str | None = None
-    width: int | None = None
-    height: int | None = None
-    fps: float | None = None
-    input: int | None = None
-    plane: Plane = "raw"
-    white: int | None = None
-    buffers: int = 8
-    stall_s: float | None = None
-    controls: ControlWishes = field(default_factory=ControlWishes)
+from acquire.v4l2.formats import FORMATS, PixelFormat, preferred, warning_of
+from acquire.v4l2.settings import V4L2Settings
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +70,7 @@ def set_up(device: V4L2Device, settings: V4L2Settings, where: str) -> Setup:
         _choose_input(device, settings.input, where)
     fourcc = _choose_format(device, settings.format, where)
     _set_format(device, fourcc, settings, where)
-    controls = apply_controls(device, settings.controls, where)
+    controls = apply_controls(device, settings, where)
     if settings.fps is not None:
         _set_fps(device, fourcc, settings.fps, where)
     return _in_force(device, settings, controls)

@@ -15,16 +15,17 @@ from analysis.evaluate.figure import AT_LEAST, CONFIDENCE, Figure
 from analysis.evaluate.floor import MIN_STILL_INSTANTS, NoiseFloor, evenly, noise_floor, still_phase
 from analysis.evaluate.flow import Neck, neck, true_at_top
 from analysis.evaluate.gauges.extensometers import (
+    REGION,
     ExtensionGauge,
     LineGauge,
+    RegionStrips,
     TransverseGauge,
-    extension_of,
-    strips_of,
 )
-from analysis.evaluate.gauges.gauge import Gauge, GaugeValue, Parameter
+from analysis.evaluate.gauges.gauge import Gauge, Parameter
 from analysis.evaluate.gauges.geometry import inside_polygon
 from analysis.evaluate.gauges.kinds import GAUGE_KINDS, AreaGauge, CircleGauge, StripGauge, ZoiGauge
-from analysis.evaluate.gauges.readings import COME_APART, distance, facing
+from analysis.evaluate.gauges.readings import GaugeSet, GaugeValue, distance, facing
+from analysis.evaluate.gauges.taken import COME_APART
 from analysis.evaluate.lag import Track, find_lag
 from analysis.evaluate.programme import KINDS, Kind
 from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
@@ -38,6 +39,7 @@ __all__ = [
     "GAUGE_KINDS",
     "KINDS",
     "MIN_STILL_INSTANTS",
+    "REGION",
     "STANDARDS",
     "AreaGauge",
     "AreaStrain",
@@ -49,6 +51,7 @@ __all__ = [
     "ExtensionGauge",
     "Figure",
     "Gauge",
+    "GaugeSet",
     "GaugeValue",
     "Interval",
     "Kind",
@@ -57,6 +60,7 @@ __all__ = [
     "Neck",
     "NoiseFloor",
     "Parameter",
+    "RegionStrips",
     "Span",
     "Standard",
     "StrainZero",
@@ -74,7 +78,6 @@ __all__ = [
     "effect",
     "evaluate_test",
     "evenly",
-    "extension_of",
     "facing",
     "find_lag",
     "free",
@@ -84,7 +87,6 @@ __all__ = [
     "noise_floor",
     "principal_direction",
     "still_phase",
-    "strips_of",
     "true_at_top",
     "true_curve",
 ]

@@ -19,7 +19,9 @@ from analysis.evaluate.elastic import (
     MIN_POINTS,
     FittedLine,
     between,
+    blur_share,
     chord,
+    lens_share,
     line_through,
     not_uniform,
     poisson,
@@ -30,7 +32,6 @@ from analysis.evaluate.flow import anisotropy, hardening
 from analysis.evaluate.programme import KindOfTest
 from analysis.evaluate.rates import midway, seconds_of, strain_rate
 from analysis.evaluate.seen import Unseen, confirmed, unseen
-from analysis.evaluate.shares import blur_share, lens_share
 from analysis.evaluate.standards import Standard
 from analysis.evaluate.strengths import (
     Yield,

@@ -7,7 +7,7 @@
 from analysis.field.blocks import area_share, in_blocks
 from analysis.field.blur import Blur, blur_maps, mean_blur
 from analysis.field.common import CommonError
-from analysis.field.grid import WINDOWS, Roi, Window, ZoiGrid, profile
+from analysis.field.grid import WINDOWS, Roi, Window, ZoiGrid, overlap, profile
 from analysis.field.motion import Motion
 from analysis.field.part import Block, part_of
 from analysis.field.status import Status
@@ -50,6 +50,7 @@ __all__ = [
     "fixed_sums",
     "in_blocks",
     "mean_blur",
+    "overlap",
     "part_of",
     "products",
     "profile",

@@ -37,10 +37,12 @@ def area_share(field: StrainField, where: ArrayLike | None = None) -> float:
     where : (R, C) bool, optional
         The ZOIs of a gauge; None: all.
     """
-    able = ~np.isin(field.status, (Status.NOT_MEASURED, Status.NO_PATTERN))
+    able = (field.status != Status.NOT_MEASURED) & (field.status != Status.NO_PATTERN)
     if where is not None:
         able &= np.asarray(where, bool)
-    lost, count = able & ~field.ok, int(np.count_nonzero(able))
-    if not lost.any() or not in_blocks(lost, max(1, min(MIN_BLOCK, round(BLOCK_SHARE * count)))).any():
+    lost = able & ~field.ok
+    n_lost, count = int(np.count_nonzero(lost)), int(np.count_nonzero(able))
+    least = max(1, min(MIN_BLOCK, round(BLOCK_SHARE * count)))
+    if n_lost < least or not in_blocks(lost, least).any():
         return 1.0
-    return 1 - np.count_nonzero(lost) / count
+    return 1 - n_lost / count

@@ -38,7 +38,7 @@ class Block:
         return ZoiGrid(Roi(x[0], y[0], width, height), grid.size, grid.step, active)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class PartSums:
     """``Sums`` of the whole grid, of ``shape``, for one block of it."""
 

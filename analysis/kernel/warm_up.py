@@ -26,7 +26,7 @@ log = logging.getLogger("analysis")
 
 COMPILE_SECONDS = 60
 """About how long one process takes for everything; for the announcement."""
-FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 91, 4, 7
+FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 93, 4, 7
 """That are compiled in all, more for each kind of pictures, and for the estimator by phases."""
 ITERATION, REST, PHASE, ALL = "iteration", "rest", "phase", "all"
 COMPILE_PARTS = (ITERATION, REST)
@@ -44,6 +44,7 @@ def not_compiled(kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) ->
 
 
 def _loops(phase: bool) -> list[Any]:
+    from analysis.compiled import sparse_sums
     from analysis.fit import assembly, iteration, pooling, sensitivity, shared, sums, verdict
     from analysis.follow import block_match, coherence, hill_climb, prediction
 
@@ -52,6 +53,7 @@ def _loops(phase: bool) -> list[Any]:
         prediction.advance, verdict.judge, coherence.stand_out, coherence.label,
         assembly.expect, assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.medians,
         pooling.interpolate, assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
+        sparse_sums.row_sums, sparse_sums.overlapping,
     ]  # fmt: skip
     return loops + [iteration.compose_all, iteration.within_image] * phase
 
@@ -127,6 +129,7 @@ def _everything(kinds: Sequence[str], phase: bool) -> None:
     from analysis.kernel.phase_kernel import PhaseKernel
     from analysis.kernel.settings import KernelSettings
 
+    _gauges()
     interpolate(np.ones(1), np.arange(2.0), np.ones(2), np.ones(1))  # not reached with so few ZOIs
     image, grid = _small()
     ways = [KernelSettings(), KernelSettings(order=2)]
@@ -210,6 +213,7 @@ def _rest() -> None:
     from analysis.kernel.reference import ReferencePicture
     from analysis.kernel.settings import KernelSettings
 
+    _gauges()
     image, grid = _small()
     FORK_GUARD.check()
     # No PhaseKernel: its self-test would compile the iteration.
@@ -242,3 +246,16 @@ def _rest() -> None:
     still = StrainField.from_values(grid, {}, 0.1)
     # Parts are looked for where ZOIs are lost.
     coherent(replace(still, status=np.where(grid.x > 50, np.uint8(Status.LOST), still.status)))
+
+
+def _gauges() -> None:
+    """The sums over gauges, for none."""
+    from analysis.compiled.loops import read_only
+    from analysis.compiled.sparse_sums import overlapping, row_sums
+
+    first, no, none, triples = np.zeros(1, np.intp), np.empty(0, np.intp), np.empty(0), np.empty((0, 3))
+    covariance = read_only(np.empty((21, 0), np.float32))
+    row_sums(first, no, none, triples, triples)
+    overlapping(
+        first, no, none, triples.astype(np.intp), triples, no, np.empty((4, 1, 1)), 1, covariance, none
+    )

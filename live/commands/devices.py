@@ -12,6 +12,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic devices``."""
     words = "watch each device and write what it does, to be sent: no pictures, no names (default FILE: %(const)s)"
     parser.add_argument("--report", nargs="?", const="phasedic-devices.txt", metavar="FILE", help=words)
+    words = "the settings that an address of each kind of camera takes"
+    parser.add_argument("--settings", action="store_true", help=words)
     words = "with --report: only this camera; may be repeated"
     parser.add_argument("--camera", action="append", default=[], metavar="ADDRESS", help=words)
     words = "with --report: only this load cell; may be repeated"
@@ -24,6 +26,8 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic devices [--report [FILE]]``."""
     if arguments.report is not None:
         return _report(arguments)
+    if arguments.settings:
+        return _settings()
     from acquire.camera import list_cameras
     from acquire.serial_line.ports import list_serial_ports
     from acquire.text.printable import printable
@@ -42,6 +46,18 @@ def command(arguments: argparse.Namespace) -> int:
     for port in ports:
         print_line(port.text())
     print_line(f"threads that measure: {threads()}")
+    return 0
+
+
+def _settings() -> int:
+    from acquire.camera import CAMERAS
+    from acquire.settings import settings_of
+
+    for scheme, kind in CAMERAS.settings():
+        print_line(f"{scheme}:" if scheme else "/dev/...:")
+        for one in settings_of(kind):
+            more = "; ".join(filter(None, (one.allowed, one.unit, one.stands)))
+            print_line(f"  {one.key or '...'}: {one.words}" + f" ({more})" * bool(more))
     return 0
 
 

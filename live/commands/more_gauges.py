@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from acquire.errors import ConfigError
-from analysis.evaluate import Gauge
+from analysis.evaluate import Gauge, GaugeSet
 from live.config.gauges import gauges_for
 from live.config.loading import load_config
 from live.results.row import gauge_columns
@@ -44,10 +44,7 @@ def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
 
 def _read(run: RunFolder, gauges: tuple[Gauge, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Values and sigmas, (T, number of gauges) each."""
-    values, sigmas = np.full((2, run.strain.n, len(gauges)), np.nan)
-    for row in range(run.strain.n):
-        field = run.field(row)
-        for k, gauge in enumerate(gauges):
-            read = gauge.measure(field)
-            values[row, k], sigmas[row, k] = read.value, read.sigma
-    return values, sigmas
+    gauge_set = GaugeSet(gauges)
+    read = [gauge_set.read(run.field(row)).values() for row in range(run.strain.n)]
+    found = np.array([[(one.value, one.sigma) for one in row] for row in read]).reshape(-1, len(gauges), 2)
+    return found[..., 0], found[..., 1]

@@ -19,6 +19,7 @@ from acquire.events import Event, EventKind, EventSink, Level, ignore_event
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
 from acquire.text import Message
+from analysis.evaluate import REGION, GaugeSet
 from analysis.field import part_of
 from analysis.optics import (
     ASSUMED_TILT,
@@ -276,7 +277,7 @@ def measure(
     Measurement
         One for each burst, in order, but for those that failed.
     """
-    number, motion = -1, BurstMotion()
+    number, motion, sets = -1, BurstMotion(), (GaugeSet(gauges), GaugeSet(REGION))
     for item in bursts:
         number += isinstance(item, Burst)
         try:
@@ -290,7 +291,8 @@ def measure(
             field, of_plates, of_lens = corrections.applied(whole, item, strain)
             field = motion.apply(field, item.t, item.duration)
             took = timer() - began
-            measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, of_plates)
+            force, (values, extensions) = loads.force_at(item.t), (one.read(field) for one in sets)
+            measurement = Measurement.of(number, item, field, force, took, values, of_plates, extensions)
             measurement = replace(measurement.with_lens(of_lens), as_measured=whole)
             for guard in guards:
                 guard.check(field, measurement.time_step)

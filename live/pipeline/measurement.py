@@ -7,22 +7,23 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, Protocol
+from types import MappingProxyType
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from acquire.frame import Burst
 from acquire.text import Message
-from analysis.evaluate import COME_APART, AreaStrain, Gauge, GaugeValue, extension_of
+from analysis.evaluate import COME_APART, REGION, AreaStrain, GaugeSet, GaugeValue
 from analysis.field import StrainField, area_share, mean_blur
 from analysis.optics import ApparentMotion, LensReading
 
 AXIAL, TRANSVERSE = "axial", "transverse"
 """Gauges of these names are the strain along and across the load."""
-AXES: tuple[Literal["x", "y"], ...] = ("x", "y")
+NO_GAUGES: Mapping[str, GaugeValue] = MappingProxyType({})
 HOLD_S = 2.0
 """Measurements wait for their force at most this long, in measured time."""
 
@@ -158,10 +159,10 @@ def extension_along(gauges: Container[str], axis: str) -> str:
     return AXIAL if AXIAL in gauges else f"extension_{axis}"
 
 
-def region_strains(field: StrainField) -> dict[str, Any]:
+def region_strains(field: StrainField, extensions: Mapping[str, GaugeValue] | None = None) -> dict[str, Any]:
     """The strains of a ``TimeStep`` by their names; NaN where no ZOI has a value, or the region has come apart.
 
-    The extension between strips stays: parts of a specimen have one, too.
+    The ``extensions`` between strips (``analysis.evaluate.REGION``) stay: parts of a specimen have them, too.
     """
     area, names = AreaStrain.of(field), ("exx", "eyy", "exy")
     found: dict[str, Any] = dict.fromkeys((*names, *(f"sigma_{name}" for name in names)), math.nan)
@@ -170,23 +171,23 @@ def region_strains(field: StrainField) -> dict[str, Any]:
         found |= {"uneven_exx": uneven.exx, "uneven_eyy": uneven.eyy, "misfit": uneven.misfit}
         for name in names:
             found |= {name: area.value(name), f"sigma_{name}": area.sigma(name)}
-    if not field.n_valid:
-        return found
-    for axis in AXES:
-        extension = extension_of(field, axis)
-        found |= {f"extension_{axis}": extension.value, f"sigma_extension_{axis}": extension.sigma}
+    for name, extension in (extensions or GaugeSet(REGION).read(field)).items():
+        found |= {name: extension.value, f"sigma_{name}": extension.sigma}
     return found
 
 
-def time_step_of(burst: Burst, field: StrainField, force: float, measure_s: float = 0.0) -> TimeStep:
-    """The strains of ``field``, measured from ``burst``."""
+def time_step_of(
+    burst: Burst, field: StrainField, force: float, measure_s: float = 0.0,
+    extensions: Mapping[str, GaugeValue] | None = None,
+) -> TimeStep:  # fmt: skip
+    """The strains of ``field``, measured from ``burst``; see ``region_strains``."""
     valid = field.ok
     values = np.concatenate([field.exx[valid], field.eyy[valid]])
     blur = mean_blur(field)
     return TimeStep(
         t=burst.t,
         force=force,
-        **region_strains(field),
+        **region_strains(field, extensions),
         u=ordered_mean(field.u[valid]),
         v=ordered_mean(field.v[valid]),
         largest=float(values[np.argmax(np.abs(values))]) if values.size else math.nan,
@@ -278,14 +279,14 @@ class Measurement:
     @classmethod
     def of(
         cls, number: int, burst: Burst, field: StrainField, force: float, measure_s: float = 0.0,
-        gauges: Sequence[Gauge] = (), plates: PlateReading | None = None,
+        gauges: Mapping[str, GaugeValue] = NO_GAUGES, plates: PlateReading | None = None,
+        extensions: Mapping[str, GaugeValue] | None = None,
     ) -> Measurement:  # fmt: skip
-        """Compute the means and the values of ``gauges``.
+        """Compute the means, beside the values of ``gauges``; see ``region_strains``.
 
         ``force`` (N) is NaN where it is not known, ``measure_s`` (s) the time of the kernel.
         """
-        values = {gauge.name: gauge.read(field) for gauge in gauges}
-        step = replace(time_step_of(burst, field, force, measure_s), gauges=values)
+        step = replace(time_step_of(burst, field, force, measure_s, extensions), gauges=gauges)
         return cls(number, burst, field, step, plates)
 
     def with_lens(self, lens: LensReading | None) -> Measurement:

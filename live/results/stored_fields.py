@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
-from analysis.evaluate import ExtensionGauge, distance, facing, strips_of
+from analysis.evaluate import ExtensionGauge, RegionStrips, distance, facing
 from analysis.evaluate.area.affine import Places, noise_of_windows
 from analysis.field import PAIR_INDEX, WINDOWS, Measure, StrainField, Window
 from live.config.gauges import gauges_for
@@ -115,7 +115,7 @@ def window_of(strain: Strain) -> Window:
 def length_between(strain: Strain, axis: Literal["x", "y"], described: Mapping[str, Any] | None) -> float:
     """L0 of the extension, px: between strips along ``axis``, where they face each other, or between the ends of the
     gauge ``described``; NaN without ends."""
-    ends, along = strips_of(strain.grid, axis), str(axis)
+    ends, along = RegionStrips(axis).zois(strain.grid), str(axis)
     if described is not None:
         try:
             table = from_dict({"gauges": {"axial": dict(described)}}, {}, str(strain.path)).gauges

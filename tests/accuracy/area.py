@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 
 from analysis import KernelSettings, PhaseKernel, Roi, ZoiGrid
 from analysis.evaluate import (
+    REGION,
     AreaStrain,
     Curve,
+    GaugeSet,
     Interval,
     TensileFigures,
     TensileOptions,
     evaluate_test,
-    extension_of,
     free,
 )
 from analysis.field import StrainField
@@ -150,7 +151,7 @@ def outcome(kind: Kind, size: int, share: float, instants: int, blur_px: float =
         assert area is not None
         values.append([area.value(name) for name in STRAINS])
         sigmas.append([area.sigma(name) for name in STRAINS])
-        extensions.append(extension_of(found, "y").value)
+        extensions.append(GaugeSet(REGION).read(found)["extension_y"].value)
     truth = np.stack([transverse, axial, np.zeros_like(axial)], axis=1)
     force = np.random.default_rng(0).normal(0, FORCE_NOISE_N, instants)
     measured = np.array(values)

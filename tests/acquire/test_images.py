@@ -262,7 +262,7 @@ def test_stop_ends_the_iteration(tmp_path: Path) -> None:
 
 def test_unknown_settings_list_the_known_ones(tmp_path: Path) -> None:
     write(tmp_path / "a.png", picture())
-    with pytest.raises(ConfigError, match="known: gray, fps, bits, white, stamps"):
+    with pytest.raises(ConfigError, match="known: fps, gray, bits, white, stamps"):
         open_camera(f"files:{tmp_path}?rate=5")
 
 

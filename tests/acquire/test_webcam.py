@@ -185,24 +185,6 @@ def test_stamps_of_the_driver_tell_how_many_were_lost() -> None:
     assert [frame.t for frame in frames] == pytest.approx([100.1 + k / 30 for k in steps])
 
 
-def test_a_camera_that_gives_half_of_the_rate_it_says_loses_nothing_and_is_named() -> None:
-    events: list[Event] = []
-    capture = StampedCapture([100.0 + k / 15 for k in range(42)])
-    camera = live_camera("opencv:0", lambda: capture, OpenCVSettings(), events.append, now=lambda: 100.0)
-    frames = take(camera, 40)
-    assert sum(frame.lost_before for frame in frames) == 0 and frames[-1].index == 39
-    told = [event.text for event in events if "frames a second come" in event.text]
-    assert len(told) == 1 and "15 frames" in told[0] and "30" in told[0]
-
-
-def test_a_camera_that_slows_down_in_low_light_loses_one_frame_at_most() -> None:
-    stamps = [100.0 + k / 30 for k in range(30)]
-    stamps += [stamps[-1] + k / 15 for k in range(1, 31)]
-    capture = StampedCapture(stamps)
-    camera = live_camera("opencv:0", lambda: capture, OpenCVSettings(), ignore_event, now=lambda: 100.0)
-    assert sum(frame.lost_before for frame in take(camera, 58)) <= 1
-
-
 class Unsettable(FakeCapture):
     """Takes settings without a word, and changes nothing."""
 

@@ -13,15 +13,16 @@ from analysis.evaluate import (
     AreaGauge,
     CircleGauge,
     ExtensionGauge,
+    GaugeSet,
+    GaugeValue,
     LineGauge,
+    RegionStrips,
     StripGauge,
     TransverseGauge,
     ZoiGauge,
     distance,
-    extension_of,
     facing,
     inside_polygon,
-    strips_of,
 )
 from analysis.evaluate.gauges.readings import MIN_SHARE
 from analysis.field import PAIR_INDEX, CommonError, Roi, Status, StrainField, ZoiGrid
@@ -38,6 +39,15 @@ def field(grid: ZoiGrid = GRID, status: np.ndarray | None = None) -> StrainField
     g = SHEARED
     values = {"u": g["du_dx"] * x + g["du_dy"] * y, "v": g["dv_dx"] * x + g["dv_dy"] * y, **g}
     return StrainField.from_values(grid, values, 1e-2, status)
+
+
+def extension_of(found: StrainField, along: Axis) -> GaugeValue:
+    (value,) = GaugeSet([RegionStrips(along)]).read(found).values()
+    return value
+
+
+def zois_of(grid: ZoiGrid, along: Axis) -> tuple[np.ndarray, ...]:
+    return RegionStrips(along).zois(grid)
 
 
 def along_line(direction: tuple[float, float]) -> float:
@@ -59,11 +69,11 @@ def test_the_strips_of_a_grid_are_the_sixths_of_what_is_active(along: Axis) -> N
     """Two of twelve rows and of eleven columns; one of the eight and the seven within a border that is off."""
     k = "yx".index(along)
     count, of = GRID.shape[k], np.indices(GRID.shape)[k]
-    first, last = strips_of(GRID, along)
+    first, last = zois_of(GRID, along)
     assert np.array_equal(first, of < 2) and np.array_equal(last, of >= count - 2)
-    first, last = strips_of(GRID.subset(active=(of >= 2) & (of < count - 2)), along)
+    first, last = zois_of(GRID.subset(active=(of >= 2) & (of < count - 2)), along)
     assert np.array_equal(first, of == 2) and np.array_equal(last, of == count - 3)
-    nothing = strips_of(GRID.subset(active=np.zeros(GRID.shape, bool)), along)
+    nothing = zois_of(GRID.subset(active=np.zeros(GRID.shape, bool)), along)
     assert not any(end.any() for end in nothing)
 
 
@@ -71,7 +81,7 @@ def test_the_strips_of_a_grid_are_the_sixths_of_what_is_active(along: Axis) -> N
 def test_an_end_that_lost_one_side_is_read_where_both_have_values(along: Axis) -> None:
     """In a sheared field a line that leans would show another strain."""
     status = np.zeros(GRID.shape, int)
-    strip = strips_of(GRID, along)[0]
+    strip = zois_of(GRID, along)[0]
     across = np.indices(GRID.shape)["xy".index(along)]
     status[strip & (across < 5)] = Status.LOST
     found = extension_of(field(status=status), along)
@@ -84,7 +94,7 @@ def test_an_end_that_lost_one_side_is_read_where_both_have_values(along: Axis) -
 def test_ends_that_have_values_beside_each_other_alone_have_no_line() -> None:
     """Of twelve rows the first end has the lower six left, the other one the upper six."""
     rows, status = np.indices(GRID.shape)[0], np.zeros(GRID.shape, int)
-    for end, lost in zip(strips_of(GRID, "x"), (rows < 6, rows >= 6), strict=True):
+    for end, lost in zip(zois_of(GRID, "x"), (rows < 6, rows >= 6), strict=True):
         status[end & lost] = Status.LOST
     found = extension_of(field(status=status), "x")
     assert found.reason == "the ZOIs with a value at its two ends do not face each other"
@@ -94,7 +104,7 @@ def test_strips_that_hardly_face_each_other_are_read_whole() -> None:
     """A specimen that leans: its upper end is left of its lower one."""
     rows, columns = np.indices(GRID.shape)
     leaning = GRID.subset(active=np.abs(columns - rows * 0.8) < 2.1)
-    first, last = strips_of(leaning, "y")
+    first, last = zois_of(leaning, "y")
     assert facing([first, last], "y") is None
     x, y = np.meshgrid(GRID.x, GRID.y)
     direction = (x[last].mean() - x[first].mean(), y[last].mean() - y[first].mean())
@@ -161,8 +171,8 @@ def test_the_share_of_a_gauge_is_that_of_its_worse_end() -> None:
     for end in (first, last):
         status = np.zeros(GRID.shape, int)
         status[tuple(np.argwhere(end)[0])] = Status.LOST
-        assert gauge.read(field(status=status)).share == pytest.approx(0.8)
-    assert gauge.read(field()).share == 1.0
+        assert gauge.measure(field(status=status)).share == pytest.approx(0.8)
+    assert gauge.measure(field()).share == 1.0
 
 
 def test_a_point_is_one_zoi_and_what_is_off_is_none() -> None:

@@ -27,7 +27,7 @@ ANALYSIS = {
     "analysis.compiled": "",
     "analysis.picture": "analysis.field analysis.compiled",
     "analysis.follow": "analysis.field analysis.compiled",
-    "analysis.evaluate": "analysis.field acquire.text",
+    "analysis.evaluate": "analysis.field analysis.compiled acquire.text",
     "analysis.optics": "analysis.field analysis.evaluate",
     "analysis.quality": "analysis.field analysis.picture",
     "analysis.fit": "analysis.field analysis.compiled analysis.picture",

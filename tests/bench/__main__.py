@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
 from analysis.kernel.warm_up import warm_up
 from tests.accuracy.truth import Speckle, affine, digitise
+from tests.bench import gauges as gauge_case
 from tests.bench import live, machine
 from tests.bench.peers import HOW_TO_ADD, Peer, missing, peers
 from tests.paper.others import Points
@@ -269,6 +270,11 @@ def bursts(report: Report) -> None:
     report.add("Burst averaging, 8 x 1280x1024 uint8", {"ms a burst": 1e3 * machine.best(burst_of, frames)})
 
 
+def gauges(report: Report) -> None:
+    for step, flicker in ((32, False), (16, False), (32, True)):
+        report.add("Virtual gauges, processor time", gauge_case.table(step, flicker))
+
+
 def start_up(report: Report) -> None:
     code = (
         "import time; t = time.perf_counter()\n"
@@ -298,7 +304,7 @@ def running(report: Report) -> None:
         report.add("The running program", {"case": name} | live.shown(live.case(words)))
 
 
-SECTIONS = (throughput, counts, first_frame, scaling, bursts, start_up, other_engines)
+SECTIONS = (throughput, counts, first_frame, scaling, bursts, gauges, start_up, other_engines)
 """Other people's programs last: the threads and processes they start disturb no other row."""
 
 

@@ -16,6 +16,7 @@ from acquire.events import Event, EventKind
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import SessionInfo, SessionWriter
+from analysis.evaluate import GaugeSet
 from analysis.field.strain_field import StrainField
 from live.config.gauges import gauges_for
 from live.config.loading import from_dict
@@ -108,8 +109,9 @@ def _write_results(
     )
     with Results(folder, make_grid(), info) as results:
         for k, strain in enumerate(strains):
-            burst = make_measurement(k, strain).burst
-            results.add(Measurement.of(k, burst, field_of(k, strain), force_of(strain), gauges=gauges))
+            burst, field = make_measurement(k, strain).burst, field_of(k, strain)
+            values = GaugeSet(gauges).read(field)
+            results.add(Measurement.of(k, burst, field, force_of(strain), gauges=values))
 
 
 def session_writer(

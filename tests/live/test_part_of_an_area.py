@@ -14,7 +14,7 @@ import pytest
 
 from acquire.text.printable import share_text
 from analysis import Status, StrainField
-from analysis.evaluate import AreaGauge, Gauge
+from analysis.evaluate import AreaGauge, Gauge, GaugeSet
 from analysis.field import ZoiGrid
 from live.pipeline.history import History
 from live.pipeline.measurement import Measurement
@@ -43,9 +43,8 @@ def field(lost: bool) -> StrainField:
 
 
 def measured(number: int, lost: bool) -> Measurement:
-    gauges: tuple[Gauge, ...] = (HALF, FAR)
-    burst = make_measurement(number, grid=GRID).burst
-    return Measurement.of(number, burst, field(lost), 10.0, gauges=gauges)
+    burst, found = make_measurement(number, grid=GRID).burst, field(lost)
+    return Measurement.of(number, burst, found, 10.0, gauges=GaugeSet([HALF, FAR]).read(found))
 
 
 def share_of(grid: ZoiGrid, gauge: Gauge | None) -> float:

@@ -91,7 +91,7 @@ class AffineFit:
         if key not in self._inverses:
             if len(self._inverses) >= _KEPT:
                 self._inverses.clear()
-            normal = fixed_sums(np.where(valid, self.normal, 0.0).reshape(36, -1)).reshape(6, 6)
+            normal = np.cumsum(np.where(valid, self.normal, 0.0), axis=2)[:, :, -1]  # in one order everywhere
             self._inverses[key] = np.asarray(np.linalg.inv(normal), np.float64)
         return self._inverses[key]
 
@@ -102,51 +102,55 @@ class AffineFit:
 
     def variance(self, name: str, strain: StrainField, valid: Bools) -> float:
         """Variance of a value of the affine field of the ``valid`` ZOIs (n,) of ``strain``."""
-        q = np.zeros(6)
-        for parameter, share in combination(name).items():
-            q[parameter] = share
+        variances = strain.covariance[_DISPLACEMENTS].reshape(2, -1)[:, self.at].astype(np.float64)
+        noise = np.sum(self.noise_weights(name, strain, valid) * variances, axis=0)
+        return fixed_sum(np.where(valid, noise, 0.0))
+
+    def noise_weights(self, name: str, strain: StrainField, valid: Bools) -> Floats:
+        """Weights (2, n) in ``variance`` of the variances of u and v of the ``valid`` ZOIs (n,)."""
+        q = _parameters(name)
         row = np.sum(q[:, None] * self.inverse(valid), axis=0)
         of_each = sum(
             share * np.sum(row[:, None] * self.normal[:, k], axis=0) for k, share in enumerate(q) if share
         )
-        variances = strain.covariance[_DISPLACEMENTS].reshape(2, -1)[:, self.at].astype(np.float64)
-        of_both = np.sum((q**2).reshape(2, 3), axis=1)[:, None]
-        noise = of_each * np.sum(of_both * variances / self.unit, axis=0) / np.sum(q**2) ** 2
-        return self._unit_variance(name, q, strain, valid) * fixed_sum(np.where(valid, noise, 0.0))
+        of_both = np.sum((q**2).reshape(2, 3), axis=1)[:, None] / np.sum(q**2) ** 2
+        return np.asarray(self._unit_variance(name, strain, valid) * of_each * of_both / self.unit)
 
     def weights(self, name: str, valid: Bools) -> Floats:
         """A value of the affine field of the ``valid`` ZOIs (n,) as a sum of their six values, (6, n)."""
-        q = np.zeros(6)
-        for parameter, share in combination(name).items():
-            q[parameter] = share
-        return self._weights(q, valid)
+        row = np.sum(_parameters(name)[:, None] * self.inverse(valid), axis=0)
+        return np.where(valid, np.sum(row[:, None, None] * self.sums, axis=0), 0.0)
 
-    def _unit_variance(self, name: str, q: Floats, strain: StrainField, valid: Bools) -> float:
+    def _unit_variance(self, name: str, strain: StrainField, valid: Bools) -> float:
         """Variance of a value for noise of 1: by the pattern where no ZOI is lost, and what windows make of a loss."""
         key = name, valid.tobytes()
         if key not in self._variances:
             if len(self._variances) >= _KEPT * len(VALUES):
                 self._variances.clear()
             places = Places.of(strain.grid, strain.window)
-            noise = noise_of_windows(places, self.at, self._weights(q, valid))
-            self._variances[key] = noise * self._beyond_windows(name, q, strain)
+            noise = noise_of_windows(places, self.at, self.weights(name, valid))
+            self._variances[key] = noise * self._beyond_windows(name, strain)
         return self._variances[key]
 
-    def _beyond_windows(self, name: str, q: Floats, strain: StrainField) -> float:
+    def _beyond_windows(self, name: str, strain: StrainField) -> float:
         """Variance of a value of all ZOIs with a pattern, over what follows from their windows alone."""
         pattern = strain.sums
         if pattern is None:
             return 1.0
         if name not in self._patterns:
-            weights = self._weights(q, self.measurable)
+            weights = self.weights(name, self.measurable)
             places = Places.of(strain.grid, strain.window)
             made = pattern.variance(self.at, weights)
             self._patterns[name] = made / noise_of_windows(places, self.at, weights)
         return self._patterns[name]
 
-    def _weights(self, q: Floats, valid: Bools) -> Floats:
-        row = np.sum(q[:, None] * self.inverse(valid), axis=0)
-        return np.where(valid, np.sum(row[:, None, None] * self.sums, axis=0), 0.0)
+
+def _parameters(name: str) -> Floats:
+    """A value as a sum of the six parameters, (6,)."""
+    q = np.zeros(6)
+    for parameter, share in combination(name).items():
+        q[parameter] = share
+    return q
 
 
 def affine_fit(strain: StrainField, area: Bools, valid: Bools) -> AffineFit:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
 
-from analysis.evaluate.gauges.gauge import Gauge, GaugeValue, Parameter
+from analysis.evaluate.gauges.gauge import Gauge, Parameter
 from analysis.evaluate.gauges.geometry import (
     Box,
     Line,
@@ -24,8 +23,8 @@ from analysis.evaluate.gauges.geometry import (
     zois_inside,
     zois_near,
 )
-from analysis.evaluate.gauges.readings import read_ends, read_strips
-from analysis.field import Roi, StrainField, ZoiGrid
+from analysis.evaluate.gauges.readings import GaugeReading
+from analysis.field import ZoiGrid
 
 BOX = Parameter("box", "x, y, width, height of an area, extension or transverse gauge")
 START, END = Parameter("point", "x, y of one end of a line"), Parameter("point", "x, y of the other")
@@ -69,8 +68,9 @@ class LineGauge(Gauge):
         reach = self.radius_px or grid.size / 2
         return tuple(zois_near(grid, end, reach) for end in (self.start, self.end))
 
-    def measure(self, field: StrainField) -> GaugeValue:
-        return read_ends(self.zois(field.grid), field)
+    @property
+    def reading(self) -> GaugeReading:
+        return GaugeReading("ends")
 
     def outline(self, zoi: float) -> tuple[Line, ...]:
         reach = self.radius_px or zoi / 2
@@ -112,8 +112,9 @@ class TransverseGauge(Gauge):
     def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         return tuple(zois_inside(grid, corners_of(box)) for box in ends_of(self.box, self.along, 1 / 3))
 
-    def measure(self, field: StrainField) -> GaugeValue:
-        return read_ends(self.zois(field.grid), field)
+    @property
+    def reading(self) -> GaugeReading:
+        return GaugeReading("ends")
 
     def outline(self, zoi: float) -> tuple[Line, ...]:
         return (closed(corners_of(self.box)),)
@@ -151,29 +152,34 @@ class ExtensionGauge(TransverseGauge):
         first, last = (box[k] + box[k + 2] / 2 for box in ends_of(self.box, self.along, _STRIP))
         return last - first
 
-    def measure(self, field: StrainField) -> GaugeValue:
-        return read_strips(self.zois(field.grid), field, self.along)
+    @property
+    def reading(self) -> GaugeReading:
+        return GaugeReading("ends", along=self.along)
 
 
-def strips_of(grid: ZoiGrid, along: Literal["x", "y"]) -> tuple[Mask, ...]:
-    """The two strips of ``extension_of``, (R, C) bool each."""
-    return _strips(grid.roi, grid.size, grid.step, grid.shape, grid.active.tobytes(), along)
+@dataclass(frozen=True, slots=True)
+class RegionStrips:
+    """(L - L0)/L0 between strips at the two ends of all active ZOIs, as of an ``ExtensionGauge``."""
+
+    along: Literal["x", "y"]
+
+    @property
+    def name(self) -> str:
+        return f"extension_{self.along}"
+
+    @property
+    def reading(self) -> GaugeReading:
+        return GaugeReading("ends", along=self.along)
+
+    def zois(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        """The two strips, (R, C) bool each."""
+        rows, columns = (np.flatnonzero(grid.active.any(axis=axis)) for axis in (1, 0))
+        if not rows.size:
+            return grid.active, grid.active
+        x, y = grid.x[columns[0]] - grid.step / 2, grid.y[rows[0]] - grid.step / 2
+        width, height = (float(np.ptp(found) + 1) * grid.step for found in (columns, rows))
+        return ExtensionGauge("", (float(x), float(y), width, height), self.along).zois(grid)
 
 
-def extension_of(field: StrainField, along: Literal["x", "y"]) -> GaugeValue:
-    """(L - L0)/L0 between strips at the two ends of all active ZOIs of a field; ``ExtensionGauge``."""
-    return read_strips(strips_of(field.grid, along), field, along)
-
-
-@lru_cache(maxsize=8)
-def _strips(
-    roi: Roi, size: int, step: int, shape: tuple[int, int], active: bytes, along: Literal["x", "y"]
-) -> tuple[Mask, ...]:
-    inside = np.frombuffer(active, np.bool_).reshape(shape)
-    grid = ZoiGrid(roi, size, step, inside)
-    rows, columns = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
-    if not rows.size:
-        return inside, inside
-    x, y = grid.x[columns[0]] - grid.step / 2, grid.y[rows[0]] - grid.step / 2
-    width, height = (float(np.ptp(found) + 1) * grid.step for found in (columns, rows))
-    return ExtensionGauge("", (float(x), float(y), width, height), along).zois(grid)
+REGION = RegionStrips("x"), RegionStrips("y")
+"""The extensions of a region, ``extension_x`` and ``extension_y``."""

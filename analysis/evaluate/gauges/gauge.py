@@ -1,8 +1,8 @@
 """What a virtual gauge is: a name and a geometry in px of the reference picture, read from a strain field.
 
-A kind of gauge is one class (``kinds``, ``extensometers``): its parameters with their bounds, the ZOIs it takes, its
-value, its outline, and how it is made from the places that a person drags on a picture. Uncertainties contain the noise
-of the reference and the correlation of overlapping ZOIs.
+A kind of gauge is one class (``kinds``, ``extensometers``): its parameters with their bounds, the ZOIs it takes, what
+is read from them, its outline, and how it is made from the places that a person drags on a picture. Uncertainties
+contain the noise of the reference and the correlation of overlapping ZOIs.
 """
 
 from __future__ import annotations
@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields, replace
+from dataclasses import MISSING, dataclass, fields
 from typing import Any, ClassVar, Literal
 
 from analysis.evaluate.gauges.geometry import Line, Mask, Point
-from analysis.field import StrainField, ZoiGrid, area_share
+from analysis.evaluate.gauges.readings import GaugeReading, GaugeSet, GaugeValue
+from analysis.field import StrainField, ZoiGrid
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,26 +49,6 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
-class GaugeValue:
-    """What a gauge reads from one field.
-
-    Attributes
-    ----------
-    value, sigma : float
-        Strain, or the unit of the gauge's value; NaN where there is none.
-    reason : str
-        Why there is none; empty where there is one.
-    share : float
-        Of its area that the value stands for, at either end (``analysis.field.area_share``).
-    """
-
-    value: float
-    sigma: float
-    reason: str = ""
-    share: float = 1.0
-
-
-@dataclass(frozen=True, slots=True)
 class Gauge(ABC):
     """A virtual gauge; raises ValueError where its parameters are impossible.
 
@@ -95,12 +76,10 @@ class Gauge(ABC):
     def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         """The ZOIs that lie where the gauge is, (R, C) bool: one mask, or one for each of its two ends."""
 
+    @property
     @abstractmethod
-    def measure(self, field: StrainField) -> GaugeValue:
-        """Its value with its standard uncertainty.
-
-        NaN with a reason where fewer than half of its ZOIs, or of those of one end, have a value.
-        """
+    def reading(self) -> GaugeReading:
+        """What is read from these ZOIs."""
 
     @abstractmethod
     def outline(self, zoi: float) -> tuple[Line, ...]:
@@ -138,10 +117,9 @@ class Gauge(ABC):
                 raise ValueError(f"a gauge of kind {cls.kind!r} needs {key!r}")
         return cls(name, **(by_axis | given))
 
-    def read(self, field: StrainField) -> GaugeValue:
-        """Its value with the share of its area that the value stands for."""
-        share = min(area_share(field, mask) for mask in self.zois(field.grid))
-        return replace(self.measure(field), share=share)
+    def measure(self, field: StrainField) -> GaugeValue:
+        """Its value with its standard uncertainty; of field after field, ``GaugeSet`` is faster."""
+        return GaugeSet([self]).read(field)[self.name]
 
     def zois(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         """The active ZOIs that it takes, (R, C) bool: one mask, or one for each of its two ends."""

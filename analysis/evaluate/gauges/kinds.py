@@ -19,7 +19,7 @@ from analysis.evaluate.gauges.extensometers import (
     LineGauge,
     TransverseGauge,
 )
-from analysis.evaluate.gauges.gauge import Gauge, GaugeValue, Parameter
+from analysis.evaluate.gauges.gauge import Gauge, Parameter
 from analysis.evaluate.gauges.geometry import (
     Box,
     Line,
@@ -33,8 +33,8 @@ from analysis.evaluate.gauges.geometry import (
     zois_inside,
     zois_near,
 )
-from analysis.evaluate.gauges.readings import Statistic, check_value, read_area
-from analysis.field import StrainField, ZoiGrid
+from analysis.evaluate.gauges.readings import GaugeReading, Statistic, check_value
+from analysis.field import ZoiGrid
 
 _VALUE = Parameter(
     "choice",
@@ -74,8 +74,9 @@ class ZoiGauge(Gauge):
     def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         return (zois_near(grid, self.at, 0),)
 
-    def measure(self, field: StrainField) -> GaugeValue:
-        return read_area(self.zois(field.grid)[0], field, self.value, "largest")
+    @property
+    def reading(self) -> GaugeReading:
+        return GaugeReading("largest", self.value)
 
     def outline(self, zoi: float) -> tuple[Line, ...]:
         x, y = self.at
@@ -128,8 +129,9 @@ class AreaGauge(Gauge):
     def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         return (zois_inside(grid, self._polygon()),)
 
-    def measure(self, field: StrainField) -> GaugeValue:
-        return read_area(self.zois(field.grid)[0], field, self.value, self.statistic)
+    @property
+    def reading(self) -> GaugeReading:
+        return GaugeReading(self.statistic, self.value)
 
     def outline(self, zoi: float) -> tuple[Line, ...]:
         return (closed(self._polygon()),)
@@ -173,8 +175,9 @@ class CircleGauge(Gauge):
     def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         return (zois_near(grid, self.centre, self.radius_px),)
 
-    def measure(self, field: StrainField) -> GaugeValue:
-        return read_area(self.zois(field.grid)[0], field, self.value)
+    @property
+    def reading(self) -> GaugeReading:
+        return GaugeReading("affine", self.value)
 
     def outline(self, zoi: float) -> tuple[Line, ...]:
         return (circle(self.centre, self.radius_px),)
@@ -218,8 +221,9 @@ class StripGauge(Gauge):
     def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         return (zois_inside(grid, self._corners(grid.size)),)
 
-    def measure(self, field: StrainField) -> GaugeValue:
-        return read_area(self.zois(field.grid)[0], field, self.value)
+    @property
+    def reading(self) -> GaugeReading:
+        return GaugeReading("affine", self.value)
 
     def outline(self, zoi: float) -> tuple[Line, ...]:
         return (closed(self._corners(zoi)),)

@@ -1,4 +1,8 @@
-"""What is read from the ZOIs of a gauge: the value of an area, and (L - L0)/L0 between two ends."""
+"""How gauges are read: what each takes of its ZOIs, and all of them from a field in one pass.
+
+What a gauge takes follows from the reference, and from which of its ZOIs have a value: it is prepared once, and anew
+where these are others. A field is then read in one pass over the ZOIs of all gauges.
+"""
 
 from __future__ import annotations
 
@@ -6,76 +10,208 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from itertools import pairwise
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquire.text import Message
-from analysis.evaluate.area.strain import GRADIENTS, AreaStrain
-from analysis.evaluate.gauges.gauge import GaugeValue
-from analysis.evaluate.gauges.geometry import Floats, Mask
-from analysis.field import PAIR_INDEX, VALUES, Status, StrainField, ZoiGrid, variance_of_sum
+from analysis.evaluate.area.affine import Places
+from analysis.evaluate.area.strain import GRADIENTS
+from analysis.evaluate.gauges.geometry import Mask
+from analysis.evaluate.gauges.taken import (
+    NOTHING,
+    AffineTaken,
+    EndsTaken,
+    ExtremeTaken,
+    MeanTaken,
+    Now,
+    Row,
+    Taken,
+    overlaps,
+)
+from analysis.field import VALUES, Status, StrainField, ZoiGrid, area_share
 
 Statistic = Literal["affine", "mean", "largest", "smallest"]
 
-COME_APART = Message("the region has come apart")
-"""Why an area has no strain."""
 MIN_SHARE = 0.5
 """A gauge has a value as long as this share of the ZOIs of an area, or of each of its ends, has one."""
-_U, _V = 0, 3  # among the affine parameters
 
 
-def read_area(chosen: Mask, field: StrainField, value: str, statistic: Statistic = "affine") -> GaugeValue:
-    """A value of the affine field of some ZOIs, or their mean, largest or smallest value; of u and v the mean."""
-    if missing := _missing(chosen, field):
-        return GaugeValue(math.nan, math.nan, missing)
-    affine = statistic == "affine" and value in GRADIENTS
-    if affine and field.n_parts(chosen) > 1:
-        return GaugeValue(math.nan, math.nan, COME_APART)
-    found = AreaStrain.of(field, chosen) if affine else None
-    if found is not None:
-        return GaugeValue(found.value(value), found.sigma(value))
-    if statistic in ("affine", "mean"):
-        return GaugeValue(*field.mean(value, chosen))
-    sign = 1 if statistic == "largest" else -1
-    values = np.where(chosen & field.ok, sign * field.value(value), -np.inf)
-    k = np.unravel_index(int(np.argmax(values)), values.shape)
-    return GaugeValue(float(sign * values[k]), float(field.sigma(value)[k]))
+@dataclass(frozen=True, slots=True)
+class GaugeValue:
+    """What a gauge reads from one field.
 
-
-def read_ends(chosen: Sequence[Mask], field: StrainField) -> GaugeValue:
-    """The change of the distance between the mean places of two groups of ZOIs, over that distance.
-
-    From displacements, not from gradients: a rigid rotation changes nothing.
+    Attributes
+    ----------
+    value, sigma : float
+        Strain, or the unit of the gauge's value; NaN where there is none.
+    reason : str
+        Why there is none; empty where there is one.
+    share : float
+        Of its area that the value stands for, at either end (``analysis.field.area_share``).
     """
-    for number, end in enumerate(chosen, 1):
-        if missing := _missing(end, field):
-            return GaugeValue(math.nan, math.nan, Message("end {number}: {missing}", number, missing))
-    found = extension(field, Ends(chosen[0] & field.ok, chosen[1] & field.ok))
-    if not found.length > 0:
-        return GaugeValue(math.nan, math.nan, Message("both ends are the same ZOIs; make the gauge longer"))
-    return GaugeValue(found.strain, found.sigma)
+
+    value: float
+    sigma: float
+    reason: str = ""
+    share: float = 1.0
 
 
-def read_strips(chosen: Sequence[Mask], field: StrainField, along: str) -> GaugeValue:
-    """``read_ends`` of two strips, each where the other has values too, so that their line is not tilted.
+@dataclass(frozen=True, slots=True)
+class GaugeReading:
+    """How a gauge is read.
 
-    Strips that hardly face each other, as those of a specimen that leans, are read whole.
+    Attributes
+    ----------
+    statistic : "affine", "mean", "largest", "smallest" or "ends"
+        Of an area: by its affine field (u and v: their mean), or of the values of its ZOIs, by sign. Of two ends: the
+        change of the distance between their mean places, over that distance.
+    value : str
+        Of an area, one of ``analysis.field.VALUES``.
+    along : "x", "y" or ""
+        Ends that are strips are read where the other one has values too, so that their line is not tilted; those that
+        hardly face each other, as of a specimen that leans, are read whole.
     """
-    if facing(chosen, along) is None:
-        return read_ends(chosen, field)
-    for number, end in enumerate(chosen, 1):
-        if missing := _missing(end, field):
-            return GaugeValue(math.nan, math.nan, Message("end {number}: {missing}", number, missing))
-    side = 1 if along == "x" else 0
-    first, second = ((end & field.ok).any(axis=side, keepdims=True) for end in chosen)
-    both = first & second & field.ok
-    if not both.any():
-        return GaugeValue(
-            math.nan, math.nan, Message("the ZOIs with a value at its two ends do not face each other")
+
+    statistic: Statistic | Literal["ends"]
+    value: str = "u"
+    along: str = ""
+
+    def taken(self, ends: Sequence[Mask], field: StrainField, before: Taken) -> Taken:
+        """What it takes of its ZOIs, (R, C) bool of one area or of each of two ends, in the place of ``before``."""
+        if why := _missing(ends, field):
+            return Taken(reason=why)
+        if self.along and facing(ends, self.along) is not None:
+            side = 1 if self.along == "x" else 0
+            first, second = ((end & field.ok).any(axis=side, keepdims=True) for end in ends)
+            ends = [end & first & second for end in ends]
+            if not (ends[0] & field.ok).any():
+                return Taken(reason=Message("the ZOIs with a value at its two ends do not face each other"))
+        valid = [np.flatnonzero(end & field.ok) for end in ends]
+        if self.statistic == "ends":
+            return EndsTaken.of(valid[0], valid[1], field)
+        if self.statistic == "affine" and self.value in GRADIENTS:
+            return AffineTaken.of(self.value, ends[0], field, before)
+        if self.statistic in ("affine", "mean"):
+            return MeanTaken.of(self.value, ends[0], field)
+        sign = 1 if self.statistic == "largest" else -1
+        return ExtremeTaken(value=self.value, at=valid[0], sign=sign)
+
+
+class Readable(Protocol):
+    """A name, what is read, and of which ZOIs, (R, C) bool: of one area, or of each of two ends."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def reading(self) -> GaugeReading: ...
+
+    def zois(self, grid: ZoiGrid) -> tuple[Mask, ...]: ...
+
+
+class GaugeSet:
+    """Reads gauges from field after field, all in one pass.
+
+    Parameters
+    ----------
+    gauges : sequence of Readable
+        Of different names.
+    """
+
+    def __init__(self, gauges: Sequence[Readable]) -> None:
+        self._gauges, self._of = gauges, tuple[object, ...]()
+
+    def read(self, field: StrainField) -> dict[str, GaugeValue]:
+        """The value of each by its name.
+
+        NaN with a reason where fewer than half of its ZOIs, or of those of one end, have a value.
+        """
+        if not self._gauges:
+            return {}
+        from analysis.compiled.sparse_sums import overlapping, row_sums
+
+        grid, now, variances = field.grid, Now(field), np.empty(len(self._gauges))
+        of = grid.roi, grid.size, grid.step, grid.active.tobytes(), field.window, field.sums, field.measure
+        if of != self._of:
+            self._begin(field)
+            self._of = of
+        self._prepare(field)
+        sums = np.empty((len(self._sums[0]) - 1, len(now.maps)))
+        row_sums(*self._sums, now.maps, sums)
+        own = [sums[rows] for rows in self._own]
+        factors = np.array([one.factors(found) for one, found in zip(self._taken, own, strict=True)])
+        rho = overlaps(Places.of(grid, field.window)), grid.shape[1]
+        overlapping(*self._noise, self._pairs, factors, self._kinds, *rho, now.covariance, variances)
+        each = zip(self._gauges, self._taken, own, variances.tolist(), self._shares, strict=True)
+        return {
+            gauge.name: GaugeValue(*taken.read(now, found, variance), share)
+            for gauge, taken, found, variance, share in each
+        }
+
+    def _begin(self, field: StrainField) -> None:
+        """Find the ZOIs of each on the grid of ``field``."""
+        self._zois = [gauge.zois(field.grid) for gauge in self._gauges]
+        at = [np.flatnonzero(np.logical_or.reduce(ends)) for ends in self._zois]
+        self._at, self._gauge = np.concatenate(at), np.repeat(np.arange(len(at)), [len(one) for one in at])
+        self._status: NDArray[np.uint8] | None = None
+        self._taken, self._shares = [Taken()] * len(at), [1.0] * len(at)
+
+    def _prepare(self, field: StrainField) -> None:
+        """Prepare anew the gauges of which another ZOI has a value than in the last field."""
+        status = field.status.ravel()[self._at]
+        changed = np.arange(len(self._gauges))
+        if self._status is not None:
+            changed = np.unique(self._gauge[status != self._status])
+        if not changed.size:
+            return
+        for g in changed.tolist():
+            ends = self._zois[g]
+            self._taken[g] = self._gauges[g].reading.taken(ends, field, self._taken[g])
+            self._shares[g] = min(area_share(field, end) for end in ends)
+        self._status, taken = status, self._taken
+        self._sums = _rows([row for one in taken for row in one.sums])
+        self._noise = _rows([one.noise for one in taken])
+        ends_of = np.cumsum([0, *(len(one.sums) for one in taken)]).tolist()
+        self._own = [slice(first, end) for first, end in pairwise(ends_of)]
+        self._pairs, self._kinds = (
+            np.array([getattr(one, name) for one in taken], np.intp) for name in ("pairs", "kind")
         )
-    return read_ends([end & both for end in chosen], field)
+
+
+def _rows(rows: Sequence[Row]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+    """Rows one behind the other: where each begins, places and weights."""
+    first = np.cumsum([0, *(len(row.at) for row in rows)], dtype=np.intp)
+    at, weights = (np.concatenate(column) for column in zip(NOTHING, *rows, strict=True))
+    return first, at, weights
+
+
+def _missing(ends: Sequence[Mask], field: StrainField) -> str:
+    """Why there is no value; empty where enough of the ZOIs, or of those of each end, have one."""
+    for number, end in enumerate(ends, 1):
+        if why := _missing_in(end, field):
+            return why if len(ends) == 1 else Message("end {number}: {missing}", number, why)
+    return ""
+
+
+def _missing_in(chosen: Mask, field: StrainField) -> str:
+    total = int(np.count_nonzero(chosen))
+    if total == 0:
+        grid = field.grid
+        return Message(
+            "no ZOI is there; their centres reach from {x:g}, {y:g} to {x2:g}, {y2:g} px; move the gauge there",
+            grid.x[0],
+            grid.y[0],
+            grid.x[-1],
+            grid.y[-1],
+        )
+    lost = Counter(Status(s) for s in field.status[chosen & ~field.ok].tolist())
+    if total - lost.total() >= MIN_SHARE * total:
+        return ""
+    words = ", ".join(Message("{n} {name}", n, status.name) for status, n in lost.most_common())
+    return Message("{total} of {total2} ZOIs have no value ({words})", lost.total(), total, words)
 
 
 def facing(strips: Sequence[Mask], along: str) -> list[Mask] | None:
@@ -87,83 +223,6 @@ def facing(strips: Sequence[Mask], along: str) -> list[Mask] | None:
     )
 
 
-def _missing(chosen: Mask, field: StrainField) -> str:
-    """Why there is no value; empty where enough of the ZOIs have one."""
-    total = int(chosen.sum())
-    if total == 0:
-        grid = field.grid
-        return Message(
-            "no ZOI is there; their centres reach from {x:g}, {y:g} to {x2:g}, {y2:g} px; move the gauge there",
-            grid.x[0],
-            grid.y[0],
-            grid.x[-1],
-            grid.y[-1],
-        )
-    status = field.status[chosen]
-    lost = Counter(Status(s) for s in status[status != Status.OK].tolist())
-    if total - lost.total() >= MIN_SHARE * total:
-        return ""
-    words = ", ".join(Message("{n} {name}", n, status.name) for status, n in lost.most_common())
-    return Message("{total} of {total2} ZOIs have no value ({words})", lost.total(), total, words)
-
-
-def check_value(name: str, value: str) -> None:
-    """Raises ValueError unless ``value`` is one of a strain field."""
-    if value not in VALUES:
-        raise ValueError(f"gauge {name}: unknown value {value!r}; known: {', '.join(VALUES)}")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Ends:
-    """The ZOIs of the two ends, (R, C) bool each; all of them have a value, and none is empty."""
-
-    first: NDArray[np.bool_]
-    second: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, slots=True)
-class Extension:
-    """(L - L0)/L0 with its standard uncertainty, and L0 in px (0 where the ends lie upon each other)."""
-
-    strain: float
-    sigma: float
-    length: float
-
-
-def extension(field: StrainField, ends: Ends) -> Extension:
-    """The strain between the mean places of two ends.
-
-    Parameters
-    ----------
-    field : StrainField
-    ends : Ends
-
-    Returns
-    -------
-    Extension
-        sigma is that of the displacement difference along the line, reference noise included.
-    """
-    share = ends.second / ends.second.sum() - ends.first / ends.first.sum()
-    used = share != 0
-    weights = share[used]
-    x, y = np.meshgrid(field.grid.x, field.grid.y)
-    before = np.array([_sum(weights * x[used]), _sum(weights * y[used])])
-    length = float(np.hypot(*before))
-    if length == 0:
-        return Extension(math.nan, math.nan, 0.0)
-    # The difference of the lengths loses no digits where the extension is small.
-    moved = np.array([_sum(weights * field.u[used]), _sum(weights * field.v[used])])
-    now = float(np.hypot(*(before + moved)))
-    strain = float(moved @ (2 * before + moved)) / (now + length) / length
-    spread = np.where(used, share * _sigma_along(field, (before + moved) / now), 0.0)
-    variance = variance_of_sum(spread, "u", field.grid, field.window)
-    if field.common is not None:
-        along = np.zeros((6, *field.grid.shape))
-        along[_U], along[_V] = np.multiply.outer((before + moved) / now, share)
-        variance += field.common.variance_of_sum(along)
-    return Extension(strain, math.sqrt(max(variance, 0.0)) / length, length)
-
-
 def distance(grid: ZoiGrid, ends: Sequence[Mask]) -> float:
     """L0 between the mean places of two ends, px; NaN of a gauge with one area."""
     if len(ends) != 2 or not all(end.any() for end in ends):
@@ -173,15 +232,7 @@ def distance(grid: ZoiGrid, ends: Sequence[Mask]) -> float:
     return float(np.hypot(x1 - x0, y1 - y0))
 
 
-def _sum(values: Floats) -> float:
-    """The sum, in the order of the values: the same bits wherever they lie in memory."""
-    return float(np.cumsum(values)[-1]) if values.size else 0.0
-
-
-def _sigma_along(field: StrainField, direction: Floats) -> Floats:
-    """Standard uncertainty of the displacement along a unit vector, (R, C), px."""
-    nx, ny = direction
-    uu, uv, vv = (
-        field.covariance[PAIR_INDEX[pair]].astype(np.float64) for pair in ((_U, _U), (_U, _V), (_V, _V))
-    )
-    return np.asarray(np.sqrt(np.maximum(nx * nx * uu + 2 * nx * ny * uv + ny * ny * vv, 0)))
+def check_value(name: str, value: str) -> None:
+    """Raises ValueError unless ``value`` is one of a strain field."""
+    if value not in VALUES:
+        raise ValueError(f"gauge {name}: unknown value {value!r}; known: {', '.join(VALUES)}")

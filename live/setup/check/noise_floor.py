@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from acquire.frame import Burst
-from analysis.evaluate import AreaStrain
+from analysis.evaluate import AreaStrain, GaugeSet
 from analysis.field import StrainField
 from analysis.picture.pattern import gauge_length, l10_strain
 from live.config.gauges import gauges_for
@@ -266,6 +266,6 @@ def _gauges(config: Config, field: StrainField, factor: float) -> Iterator[Gauge
     region = AreaStrain.of(field)
     yield GaugeNoise("", factor * (math.nan if region is None else region.sigma(along)))
     config = with_auto_gauges(config, field.grid)
-    for gauge in gauges_for(config.gauges, config.specimen.first_axis, field.grid):
-        value = gauge.measure(field)
-        yield GaugeNoise(gauge.name, factor * value.sigma, value.reason)
+    gauges = gauges_for(config.gauges, config.specimen.first_axis, field.grid)
+    for name, value in GaugeSet(gauges).read(field).items():
+        yield GaugeNoise(name, factor * value.sigma, value.reason)

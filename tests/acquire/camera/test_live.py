@@ -58,15 +58,6 @@ def away(driver: MemoryDriver) -> Picture | None:
     raise DeviceFault("the cable is out")
 
 
-def skipped(count: int) -> Step:
-    def step(driver: MemoryDriver) -> Picture:
-        driver.number += count
-        driver.rig.t += 0.1 * count
-        return picture(driver)
-
-    return step
-
-
 class Rig:
     """A camera over a driver in memory, what it says, and what opening it again does."""
 
@@ -115,11 +106,6 @@ def test_frames_are_what_the_driver_gives() -> None:
     assert rig.drivers[0].closed
 
 
-def test_what_is_missing_between_two_numbers_is_lost() -> None:
-    frames = Rig(picture, skipped(3)).take(3)
-    assert [(frame.index, frame.lost_before) for frame in frames] == [(0, 0), (4, 3), (5, 0)]
-
-
 def test_a_picture_that_is_not_whole_is_lost_and_told() -> None:
     rig = Rig(picture, lambda driver: picture(driver, image=None, trouble="packets are missing"))
     assert [frame.index for frame in rig.take(2)] == [0, 2]
@@ -157,38 +143,11 @@ def test_three_pictures_that_agree_in_every_bit_are_one() -> None:
     assert [found for _, found in seen] == [False, False, True, False, False, False]
 
 
-def test_a_stall_is_told_once_and_so_is_its_end() -> None:
-    rig = Rig(picture, *[nothing] * 8)
-    assert len(rig.take(2)) == 2 and len(rig.drivers) == 1
-    assert [text.partition(" for")[0] for text in rig.texts] == [
-        "mem:: no picture",
-        "mem:: pictures again after 0.9 s",
-    ]
-
-
 @pytest.mark.parametrize(("waits", "opened"), [(19, 1), (22, 2)])
 def test_a_camera_is_dead_after_four_of_its_longest_pauses(waits: int, opened: int) -> None:
     rig = Rig(picture, *[nothing] * waits)  # of a tenth of a second; the longest pause is half a second
     rig.take(2)
     assert len(rig.drivers) == opened
-
-
-def test_a_long_stall_opens_the_camera_again() -> None:
-    rig = Rig(picture, *[nothing] * 30)
-    frames = rig.take(2)
-    assert len(rig.drivers) > 1 and rig.drivers[0].closed
-    assert frames[1].lost_before == round((frames[1].t - frames[0].t) * 10) - 1
-    assert sum(event.level == "error" for event in rig.events) == 1
-
-
-def test_a_camera_that_was_away_goes_on_and_the_gap_is_counted() -> None:
-    rig = Rig(picture, picture, away)
-    frames = rig.take(4)
-    assert [frame.index for frame in frames] == [0, 1, 7, 8] and frames[2].lost_before == 5
-    assert rig.texts == [
-        "mem:: the cable is out; looking for it again (last good frame 1)",
-        "mem:: opened again; the frames in between are counted as lost",
-    ]
 
 
 def test_it_is_closed_before_it_is_said_to_be_away() -> None:
@@ -224,29 +183,6 @@ def test_one_that_comes_back_and_does_not_stream_is_tried_again() -> None:
     rig = Rig(picture, away)
     rig.on_open = [lambda: setattr(rig, "refuses", "no bandwidth"), lambda: setattr(rig, "refuses", "")]
     assert len(rig.take(2)) == 2 and len(rig.drivers) == 3
-
-
-def test_stop_ends_it_while_the_camera_is_away() -> None:
-    rig = Rig(picture, away)
-
-    def gone() -> None:
-        camera.stop()
-        raise DeviceFault("it is not there")
-
-    rig.on_open = [gone]
-    with rig.camera() as camera:
-        assert len(list(camera)) == 1
-
-
-def test_a_change_of_rate_loses_nothing_and_is_told() -> None:
-    def slow(driver: MemoryDriver) -> Picture:
-        driver.rig.t += 0.1
-        return picture(driver)
-
-    rig = Rig(*[slow] * 40)
-    frames = rig.take(40)
-    assert sum(frame.lost_before for frame in frames) == 0
-    assert [text for text in rig.texts if "5 frames a second come, not the 10" in text]
 
 
 def test_frames_from_before_the_test_are_left_out() -> None:

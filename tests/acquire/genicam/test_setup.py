@@ -9,8 +9,9 @@ import pytest
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError
 from acquire.genicam.library import GenicamError
-from acquire.genicam.settings import genicam_settings
+from acquire.genicam.settings import GenicamSettings
 from acquire.genicam.setup import GenicamSetup, set_up
+from acquire.settings import read_settings
 
 
 class MadeUpCamera:
@@ -76,7 +77,7 @@ def made(query: str = "", **more: Any) -> tuple[GenicamSetup, MadeUpCamera]:
 
 
 def asked(query: str, camera: MadeUpCamera) -> GenicamSetup:
-    return set_up(camera, genicam_settings(parse_address(f"genicam:1?{query}")), "genicam:1")  # type: ignore[arg-type]
+    return set_up(camera, read_settings(GenicamSettings, parse_address(f"genicam:1?{query}")), "genicam:1")  # type: ignore[arg-type]
 
 
 def test_what_is_in_force_is_read_back() -> None:
@@ -91,7 +92,7 @@ def test_what_is_in_force_is_read_back() -> None:
 
 def test_what_was_asked_is_asked_again_after_the_camera_was_away() -> None:
     found, _ = made("format=Mono12p&trigger=no")
-    again = found.kept(genicam_settings(parse_address("genicam:1?fps=20")))
+    again = found.kept(read_settings(GenicamSettings, parse_address("genicam:1?fps=20")))
     assert (again.exposure_us, again.gain, again.fps) == (pytest.approx(2500), 3, 20)
     assert (again.format, again.x, again.y, again.width, again.height) == ("Mono12p", 8, 4, 640, 480)
 

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import pytest
 
-from acquire.genicam import trigger
+from acquire.genicam import camera
 from acquire.genicam.device import GenicamDevice
 from acquire.genicam.library import GenicamError
 
@@ -32,8 +32,8 @@ class Bench:
         self.refused_from = 10**6
         self.at_refusal: Callable[[], None] = lambda: None
         threads = SimpleNamespace(Event=lambda: self, Thread=self._thread)
-        monkeypatch.setattr(trigger, "threading", threads)
-        monkeypatch.setattr(trigger, "time", SimpleNamespace(monotonic=lambda: self.now))
+        monkeypatch.setattr(camera, "threading", threads)
+        monkeypatch.setattr(camera, "time", SimpleNamespace(monotonic=lambda: self.now))
 
     def _thread(self, target: Callable[[], None], **_: Any) -> Any:
         return SimpleNamespace(start=target)
@@ -60,7 +60,7 @@ class Bench:
 
     def work(self, period_s: float) -> str:
         """Why it is refused."""
-        return trigger.SoftwareTrigger(cast(GenicamDevice, self), period_s).refused
+        return camera.SoftwareTrigger(cast(GenicamDevice, self), period_s).refused
 
 
 def test_one_picture_each_period_whatever_a_trigger_takes(monkeypatch: pytest.MonkeyPatch) -> None:

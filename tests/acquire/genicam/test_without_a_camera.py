@@ -16,8 +16,9 @@ from acquire.genicam.finding import name_of
 from acquire.genicam.formats import FORMATS, decode
 from acquire.genicam.library import CALLS, load_aravis
 from acquire.genicam.listing import list_cameras
-from acquire.genicam.settings import genicam_settings
+from acquire.genicam.settings import GenicamSettings
 from acquire.pylon.camera import list_cameras as list_basler_cameras
+from acquire.settings import read_settings
 
 
 class ListOfCameras:
@@ -55,7 +56,7 @@ def test_which_camera_is_meant() -> None:
 
 def test_settings_and_features() -> None:
     address = parse_address("genicam:1?format=Mono12p&fps=30&trigger=Line0&stamp=end&BlackLevel=64")
-    settings = genicam_settings(address)
+    settings = read_settings(GenicamSettings, address)
     assert (settings.format, settings.fps, settings.stamp) == ("Mono12p", 30, "end")
     assert settings.waits_for_trigger and not settings.fires_triggers
     assert settings.features == {"BlackLevel": "64"}

@@ -10,11 +10,11 @@ import pytest
 
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError, DataError
-from acquire.v4l2.camera import v4l2_settings
+from acquire.settings import read_settings
 from acquire.v4l2.controls import MANUAL, changeable, control_name, exposure_s, list_controls, still_automatic
 from acquire.v4l2.faults import fault_in_words, why_not_open
 from acquire.v4l2.formats import FORMATS, Plane, decode, picture_size, warning_of
-from acquire.v4l2.setup import V4L2Settings
+from acquire.v4l2.settings import V4L2Settings
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
 from tests.acquire.v4l2.test_setup import AUTO, EXPOSURE, GAIN, device_with, in_force
 
@@ -75,36 +75,16 @@ def test_each_doubtful_format_is_warned_of_by_name() -> None:
     ]  # fmt: skip
 
 
-ALLOWED = {
-    "plane": "one of raw, r, g, b",
-    "width": "a whole number from 1 to 65536",
-    "height": "a whole number from 1 to 65536",
-    "fps": "a number from 0.001 to 100000",
-    "input": "a whole number from 0",
-    "white": "a whole number from 1 to 65535",
-    "buffers": "a whole number from 2 to 32",
-    "stall_s": "a number from 0.1",
-    "manual": "yes or no",
-    "exposure_us": "a number from 1",
-    "gain": "a whole number",
-}
-
-
-@pytest.mark.parametrize("key", ALLOWED)
-def test_an_impossible_value_is_refused_with_what_is_allowed(key: str) -> None:
-    with pytest.raises(ConfigError) as caught:
-        v4l2_settings(parse_address(f"/dev/video0?{key}=nonsense"))
-    assert str(caught.value).partition(" is not possible; allowed: ")[2] == ALLOWED[key]
-
-
 def test_settings_of_a_camera_and_its_controls_by_name() -> None:
-    plain = v4l2_settings(parse_address("/dev/video0"))
-    assert plain == V4L2Settings() and (plain.buffers, plain.plane, plain.controls.manual) == (8, "raw", True)
-    found = v4l2_settings(parse_address("/dev/video0?format=y12 &sharpness=0x10&manual=no&exposure_us=500"))
-    assert (found.format, found.controls.named) == ("Y12", {"sharpness": 16})
-    assert (found.controls.manual, found.controls.exposure_us) == (False, 500.0)
-    with pytest.raises(ConfigError, match=r"sharpness=1\.5 is not possible; controls take whole numbers"):
-        v4l2_settings(parse_address("/dev/video0?sharpness=1.5"))
+    plain = read_settings(V4L2Settings, parse_address("/dev/video0"))
+    assert plain == V4L2Settings() and (plain.buffers, plain.plane, plain.manual) == (8, "raw", True)
+    found = read_settings(
+        V4L2Settings, parse_address("/dev/video0?format=y12 &sharpness=0x10&manual=no&exposure_us=500")
+    )
+    assert (found.format, found.controls) == ("Y12", {"sharpness": 16})
+    assert (found.manual, found.exposure_us) == (False, 500.0)
+    with pytest.raises(ConfigError, match=r"sharpness=1\.5 is not possible; allowed: a whole number"):
+        read_settings(V4L2Settings, parse_address("/dev/video0?sharpness=1.5"))
 
 
 AUTOMATIC = {

@@ -12,6 +12,7 @@ from acquire.events import Event
 from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
 from analysis import Roi, StrainField, ZoiGrid
+from analysis.evaluate import ZoiGauge
 from analysis.optics import PlateFit
 from live.config.loading import load_config
 from live.pipeline import measure as module
@@ -149,7 +150,7 @@ def test_a_burst_is_corrected_measured_joined_to_its_force_and_guarded() -> None
         return SimpleNamespace(n=burst.n + 100)
 
     guard: Any = SimpleNamespace(check=lambda field, step: checked.append((field, step.t)))
-    gauge: Any = SimpleNamespace(name="left", read=lambda field: SimpleNamespace(value=5.0))
+    gauge = ZoiGauge("left", (GRID.x[1], GRID.y[1]))
     items = [make_measurement(1).burst, NewReference(make_measurement(2).burst), make_measurement(3).burst]
     found = list(
         measure(
@@ -163,4 +164,6 @@ def test_a_burst_is_corrected_measured_joined_to_its_force_and_guarded() -> None
     ]  # fmt: skip
     assert [t for _, t in checked] == [m.t for m in found] and checked[0][0] is found[0].field
     assert found[0].field.measure == "green" and found[0].as_measured is field
-    assert found[0].time_step.gauges["left"].value == 5.0 and found[0].plates is None
+    assert (
+        found[0].time_step.gauges["left"].value == pytest.approx(1e-3, rel=1e-3) and found[0].plates is None
+    )
