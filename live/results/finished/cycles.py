@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.text import Message
+from acquire.text.message import joined
 from acquire.text.quantity import Amount
 from analysis.evaluate import Curve, Figure, Track
 from analysis.evaluate.curve import broken_at
@@ -145,11 +146,20 @@ class Cycles:
         """What a person reads; nothing of a test that is not cyclic."""
         if not self.any:
             return []
-        found = [f"{figure_text(one, *self.unit[::-1])} in cycle {k}" for k, one in self.moduli.items()]
-        change = f", a change of {figure_text(self.change, 0.01, '%')}" if self.change.known else ""
-        known = ", ".join(found) + change if found else f"not known: {self._why}"
-        duration = float(np.median(self.table.column("duration")))
-        return [f"{len(self.table)} cycles of {duration:.4g} s; secant modulus {known}"]
+        text = Message("{count} cycles of {duration:.4g} s", len(self.table), self._duration)
+        if not self.moduli:
+            return [text + Message("; secant modulus not known: {why}", self._why)]
+        found = [
+            Message("{modulus} in cycle {number}", figure_text(one, *self.unit[::-1]), k)
+            for k, one in self.moduli.items()
+        ]
+        if self.change.known:
+            found.append(Message("a change of {change}", figure_text(self.change, 0.01, "%")))
+        return [text + Message("; secant modulus {found}", joined(", ", found))]
+
+    @property
+    def _duration(self) -> float:
+        return float(np.median(self.table.column("duration")))
 
     def write(self, folder: Path) -> None:
         """Write ``cycles.csv`` of a cyclic test; raises DataError or ConfigError where that cannot be done."""

@@ -6,35 +6,49 @@ import math
 
 import numpy as np
 
-from live.results.figures import value_text
+from acquire.text import Message
+from acquire.text.message import joined
+from acquire.text.quantity import Amount
 from live.results.finished.cycles import FILE, Cycles
 from live.results.report.curves import force_unit, strain_unit
 from live.results.report.page import Html, paragraph, table
 from live.results.report.svg import Plot, PlotLine
 
 _ROWS = 12  # of the table
-_HEADS = ("cycle", "peak, valley of the force", "range of the strain", "secant modulus", "loop area", "phase")
+_HEADS = (
+    Message("cycle"), Message("peak, valley of the force"), Message("range of the strain"), Message("secant modulus"),
+    Message("loop area"), Message("phase"),
+)  # fmt: skip
 
 
 def cycle_plots(cycles: Cycles) -> tuple[Plot, ...]:
     """Modulus with its sigma, ranges, peaks and valleys over the cycles."""
     column, (unit, one) = cycles.table.column, cycles.unit
-    x, axis = np.log10(column("number")), "cycle, power of 10"
+    x, axis = np.log10(column("number")), Message("cycle, power of 10")
     e, force = (
         strain_unit(column("range_strain"), column("peak_strain")),
         column("peak_load") * (cycles.area_m2 or 1.0),
     )
     n, valley = force_unit(force), column("valley_load") * (cycles.area_m2 or 1.0)
     modulus = PlotLine("", x, column("modulus") / one, column("sigma_modulus") / one)
+    names = {"range": Message("range"), "peak": Message("peak"), "valley": Message("valley")}
     strains = [
-        PlotLine(name, x, column(f"{name}_strain") * e.factor, colour=k)
-        for k, name in enumerate(("range", "peak", "valley"))
+        PlotLine(words, x, column(f"{name}_strain") * e.factor, colour=k)
+        for k, (name, words) in enumerate(names.items())
     ]
-    forces = [PlotLine("peak", x, force * n.factor), PlotLine("valley", x, valley * n.factor, colour=1)]
+    forces = [
+        PlotLine(names["peak"], x, force * n.factor),
+        PlotLine(names["valley"], x, valley * n.factor, colour=1),
+    ]
+    heads = (
+        Message("modulus, {unit}", unit),
+        Message("strain, {unit}", e.name),
+        Message("force, {unit}", n.name),
+    )
     found = [
-        Plot("cycles-modulus", "Secant modulus of the cycles", axis, f"modulus, {unit}", (modulus,)),
-        Plot("cycles-strain", "Strain of the cycles", axis, f"strain, {e.name}", tuple(strains)),
-        Plot("cycles-force", "Force of the cycles", axis, f"force, {n.name}", tuple(forces)),
+        Plot("cycles-modulus", Message("Secant modulus of the cycles"), axis, heads[0], (modulus,)),
+        Plot("cycles-strain", Message("Strain of the cycles"), axis, heads[1], tuple(strains)),
+        Plot("cycles-force", Message("Force of the cycles"), axis, heads[2], tuple(forces)),
     ]
     return tuple(one for one in found if any(np.isfinite(line.y).any() for line in one.curves))
 
@@ -43,9 +57,10 @@ def cycle_table(cycles: Cycles) -> list[Html]:
     """The figures of some cycles, at equal distances of the logarithm of their number."""
     last = len(cycles.table) - 1
     rows = np.unique(np.rint(np.geomspace(1, last + 1, _ROWS)).astype(int) - 1)
-    words = (
-        f"±: 1 sigma, of the scatter of bursts in the cycle. Area and phase hold what the force comes late beside the"
-        f" pictures. {FILE} has all cycles."
+    words = Message(
+        "±: 1 sigma, of the scatter of bursts in the cycle. A force later than the pictures adds to area and phase."
+        " {file} has all cycles.",
+        FILE,
     )
     lines = [paragraph(line) for line in cycles.lines()]
     return [
@@ -55,17 +70,17 @@ def cycle_table(cycles: Cycles) -> list[Html]:
     ]
 
 
-def _row(cycles: Cycles, k: int) -> tuple[str, ...]:
+def _row(cycles: Cycles, k: int) -> tuple[object, ...]:
     def value(name: str) -> float:
         return float(cycles.table.column(name)[k])
 
-    def text(name: str, unit_is: float, unit: str) -> str:
-        return value_text(value(name) / unit_is, value(f"sigma_{name}") / unit_is, unit)
+    def amount(name: str, kind: str = "", one: float = 1.0) -> Amount:
+        return Amount(kind, value(name) / one, value(f"sigma_{name}") / one, 2)
 
-    area, (unit, one) = cycles.area_m2 or 1.0, cycles.unit
-    forces = f"{value('peak_load') * area:.5g}, {value('valley_load') * area:.5g} N"
+    area, kind = cycles.area_m2 or 1.0, "stress" if cycles.area_m2 else "force"
+    forces = [Amount.rough("force", value(f"{end}_load") * area, 5) for end in ("peak", "valley")]
     energy = "J/m³" if cycles.area_m2 else "J/m"
     return (
-        f"{k + 1}", forces, text("range_strain", 1e-6, "µm/m"), text("modulus", one, unit), text("area", 1, energy),
-        text("phase", math.pi / 180, "°"),
+        f"{k + 1}", joined(", ", forces), amount("range_strain", "strain"), amount("modulus", kind),
+        joined(" ", [amount("area"), energy]), joined(" ", [amount("phase", one=math.pi / 180), "°"]),
     )  # fmt: skip
