@@ -166,6 +166,6 @@ def test_a_camera_in_the_list(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (found.address, found.trouble) == ("genicam:Maker-1?format=Mono12p", "")
     assert found.name == "Maker M1 (1, GigEVision 10.0.0.2)" and Listed.closed
     assert found.details == (
-        "format=Mono12p, Mono8", "640x480 of 1280x1024", "fps=20 (1..100)", "exposure_us=2500 (10..1e+06)",
+        "format=Mono12p, Mono8", "640x480 of 1280x1024", "fps=20 (1..100)", "exposure_us=2500 (10..1000000)",
         "gain=3 (-12..24)", "trigger=no, Line0, Software",
     )  # fmt: skip

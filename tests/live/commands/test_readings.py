@@ -66,7 +66,7 @@ def test_the_devices_are_listed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.
         monkeypatch.setattr("acquire.camera.list_cameras", lambda found=cameras: found)
         monkeypatch.setattr("acquire.serial_line.ports.list_serial_ports", lambda found=ports: found)
         monkeypatch.setattr("analysis.threads", lambda: 7)
-        assert devices.command(argparse.Namespace(report=None)) == 0
+        assert devices.command(argparse.Namespace(report=None, settings=False)) == 0
         lines = capsys.readouterr().out.splitlines()
         assert lines[0].startswith(heads[0]) and any(line.startswith(heads[1]) for line in lines)
         assert lines[-1] == "threads that measure: 7" and ("  its format" in lines) == (

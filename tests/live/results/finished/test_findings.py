@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from acquire.load_sample import LoadSample
+from acquire.text.quantity import Amount
 from live.config.sections import SpecimenConfig
 from live.pipeline.run_state import RunState
 from live.results.finished.findings import SHOWN, doubts, findings
@@ -141,8 +142,9 @@ def test_forces_that_do_not_cover_the_pictures() -> None:
     assert text.startswith("the forces begin 5.0 s after the pictures (")
     longer = np.r_[whole, np.linspace(whole[-1], 2 * whole[-1], 50)]
     text = first_doubt(test_of(force=longer))
-    said = in_ascii(text).replace(f"{2 * whole[-1]:.1f}", "...")
-    assert said == "the pictures end 5.0 s before the forces, which go on to ... N; no picture shows that"
+    most = in_ascii(str(Amount("force", 2 * whole[-1]).printed()))
+    words = f"the pictures end 5.0 s before the forces, which go on to {most}; no picture shows that"
+    assert in_ascii(text) == words
     assert doubts(findings(test_of(force=np.r_[whole, whole[-1] * np.ones(10)]))) == []
 
 

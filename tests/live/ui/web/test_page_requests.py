@@ -146,4 +146,10 @@ def test_a_page_of_another_edition_gets_all_rows() -> None:
     for n in range(3):
         curve.add([n])
     assert curve.position == (0, 3)
-    assert curve.since(1, 2) == {"names": ["t"], "edition": 0, "first": 0, "rows": [[0], [1], [2]]}
+    assert curve.since(1, 2) == {
+        "names": ["t"],
+        "colours": [],
+        "edition": 0,
+        "first": 0,
+        "rows": [[0], [1], [2]],
+    }
