@@ -155,7 +155,7 @@ def _coverage(test: FinishedTest) -> str | None:
         return Message(
             "the pictures end {beyond:.1f} s before the forces, which go on to {most}; no picture shows that",
             beyond,
-            Amount("force", float(most)),
+            Amount.rough("force", float(most), 4),
         )
     return ""
 

@@ -142,7 +142,7 @@ def test_forces_that_do_not_cover_the_pictures() -> None:
     assert text.startswith("the forces begin 5.0 s after the pictures (")
     longer = np.r_[whole, np.linspace(whole[-1], 2 * whole[-1], 50)]
     text = first_doubt(test_of(force=longer))
-    most = in_ascii(str(Amount("force", 2 * whole[-1]).printed()))
+    most = in_ascii(str(Amount.rough("force", 2 * whole[-1], 4).printed()))
     words = f"the pictures end 5.0 s before the forces, which go on to {most}; no picture shows that"
     assert in_ascii(text) == words
     assert doubts(findings(test_of(force=np.r_[whole, whole[-1] * np.ones(10)]))) == []
