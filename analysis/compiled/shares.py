@@ -2,8 +2,8 @@
 
 numba's own parallel loops are compiled anew for each body: its analysis, a kernel, the wrapper of the kernel and the
 function around it, each with all the code of the body, which LLVM then translates four times. Here the threads call the
-body by its address, with a pointer to its arguments: 79 s of processor time for all loops in place of 109, and the same
-bits (November 2026).
+body by its address, with a pointer to its arguments, and the same bits come of it (November 2026). The iteration stays
+with numba's own loops (``loops.parallel``): by address it takes 12 to 30 % longer, and what for was not found.
 """
 
 from __future__ import annotations
@@ -34,8 +34,7 @@ def _addresses(typing: Any, function: Any, arguments: Any) -> Any:
 
     def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
         convention, packed = context.call_conv, cgutils.alloca_once_value(builder, values[1])
-        kind = convention.get_function_type(types.none, _SHARE)
-        module = builder.module
+        kind, module = convention.get_function_type(types.none, _SHARE), builder.module
         shared = ir.Function(module, kind, module.get_unique_name("phasedic_share"))
         shared.linkage = "internal"
         convention.decorate_function(shared, ["arguments", "share"], _SHARE)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, inlined, parallel, read_only
+from analysis.compiled.loops import helper, inlined, read_only, shared
 from analysis.compiled.shares import in_shares, part_of
 
 RUN = 1024
@@ -119,7 +119,7 @@ def weigh_blur(unit: Any, whole: Any, out: Any) -> None:
         out[z] = math.sqrt(max(unit[z] * whole[z], 0.0)) if whole[z] == whole[z] else np.nan
 
 
-@parallel
+@shared
 def scale(unit: Any, colour: Any, from_reference: Any, whole: Any, out_reference: Any, out: Any) -> None:
     """The unit covariances (21, N) times ``colour`` (21,) and two variances (N,) each, written to the last two."""
     in_shares(_scale_share, (unit, colour, from_reference, whole, out_reference, out))
@@ -165,7 +165,7 @@ def clipped_share(
     return out
 
 
-@parallel
+@shared
 def clipped_shares(marked: Any, first: Any, weight: Any, out: Any) -> None:
     """See ``clipped_share``; ``marked`` (H, W) uint8, ``out`` (A,) written."""
     in_shares(_clipped_share, (marked, first, weight, out))

@@ -13,10 +13,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numba import prange
 
-from analysis.compiled.loops import helper, inlined, parallel
+from analysis.compiled.loops import helper, inlined, parallel, shared
 from analysis.compiled.shares import in_shares, part_of
-from analysis.compiled.threads import SHARES, next_piece
+from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
 from analysis.compiled.vectors import LANES, fetch_later, fetch_soon
 from analysis.fit.kernel_args import (
     CONVERGED,
@@ -239,7 +240,10 @@ def track(picture: PictureArgs, table: Any, fit: FitArgs, stop: StopArgs, out: O
     read from a tuple it lets the compiler sum in another order, and the last digit of float32 changes. ``todo`` (K,)
     are the places in ``out``; those whose iterations have begun go on.
     """
-    in_shares(_track_share, (picture, table, fit, stop, out, todo, np.zeros(SHARES, np.int64)))
+    counters, calling = np.zeros(SHARES, np.int64), caller()
+    for share in prange(SHARES):
+        keep_apart(calling)
+        _track_share(picture, table, fit, stop, out, todo, counters, np.int64(share))
 
 
 @helper
@@ -363,7 +367,7 @@ def is_short(length: Any, lever: Any, length_left: Any, slope_left: Any, trust: 
     return left <= length_left and left <= slope_left * lever
 
 
-@parallel
+@shared
 def warp_zois(picture: PictureArgs, table: Any, origins: Any, size: int, p: Any, out: Any) -> None:
     """The deformed image in every warped ZOI of order 1, (A, n, n) float32, written to ``out``."""
     in_shares(_warp_share, (picture, table, origins, size, p, out))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, parallel
+from analysis.compiled.loops import helper, shared
 from analysis.compiled.shares import in_shares
 from analysis.compiled.threads import SHARES, next_piece
 from analysis.fit.kernel_args import BLURS, NUISANCES, NormalArgs, ReferenceImages, WindowRows
@@ -142,7 +142,7 @@ def _sandwich(inverse: Any, middle: Any, affine: Any, units: Any, out: Any) -> N
             pair += 1
 
 
-@parallel
+@shared
 def prepare(
     images: ReferenceImages,
     origins: Any,

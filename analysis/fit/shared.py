@@ -20,10 +20,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numba import prange
 
 from analysis.compiled.loops import helper, inlined, parallel
-from analysis.compiled.shares import in_shares
-from analysis.compiled.threads import SHARES, next_piece
+from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
 from analysis.compiled.vectors import LANES
 from analysis.fit.iteration import GAIN_RANGE, fetch_all, is_short, moments_of, solve, take
 from analysis.fit.kernel_args import DIVERGED, IMAGES, FitArgs, OutArgs, PictureArgs, StopArgs
@@ -62,7 +62,10 @@ def share_warps(
     place = np.full(len(fit.origins), -1, np.int64)
     for i in range(len(fit.which)):
         place[fit.which[i]] = i
-    in_shares(_some_tiles, (picture, table, fit, stop, out, tiles, place, np.zeros(SHARES, np.int64)))
+    counters, calling = np.zeros(SHARES, np.int64), caller()
+    for share in prange(SHARES):
+        keep_apart(calling)
+        _some_tiles(picture, table, fit, stop, out, tiles, place, counters, np.int64(share))
 
 
 @helper

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from analysis.compiled.loops import helper, parallel
+from analysis.compiled.loops import helper, shared
 from analysis.compiled.shares import in_shares, part_of
 
 f4 = np.float32
 
 
-@parallel
+@shared
 def match(
     reference: Any, padded: Any, margin: int, firsts: Any, size: int, guesses: Any, reach: int, out: Any
 ) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, parallel
+from analysis.compiled.loops import helper, shared
 from analysis.compiled.shares import in_shares, part_of
 
 ALLOWED_PX, ALLOWED_SIGMAS, ALLOWED_SPREADS = 0.05, 10.0, 6.0
@@ -42,7 +42,7 @@ def _others() -> NDArray[np.float64]:
 _WEIGHTS = _others()
 
 
-@parallel
+@shared
 def stand_out(p: Any, variance: Any, step: float, ok: Any, out: Any) -> None:
     """Which ZOIs lie off what their neighbours say.
 

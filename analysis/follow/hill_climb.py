@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, parallel, read_only
+from analysis.compiled.loops import helper, inlined, read_only, shared
 from analysis.compiled.shares import in_shares, part_of
 
 f4 = np.float32
@@ -16,7 +16,7 @@ Places = NDArray[np.int64]
 MAX_MOVES = 12
 
 
-@helper
+@inlined
 def _dot(a: Any, b: Any, offset: Any) -> Any:
     """Sums of the products of two rows less ``offset``, of the second, and of its squares."""
     p = f4(0)
@@ -69,7 +69,7 @@ def climbed(
     return found, score
 
 
-@parallel
+@shared
 def climb(
     reference: Any, deformed: Any, offset: Any, origins: Any, size: int, candidates: Any, moves: int, out: Any,
     score: Any,

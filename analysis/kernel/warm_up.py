@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("analysis")
 
-COMPILE_SECONDS = 60
+COMPILE_SECONDS = 80
 """About how long one process takes for everything; for the announcement."""
 FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 93, 4, 7
 """That are compiled in all, more for each kind of pictures, and for the estimator by phases."""
@@ -109,9 +109,9 @@ def warm_up(part: str = ALL, kinds: Sequence[str] = PICTURE_KINDS, *, phase: boo
     """
     if part == ITERATION:
         _iteration()
-        _prefilter(kinds)
         return
     if part == REST:
+        _prefilter(kinds)
         _rest()
         return
     if part == PHASE:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.compiled.convolution import GROUP, REACH, ROWS, STRIP, filter_across, filter_along
-from analysis.compiled.loops import helper, parallel
+from analysis.compiled.loops import helper, shared
 from analysis.compiled.shares import in_shares
 from analysis.compiled.threads import SHARES, next_piece
 from analysis.compiled.vectors import LANES
@@ -43,7 +43,7 @@ def room_for(shape: tuple[int, int]) -> NDArray[np.float32]:
     return np.empty((height + 2 * PAD) * (width + 2 * PAD) + LANES, np.float32)
 
 
-@parallel
+@shared
 def coefficients(
     image: NDArray[Any], offset: Any, taps: NDArray[np.float32], box: Box, out: NDArray[np.float32]
 ) -> bool:

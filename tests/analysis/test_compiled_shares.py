@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from analysis.compiled.loops import helper, parallel
+from analysis.compiled.loops import helper, shared
 from analysis.compiled.shares import in_shares, part_of
 from analysis.compiled.threads import SHARES, next_piece
 
@@ -27,7 +27,7 @@ def _times(args: Any, other: tuple[Any, int], done: Any, share: int) -> None:
         done[i] += args.factor * args.values[i] + other[0][i, 1] + other[1]
 
 
-@parallel
+@shared
 def times(args: Args, other: tuple[Any, int], done: Any) -> int:
     """Add to ``done``; then go on, alone."""
     in_shares(_times, (args, other, done))
@@ -43,7 +43,7 @@ def _count(done: Any, counters: Any, by: Any, share: int) -> None:
         piece = next_piece(counters, share, len(done))
 
 
-@parallel
+@shared
 def count(done: Any, by: Any) -> None:
     """Two loops one after the other, of which the second finds all of the first done."""
     in_shares(_count, (done, np.zeros(SHARES, np.int64), by))
