@@ -49,8 +49,7 @@ GAIN_RANGE = (0.15, 6.0)
 """A step is divided by the estimated gain only within this range."""
 LEFT_BY_NOISE = 1.15
 """Share of a step left as error after it, per px of uncertainty from one image (measured: 0.5-1 rms)."""
-LEFT_BY_MISFIT = 0.003
-"""The same without noise (measured: up to 0.002)."""
+LEFT_BY_MISFIT = 0.003  # the same without noise (measured: up to 0.002)
 LEFT_BY_LENGTH = 0.03
 """The same per px of the step, the next order of the expansion (measured: 0.004-0.03)."""
 MAX_STEP = 3.0
@@ -58,9 +57,7 @@ MAX_STEP = 3.0
 CHUNK = 32
 """ZOIs that a thread takes at a time, where there are many."""
 AHEAD, BEYOND = 16, 3
-"""ZOIs ahead of the present one whose pixels are prefetched; taps beyond the pixel that they make. Waiting for memory
-was 35 % of the time of the iteration without it and is 18 %; rows of the next ZOI, prefetched once more, save another
-4 to 13 % (November 2026)."""
+"""ZOIs ahead of the present one whose pixels are prefetched; taps beyond the pixel that they make."""
 
 
 @helper
