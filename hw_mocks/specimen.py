@@ -233,10 +233,12 @@ def specimen_from(address: Address) -> VirtualSpecimen:
 def take_specimen(options: Options) -> VirtualSpecimen:
     """Take the keys of the specimen out of an address's settings; raises as ``specimen_from``."""
     kind, cyclic = _kind(options.address), options.choice("programme", ("pull", "cyclic"), "pull") == "cyclic"
-    material, clock = (
-        _take_material(options, 120.0 if kind == "halves" else 140.0, metal=not cyclic),
-        TestClock(),
-    )
+    if cyclic and kind == "halves":
+        raise ConfigError(
+            "{text}: halves are pulled, programme=cyclic is for the others", options.address.text
+        )
+    material = _take_material(options, 120.0 if kind == "halves" else 140.0, metal=not cyclic)
+    clock = TestClock()
     return VirtualSpecimen(
         kind=kind,
         width=options.integer("width", 640, minimum=32, maximum=8192),

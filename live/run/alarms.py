@@ -133,10 +133,8 @@ def check_alarms(config: Config, *, both_sides: bool = False) -> None:
     if config.load.address != "none:":
         missing.clear()
     if config.specimen.area_m2 is None:
-        for channel in {
-            "stress_MPa",
-            *(one.channel for one in config.alarm if one.of_cycle is None),
-        } & OF_SECTION:
+        absolute = {alarm.channel for alarm in config.alarm if alarm.of_cycle is None}
+        for channel in absolute & OF_SECTION:
             missing.setdefault(channel, Message("the section: give --section W,T"))
     if not config.record.enabled:
         missing["disk_min"] = Message("a recording: leave --no-record out")

@@ -17,7 +17,7 @@ from live.pipeline.measure import measure
 from tests.accuracy.truth import Speckle, affine, digitise
 
 SHAPE = (1024, 1024)
-COUNTS = (0, 1, 10, 100)
+COUNTS = (0, 10, 100)  # what one alone adds is less than the noise
 BURSTS, ROUNDS = 40, 9
 FLICKER = 0.002
 """Share of the ZOIs that another field has lost."""

@@ -277,12 +277,17 @@ def test_cycles_keep_their_forces_while_the_stiffness_falls() -> None:
 
 
 @pytest.mark.parametrize(
-    ("settings", "words"),
-    [("max_strain=2e-3&fall=0.1", "elastic"), ("hold=0", "hold"), ("n=0", "n")],
+    ("kind", "settings", "words"),
+    [
+        ("", "max_strain=2e-3&fall=0.1", "elastic"),
+        ("", "hold=0", "hold"),
+        ("", "n=0", "n"),
+        ("halves", "n=5", "halves are pulled"),
+    ],
 )
-def test_impossible_cycles_are_refused(settings: str, words: str) -> None:
+def test_impossible_cycles_are_refused(kind: str, settings: str, words: str) -> None:
     from hw_mocks.sim_camera import open_sim_camera
 
-    address = parse_address(f"sim:?programme=cyclic&{settings}")
+    address = parse_address(f"sim:{kind}?programme=cyclic&{settings}")
     with pytest.raises(ConfigError, match=words):
         open_sim_camera(address, lambda event: None, specimen_from(address))

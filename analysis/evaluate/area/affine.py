@@ -114,9 +114,7 @@ class AffineFit:
             share * np.sum(row[:, None] * self.normal[:, k], axis=0) for k, share in enumerate(q) if share
         )
         of_both = np.sum((q**2).reshape(2, 3), axis=1)[:, None] / np.sum(q**2) ** 2
-        unit = np.where(
-            self.unit > 0, self.unit, np.inf
-        )  # of ZOIs without a pattern, which are not valid, it is 0
+        unit = np.where(self.unit > 0, self.unit, np.inf)  # 0 without a pattern, where nothing is valid
         return np.asarray(self._unit_variance(name, strain, valid) * of_each * of_both / unit)
 
     def weights(self, name: str, valid: Bools) -> Floats:

@@ -16,6 +16,7 @@ import pytest
 
 from live.commands.attended import page_opened
 from live.config.loading import load_config
+from live.results.run_folder import open_run
 from live.setup.pictures import read_mask
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.web.authorization import RequestGuard
@@ -73,7 +74,9 @@ def test_from_nothing_to_a_report(browser: Any, tmp_path: Path, start: Callable[
     program = start(*words)
     page = opened(browser, program)
     set_up(page, tmp_path)
-    run(page, program)
+    columns, rows = run(page, program)
+    with open_run(tmp_path / "runs" / "specimen-1") as of:
+        assert of.strain.grid.shape == (rows, columns), "the map has a pixel a point"
     after(page, tmp_path)
     assert program.end() == 0, program.output
     here = program.address.partition("/?")[0]
@@ -162,7 +165,8 @@ def check_saved(page: Page, folder: Path) -> None:
     )
 
 
-def run(page: Page, program: Program) -> None:
+def run(page: Page, program: Program) -> list[int]:
+    """Returns width and height of a map, as it came."""
     page.press("s")
     page.until(lambda: page.page.get_attribute("#state", "data-word") == "measuring", "it measures")
     page.page.wait_for_timeout(1500)
@@ -185,13 +189,16 @@ def run(page: Page, program: Program) -> None:
     page.page.keyboard.press("p")
     page.until(lambda: page.page.get_attribute("#state", "data-word") == "measuring", "measuring again")
     page.page.select_option("#component", "e1")
-    page.until(lambda: page.page.evaluate("() => document.getElementById('map').naturalWidth") > 1, "a map")
+    size = "() => [document.getElementById('map').naturalWidth, document.getElementById('map').naturalHeight]"
+    page.until(lambda: page.page.evaluate(size)[0] > 1, "a map")
+    columns_and_rows: list[int] = page.page.evaluate(size)
     with program.frozen():
         page.until(lambda: page.page.is_visible("#nolink"), "NO LINK")
     page.until(lambda: not page.page.is_visible("#nolink"), "the link is back")
     page.until(lambda: page.stage() == "after", "the test is over")
     moved = page.page.evaluate("() => window.moved")
     assert sum(value for value, *_ in moved) < 0.01, f"the layout moved: {sorted(moved)[-12:]}"
+    return columns_and_rows
 
 
 def assert_a_page_without_the_token_is_refused(page: Page, program: Program) -> None:
