@@ -291,9 +291,9 @@ def test_figures_in_other_languages(browser: Any, locale: str, wanted: str) -> N
 
 def test_two_cameras_after_a_test(browser: Any) -> None:
     peak = MAP | {"picture": "/picture?side=back&after=1", "low": 0.1, "s": 85.0}
-    second = {"side": "back", "atpeak": "at the highest force", "peak": peak}
+    sides = [{"side": side, "atpeak": "at the highest force", "peak": one} for side, one in (("front", MAP), ("back", peak))]
     with opened(browser) as page:
-        show_after(page, side="front", second=second)
+        show_after(page, cameras=sides)
         unit_of_strains(page, "%")
         assert marks(page, "peaklegend")[0] == pytest.approx(18.5)
         page.page.click("#peakside button:nth-child(2)")
