@@ -30,7 +30,7 @@ export function beginViews(stage, every = [""], again) {
   [redraw, names] = [again, every];
   latest[stage] = {};
   failed.clear();
-  fill($(`${stage}views`), [], null);
+  fill($(`${stage}views`), [], card);
   if (stage === "run" || !names.includes(chosen())) delete document.body.dataset.side;
   showCards(stage);
 }

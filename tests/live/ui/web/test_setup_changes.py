@@ -87,6 +87,22 @@ def test_all_cameras_are_checked(both: SetupSessions, monkeypatch: pytest.Monkey
     assert begun == ["front", "back"]
 
 
+def test_the_rig_file_of_the_first_names_those_of_all_others(tmp_path: Path) -> None:
+    draft = draft_of(tmp_path, '[camera]\naddress = "sim:a"\nbeside = ["sim:b", "sim:c"]\n')
+    sessions = SetupSessions(drafts_of(draft), Broadcaster(), {})
+    for session in sessions.by_name.values():
+        session._folder.cleanup()
+    CHANGES["set"](sessions.of("third"), {"key": "measure.zoi", "value": 48})
+    sessions.save()
+    own = tmp_path / "rig-second.toml", tmp_path / "rig-third.toml"
+    assert load_config(tmp_path / "rig.toml", {}).camera.beside == tuple(map(str, own))
+    second, third = (load_config(path, {}) for path in own)
+    assert (second.camera.address, second.measure.zoi) == ("sim:b", 64)
+    assert (third.camera.address, third.measure.zoi) == ("sim:c", 48)
+    again = drafts_of(draft_of(tmp_path, (tmp_path / "rig.toml").read_text()))
+    assert [one.path for one in again.values()] == [draft.path, *own]
+
+
 def test_another_load_cell_has_no_zero_yet(both: SetupSessions) -> None:
     front, back = both.by_name.values()
     front.draft.change_all({"load.zero_N": 5.0})
