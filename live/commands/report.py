@@ -12,8 +12,8 @@ from acquire.errors import ConfigError, PhasedicError
 from acquire.text.message import about
 from live.commands.more_gauges import add_gauges
 from live.commands.options import add_gauge_option
+from live.config.new_files import check_free, new_file
 from live.pipeline.screen import Screen
-from live.results.export.atomic_file import check_free, new_file
 from live.results.finished.figures_file import FILE, FiguresFile
 from live.results.quantities import Display
 from live.results.report.cameras import report_of_cameras
