@@ -142,7 +142,7 @@ def _lines(
     """The lines and marks of the report's curve, in SI units."""
     history, loads = run_state.history, run_state.loads
     axial, transverse = history.along(specimen.axis)
-    load = history.forces(loads) / (specimen.area_m2 or 1.0)
+    load = specimen.load(history.forces(loads))
     if not np.isfinite(load).any():
         return
     curve = EvaluatedCurve(
