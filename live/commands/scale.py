@@ -43,10 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="standard uncertainty of the length, the width or the board (default 0)",
     )
     parser.add_argument(
-        "--stand-off",
-        type=float,
-        metavar="MM",
-        help="distance from the camera to the specimen",
+        "--stand-off", type=float, metavar="MM", help="distance from the camera to the specimen"
     )
     add_verbose(parser)
 

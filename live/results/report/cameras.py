@@ -140,11 +140,7 @@ def _stress_strain(sides: SidesOfTest, stresses: bool) -> Plot:
     """The load over the axial strain of each side and of the mean, at the instants of the front."""
     axial, load = sides.courses[AXIAL], sides.curve.stress
     name, factor = ("MPa", 1e-6) if stresses else _force(load)
-    strains = {
-        "mean": axial.mean,
-        "front": axial.mean + axial.bending,
-        "back": axial.mean - axial.bending,
-    }
+    strains = {"mean": axial.mean, "front": axial.mean + axial.bending, "back": axial.mean - axial.bending}
     e = strain_unit(*strains.values())
     lines = tuple(
         PlotLine(Message("{side}", side), strain * e.factor, load * factor, colour=k)

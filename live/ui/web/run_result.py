@@ -104,13 +104,7 @@ def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str
     first = {row.name for row in headline(figures, stresses=specimen.area_m2 is not None)}
     found = [_figure(row) | {"head": row.name in first} for row in _rows(figures, specimen)]
     if figures.E.known and figures.elastic_strain:
-        found.append(
-            {
-                "name": Message("strain of E and nu"),
-                "text": figures.elastic_strain,
-                "words": True,
-            }
-        )
+        found.append({"name": Message("strain of E and nu"), "text": figures.elastic_strain, "words": True})
     if figures.E.known:
         found.append(_interval_of_e(figures))
     return found + [{"name": Message("of the test"), "text": note, "words": True} for note in figures.notes]
