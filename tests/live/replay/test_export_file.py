@@ -182,3 +182,8 @@ def test_any_text_is_refused_in_words_or_has_rising_times(parts: list[str]) -> N
         assert str(refused).startswith("forces.csv: ")
     else:
         assert found.times is None or bool((np.diff(found.times) > 0).all())
+
+
+def test_a_force_beyond_sense_is_refused() -> None:
+    with pytest.raises(DataError, match=r"a force of 1e\+15 N is beyond sense; give --load-unit"):
+        read("time [s];Force [N]\n0;1\n1;1e15\n")
