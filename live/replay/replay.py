@@ -46,7 +46,7 @@ from live.results.finished.finished_test import FinishedTest
 from live.results.folder import LOG, BurstFailures, check_folder, make_folder
 from live.results.response.rising import check_channel
 from live.results.writer import write_results
-from live.setup.devices import open_rig
+from live.setup.frames import camera_of
 from live.setup.pictures import with_film, with_mask
 from live.setup.region import is_auto_region
 from live.stream.adapted import Outputs
@@ -118,17 +118,14 @@ def _replay_pictures(
         measure=replace(config.measure, roi=region),
     )
     event_log = EventLog()
-    rig = open_rig(config.camera.address, "none:", _in_test_time(event_log), crop=config.camera.crop)
-    try:
-        with rig.camera as camera:
-            found = picture_source(camera, request, config)
-            screen.print(found.words)
-            for warning in camera.info.warnings:
-                screen.print(f"warning: {warning}")
-            source = _with_forces(found, request, config, screen)
-            return _run(source, config, request, screen, stopping, event_log, consumers)
-    finally:
-        rig.close()
+    into = _in_test_time(event_log)
+    with camera_of(config.camera.address, into, crop=config.camera.crop) as camera, camera:
+        found = picture_source(camera, request, config)
+        screen.print(found.words)
+        for warning in camera.info.warnings:
+            screen.print(f"warning: {warning}")
+        source = _with_forces(found, request, config, screen)
+        return _run(source, config, request, screen, stopping, event_log, consumers)
 
 
 def _with_forces(
