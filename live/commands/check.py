@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.errors import ConfigError
+from acquire.errors import NOT_READY, ConfigError
 from acquire.files.picture import write_picture
 from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
 from live.commands.check_watch import watch
-from live.commands.exit_codes import NOT_READY
 from live.commands.options import (
     MEASURE,
     PICTURES,

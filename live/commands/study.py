@@ -23,8 +23,8 @@ from live.commands.options import (
     in_picture_order,
     overrides,
 )
+from live.config.new_files import check_free, new_folder
 from live.config.values import AUTO
-from live.results.export.atomic_file import check_free, new_folder
 from live.results.report.saving import save_figures
 from live.results.report.svg import Plot, PlotLine
 from live.setup.compiling import compile_ahead

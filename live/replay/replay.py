@@ -19,7 +19,7 @@ import numpy as np
 
 from acquire.addresses import parse_address
 from acquire.camera import with_scheme
-from acquire.errors import ConfigError, DataError
+from acquire.errors import EXIT_INTERRUPTED, LOSS, ConfigError, DataError
 from acquire.events import Event, EventKind, EventSink
 from acquire.frame import Burst, Frame
 from acquire.hdf5 import FolderWatch
@@ -252,7 +252,7 @@ def _run(
         or cut_off
         or failures.count
     )
-    code = 130 if stopping.is_set() else 5 if lossy else 0
+    code = EXIT_INTERRUPTED if stopping.is_set() else LOSS if lossy else 0
     at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
     start_t = source.start.monotonic
     test = finished(folder, config, run_state, code, at_reference, start_t, request.response)

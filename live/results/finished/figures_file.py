@@ -15,8 +15,8 @@ from acquire.text import Message
 from analysis.evaluate import CONFIDENCE, Figure
 from analysis.evaluate.elastic import FILM
 from live.config.loading import Config
+from live.config.new_files import new_file
 from live.pipeline.run_state import RunState
-from live.results.export.atomic_file import new_file
 from live.results.figures import tensile_table
 from live.results.finished.findings import DataCheck, findings
 from live.results.finished.finished_test import FinishedTest

@@ -32,7 +32,7 @@ from live.ui.web.page_consumers import PageConsumers
 from live.ui.web.painting import as_png
 from live.ui.web.run_result import peaks
 from live.ui.web.server import DEFAULT_PORT, REPORT_POLICY, PageServer, Response, jpeg_response
-from live.ui.web.setup.config_draft import ConfigDraft, next_name, second_draft
+from live.ui.web.setup.config_draft import ConfigDraft, drafts_of, next_name
 from live.ui.web.setup.draft_changes import CHANGES
 from live.ui.web.setup.drawn_region import DrawnRegion
 from live.ui.web.setup.setup_session import SetupSession
@@ -75,7 +75,7 @@ class PageController:
         self.stage = RUN if draft is None else SET_UP
         self.sessions: SetupSessions | None = None
         self.others: list[Config] = []
-        self._second_draft: ConfigDraft | None = None
+        self._drafts: Mapping[str, ConfigDraft] = {}
         self._drawn: Mapping[str, DrawnRegion] = {}
         self._broadcaster = Broadcaster()
         self._consumers = PageConsumers(self._broadcaster, {}, {})
@@ -141,8 +141,8 @@ class PageController:
         assert self.draft is not None
         if not self.draft.config.metadata.get("specimen"):
             self.draft.change_all({"metadata.specimen": self._free_name(FIRST)})
-        self._second_draft = self._second_draft or second_draft(self.draft)
-        with SetupSessions(self.draft, self._second_draft, self._broadcaster, self._drawn) as sessions:
+        self._drafts = self._drafts or drafts_of(self.draft)
+        with SetupSessions(self._drafts, self._broadcaster, self._drawn) as sessions:
             self.sessions = sessions
             self._enter(SET_UP, message)
             started = self._requests.get() == START
@@ -233,6 +233,7 @@ class PageController:
             "n": self._stages,
             "words": self._message,
             "alone": self.draft is None,
+            "cameras": [*(self._consumers if self.sessions is None else self.sessions).by_name] or [""],
             "what": self._what,
             "before": self._before if self.stage == RUN else None,
         }

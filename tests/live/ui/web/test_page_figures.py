@@ -289,11 +289,59 @@ def test_figures_in_other_languages(browser: Any, locale: str, wanted: str) -> N
         assert page.page.evaluate("() => [...untranslated]") == []
 
 
+def test_three_cameras_in_a_test(browser: Any) -> None:
+    """A card of each, the map of the chosen one, and the figures of the first that goes on."""
+    names = ["first", "second", "third"]
+    sides = {"strains": [], "figures": [{"side": "third", "name": "E", "text": "70.0 GPa"}], "cameras": [
+        {"side": side, "failed": False, "valid": 900 + k, "zois": 1000, "skipped": 4, "lost": k}
+        for k, side in enumerate(names)]}  # fmt: skip
+
+    def measured(k: int, **more: Any) -> dict[str, Any]:
+        axial = figure((k + 1) * 1e-3, 2e-6)
+        figures = {"force": figure(8035.3, 0.9), "stress": figure(267.84e6, 3e4), "axial": axial}
+        axial = {"name": "eyy", "value": (k + 1) * 1e-3, "sigma": 2e-6, "assumed": ""}
+        return run_state(side=names[k], figures=figures, axial=axial, valid=900 + k, zois=1000, **more)
+
+    with opened(browser) as page:
+        unit_of_strains(page, "µm/m")
+        show(page, "run", "beginRun", STAGE | {"cameras": names})
+        for k in (2, 0, 1):
+            more = {"picture": MAP | {"low": 0.1 * (k + 1), "high": 0.1 * (k + 2), "n": 5 + k}}
+            show(page, "run", "showRun", measured(k, sides=sides if k == 0 else None, **more))
+        cards = page.page.locator("#runviews [data-view]")
+        found = [text.partition("±")[0].split("\n") for text in cards.all_inner_texts()]
+        assert [name for name, _ in found] == names
+        assert [number(value) for _, value in found] == [1000, 2000, 3000]
+        assert page.page.locator("#runviews [aria-pressed=true]").get_attribute("data-view") == "first"
+        assert tile(page, "axial") == pytest.approx(1e-3) and "first" in page.text("axialof")
+        unit_of_strains(page, "%")
+        assert marks(page, "maplegend")[0] == pytest.approx(10.0)
+        page.page.click("#runviews [data-view=third]")
+        assert marks(page, "maplegend")[0] == pytest.approx(30.0)
+        assert "side=third" in page.page.get_attribute("#map", "src")
+        rows = page.page.locator("#sides li").all_text_contents()
+        assert [number(row.split("lost")[1]) for row in rows[:3]] == [0, 1, 2] and "E, third70.0 GPa" in rows
+        show(page, "run", "showRun", measured(0, sides=sides) | {"state": "ended"})
+        show(page, "run", "showRun", measured(2))
+        assert "first" in page.text("axialof"), "the second has not said yet that it goes on"
+        show(page, "run", "showRun", measured(1))
+        assert tile(page, "axial") == pytest.approx(2e-3) and "second" in page.text("axialof")
+        show(page, "run", "showRun", measured(1) | {"state": "ended"})
+        show(page, "run", "showRun", measured(2))
+        assert tile(page, "axial") == pytest.approx(3e-3) and "third" in page.text("axialof")
+        show(page, "run", "beginRun", STAGE | {"cameras": ["front", "back"]})
+        show(page, "run", "showRun", measured(2))
+        assert cards.count() == 0, "a camera of the test before"
+
+
 def test_two_cameras_after_a_test(browser: Any) -> None:
     peak = MAP | {"picture": "/picture?side=back&after=1", "low": 0.1, "s": 85.0}
-    second = {"side": "back", "atpeak": "at the highest force", "peak": peak}
+    sides = [
+        {"side": side, "atpeak": "at the highest force", "peak": one}
+        for side, one in (("front", MAP), ("back", peak))
+    ]
     with opened(browser) as page:
-        show_after(page, side="front", second=second)
+        show_after(page, cameras=sides)
         unit_of_strains(page, "%")
         assert marks(page, "peaklegend")[0] == pytest.approx(18.5)
         page.page.click("#peakside button:nth-child(2)")
