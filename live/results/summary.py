@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ from live.results.figures import (
     tare_line,
 )
 from live.results.finished.answers import checks_line
-from live.results.finished.findings import doubts, findings
+from live.results.finished.findings import DataCheck, doubts, findings
 from live.results.finished.finished_test import FinishedTest
 
 _CARD_EVERY_S = 1.0  # of the test
@@ -90,11 +91,9 @@ def why_nothing(run_state: RunState) -> str:
     )
 
 
-def belief_lines(test: FinishedTest) -> list[str]:
-    """Whether the figures can be believed: the checks made, and what the data say against the figures."""
-    found = findings(test)
-    looks = [Message("look: {text}", text) for text in doubts(found)]
-    return [*film_line(test.specimen), checks_line(found), *looks]
+def look_lines(found: Sequence[DataCheck]) -> list[str]:
+    """What the data say against the figures."""
+    return [Message("look: {text}", text) for text in doubts(found)]
 
 
 def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
@@ -122,7 +121,8 @@ def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
         noise_line(history),
     ]
     lines += sharpness_line(history.column("blur").tolist(), history.column("sigma_blur").tolist())
-    lines += latency_lines(history) + belief_lines(test)
+    found = findings(test)
+    lines += [*latency_lines(history), *film_line(specimen), checks_line(found), *look_lines(found)]
     figures = [*test.cycles.lines(), *figure_lines(test.figures, specimen)]
     if figures:
         figures += tare_line(history, run_state.loads) + lag_line(history, run_state.loads, specimen)
