@@ -104,7 +104,7 @@ def frame_counts(run: RunFolder) -> Html:
     if not found:
         return paragraph(Message("No frame counts were recorded."), "dim")
     counts = {name: Amount("count", one) if isinstance(one, int) else one for name, one in found.items()}
-    return facts({Message("{what}", name): one for name, one in counts.items()})
+    return facts({Message("{what}", name): Message("{what}", one) for name, one in counts.items()})
 
 
 def events(run: RunFolder) -> Html:

@@ -32,7 +32,8 @@ def response_lines(strain: Strain) -> list[str]:
     name = slope_name(found.channel)
     unit, factor = shown_unit(name)
     slope, sigma, chi2, poisson = (
-        found.map(one)[strain.grid.active] for one in (name, f"sigma_{name}", "chi2", "poisson")
+        found.map(one)[strain.grid.active].astype(np.float64)
+        for one in (name, f"sigma_{name}", "chi2", "poisson")
     )
     known = slope[np.isfinite(slope)] * factor
     if not known.size:
@@ -77,7 +78,7 @@ def _departures(strain: Strain, found: StoredResponse) -> list[str]:
     leaves = leaves_name(found.channel)
     if not leaves:
         return []
-    at, fate = (found.map(one)[strain.grid.active] for one in (leaves, FATE))
+    at, fate = (found.map(one)[strain.grid.active].astype(np.float64) for one in (leaves, FATE))
     unit, factor = shown_unit(leaves) if found.channel == STRESS else ("µm/m", 1e6)
     _, left, lost = (int(np.count_nonzero(fate == code)) for code in range(3))
     if not left and found.instants < FIRST + WINDOW:
