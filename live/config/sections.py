@@ -228,7 +228,7 @@ class StrainOutConfig:
     format: str = key(choice("json", "csv"), "json",
         "format of a line; csv begins with the names of the channels", Option("strain-format", expert=True))
     channels: tuple[str, ...] | None = key(NAMES, None,
-        "channels of a line (docs/guide.md; default: time, frame, axial strain and its sigma and rate, force,"
+        "channels of a line (docs/control.md; default: time, frame, axial strain and its sigma and rate, force,"
         " stress, lost share, latency and all gauges)",
         Option("strain-channels", "NAME,NAME", expert=True))
 
@@ -237,7 +237,7 @@ class StrainOutConfig:
 class AlarmConfig:
     """[[alarm]]: any number of them; exactly one of above and below."""
 
-    channel: str = key(TEXT, "", "channel that is watched (docs/guide.md)")
+    channel: str = key(TEXT, "", "channel that is watched (docs/control.md)")
     above: float | None = key(number(), None, "the alarm is on above this value")
     below: float | None = key(number(), None, "the alarm is on below this value")
     hysteresis: float = key(number(0), 0.0, "distance back from the limit at which the alarm ends")

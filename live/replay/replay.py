@@ -237,12 +237,19 @@ def _run(
         run_state.health.ended = True
         outputs.end()
         folder = held.end()
-    speed = f"joined of {len(request.parts)} chunks" if request.parts else speed_line(run_state.history, took)
+    chunks = len(request.parts)
+    speed = Message("joined of {chunks} chunks", chunks) if chunks else speed_line(run_state.history, took)
     lines = [*_account(source, run_state), speed]
     left_out = source.count.left_out if source.count else 0
     cut_off = [e.text for e in event_log.events("warning") if "missing" in e.data and not stopping.is_set()]
-    stopped = [f"{report.name} stopped: {report.failed}" for report in outputs.reports if report.failed]
-    failed = f"{counted(failures.count, 'burst')} could not be measured; {folder / LOG} has the details"
+    stopped = [
+        Message("{name} stopped: {why}", one.name, one.failed) for one in outputs.reports if one.failed
+    ]
+    failed = Message(
+        "{bursts} could not be measured; {log} has the details",
+        counted(failures.count, "burst"),
+        folder / LOG,
+    )
     lines = [*[failed] * (failures.count > 0), *cut_off, *source.doubts, *stopped, *lines]
     lossy = (
         outputs.failed
@@ -255,7 +262,7 @@ def _run(
     code = EXIT_INTERRUPTED if stopping.is_set() else LOSS if lossy else 0
     at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
     start_t = source.start.monotonic
-    test = finished(folder, config, run_state, code, at_reference, start_t, request.response)
+    test = finished(folder, config, run_state, code, at_reference, start_t, request.response, lines)
     lines = [*test.response, *lines]
     return Replayed(folder, run_state, config, code, test, tuple(lines), left_out)
 

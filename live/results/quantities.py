@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 from analysis.field import ZoiGrid
 
 UNITLESS = ""
@@ -118,7 +119,7 @@ _INSTANTS = (
     Quantity("force_raw", "N", "force as stamped, not corrected for the lag of the load"),
     Quantity("zero", "N", "sum of the tares before, subtracted from the force"),
     *(
-        Quantity(f"raw_{e}", UNITLESS, f"{e} of the region before the correction by plates")
+        Quantity(f"raw_{e}", UNITLESS, Message("{name} of the region before the correction by plates", e))
         for e in ("exx", "eyy", "exy")
     ),
     Quantity("lens_exx", UNITLESS, "exx of the region that the lens made, and that was removed"),
@@ -148,7 +149,7 @@ _INSTANTS = (
     Quantity("latency", "s", "from the stamp of the last frame of the burst to the result; nan in a replay"),
 )
 _GAUGE, _SHARE = "gauge_", "share_gauge_"
-_KNOWN = {q.name: q for q in (*_FIELDS, *_RESPONSES, *_PLACES, *_INSTANTS)}
+KNOWN = {q.name: q for q in (*_FIELDS, *_RESPONSES, *_PLACES, *_INSTANTS)}
 
 MEANS = {
     "time_s": "time", "force_N": "force", "stress_Pa": "stress", "true_stress_Pa": "true_stress",
@@ -162,21 +163,26 @@ MEANS = {
 def quantity_of(name: str) -> Quantity:
     """The quantity of a map or column; one that is not known refers to the description of the format."""
     plain = MEANS.get(name, name)
-    if plain in _KNOWN:
-        return _KNOWN[plain]
+    if plain in KNOWN:
+        return KNOWN[plain]
     gauge = plain.removeprefix("sigma_")
     if plain.startswith(_SHARE):
-        words = f"share of its area that {plain.removeprefix('share_')} stands for, at either end"
+        words = Message(
+            "share of its area that {name} stands for, at either end", plain.removeprefix("share_")
+        )
         return Quantity(plain, UNITLESS, words)
     if gauge.startswith(_GAUGE):
-        words = f"strain of the virtual gauge {gauge.removeprefix(_GAUGE)!r}; nan where it was lost"
-        return Quantity(
-            plain, UNITLESS, words if plain == gauge else f"standard uncertainty (1 sigma) of {gauge}"
-        )
-    of = _KNOWN.get(plain.removeprefix("sigma_"))
+        named = repr(gauge.removeprefix(_GAUGE))
+        words = Message("strain of the virtual gauge {name}; nan where it was lost", named)
+        return Quantity(plain, UNITLESS, words if plain == gauge else _sigma_of(gauge))
+    of = KNOWN.get(plain.removeprefix("sigma_"))
     if of is None or not plain.startswith("sigma_"):
         return Quantity(plain, UNITLESS, "see docs/strain-format.md")
-    return Quantity(plain, of.unit, f"standard uncertainty (1 sigma) of {of.name}")
+    return Quantity(plain, of.unit, _sigma_of(of.name))
+
+
+def _sigma_of(name: str) -> str:
+    return Message("standard uncertainty (1 sigma) of {name}", name)
 
 
 def mean_name(name: str) -> str:

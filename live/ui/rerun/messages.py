@@ -20,6 +20,7 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
 from live.pipeline.timed.figure import FigureState, TimedFigure
 from live.ui.rerun.wire import Kind, Parcel, WireError
+from live.words.language import told
 
 STRAINS = ("exx", "eyy", "exy")
 MAPS = (*STRAINS, "e1", "e2", "sigma", "residual", "status")
@@ -226,8 +227,8 @@ def picture_of(message: Parcel) -> PictureMessage:
 
 
 def events_message(events: Sequence[Event]) -> Parcel:
-    """Events, without their data."""
-    return Parcel(Kind.EVENTS, {"events": [[e.t, e.kind, e.source, e.text, e.level] for e in events]})
+    """Events in the language of the terminal, without their data."""
+    return Parcel(Kind.EVENTS, {"events": [[e.t, e.kind, e.source, told(e.text), e.level] for e in events]})
 
 
 def events_of(message: Parcel) -> list[Event]:
