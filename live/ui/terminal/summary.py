@@ -68,6 +68,7 @@ def brief_lines(run_state: RunState, test: FinishedTest) -> list[str]:
         *belief_lines(test),
         *_figures(run_state, test),
         *test.cycles.lines(),
+        *test.response,
         *_remarks(run_state, test),
     ]
 

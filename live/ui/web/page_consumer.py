@@ -29,6 +29,9 @@ from live.pipeline.repeats import Repeats
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import BURST, DISK, FORCE, FPS, STRESS, Snapshot, peak_force
 from live.pipeline.timed.figure import TimedFigure
+from live.pipeline.timed.response import shown_names
+from live.results.reader import Strain
+from live.results.run_folder import STRAIN
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.cameras_panel import CamerasPanel
 from live.ui.web.curve_history import CurveHistory
@@ -141,6 +144,7 @@ class PageConsumer(Consumer):
         if len(states) > 1:
             self._cameras = CamerasPanel(states, self._config.specimen, self._now)
         self._running, self._start_t = running, running.run_state.health.began_t
+        self.map.response = running.run_state.response.maps
         self._channels = ChannelValues(self._start_t, running.run_state.snapshot)
 
     def select_map(self, request: Mapping[str, Any]) -> str:
@@ -221,6 +225,7 @@ class PageConsumer(Consumer):
         if last is not None and last is not m:
             self.layers["last"], shown = self.map.draw(last)
             found["last"] = self._shown_after(last, shown, "&layer=last")
+        found |= self._response_after(m)
         self.picture, shown = self.map.draw(m)
         words = Message("at the end") if math.isnan(self._peak_N) else Message("at the highest force")
         return found | {
@@ -229,6 +234,21 @@ class PageConsumer(Consumer):
             "gauges": _gauges(m.time_step, {}, self._colours),
             "points": self.curve.position,
         }
+
+    def _response_after(self, m: Measurement) -> dict[str, Any]:
+        """The maps of the whole test that ``strain.h5`` has, over the picture of ``m``."""
+        if self._running is None or not self._config.output.response:
+            return {}
+        with Strain.open(self._running.folder / STRAIN) as strain:
+            maps = {name: strain.maps(name, 0) for name in strain.whole_names}
+        self.map.response = lambda: maps
+        found: dict[str, Any] = {
+            "whole": [name for name in shown_names(self._config.output.response) if name in maps]
+        }
+        for name in found["whole"]:
+            self.layers[name], shown = self.map.draw(m, name)
+            found[name] = self._shown_after(m, shown, f"&layer={name}")
+        return found
 
     def _shown_after(self, m: Measurement, shown: dict[str, Any], layer: str = "") -> dict[str, Any]:
         address = f"/picture?side={self._side}&after={self._shown}{layer}"

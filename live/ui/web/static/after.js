@@ -84,7 +84,8 @@ function showFold(name, list, make, words) {
 function showMaps() {
   const sides = result.second ? [result, result.second] : [result], side = sides[chosen.side] ?? result;
   choices($("peakside"), sides.length > 1 ? sides.map((one, k) => [k, t(one.side)]) : [], chosen.side, (k) => { chosen.side = k; });
-  const times = [["peak", result.atpeak], ["last", "last picture"]].filter(([name, words]) => side[name] && words);
+  const whole = (side.whole ?? []).map((name) => [name, name]);
+  const times = [["peak", side.atpeak], ["last", "last picture"], ...whole].filter(([name, words]) => side[name] && words);
   if (!side[chosen.time]) chosen.time = "peak";
   choices($("peaktime"), times.length > 1 ? times.map(([name, words]) => [name, t(words)]) : [], chosen.time, (name) => { chosen.time = name; });
   const shown = side[chosen.time], shot = $("peakmap").closest(".shot");
@@ -93,7 +94,7 @@ function showMaps() {
   if (!$("peakmap").src.endsWith(shown.picture)) $("peakmap").src = shown.picture;
   setRatio(shot, shown.width, shown.height);
   drawGauges($("peakgauges"), shown.gauges, shown.width, shown.height);
-  const words = chosen.time === "peak" ? t(side.atpeak) : t("last picture"), at = shown.s == null ? "" : `${time(shown.s)}, `;
+  const words = t(times.find(([name]) => name === chosen.time)[1]), at = whole.some(([name]) => name === chosen.time) || shown.s == null ? "" : `${time(shown.s)}, `;
   put($("peakwords"), `${at}${side.side ? `${t(side.side)}, ` : ""}${words}`);
   showLegend($("peaklegend"), shown);
 }
