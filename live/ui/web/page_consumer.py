@@ -14,6 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
 
+from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.text import Message
@@ -30,7 +31,7 @@ from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import BURST, DISK, FORCE, FPS, STRESS, Snapshot, peak_force
 from live.pipeline.timed.figure import TimedFigure
 from live.pipeline.timed.response import shown_names
-from live.results.reader import Strain
+from live.results.reader import whole_maps
 from live.results.run_folder import STRAIN
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.cameras_panel import CamerasPanel
@@ -237,18 +238,18 @@ class PageConsumer(Consumer):
 
     def _response_after(self, m: Measurement) -> dict[str, Any]:
         """The maps of the whole test that ``strain.h5`` has, over the picture of ``m``."""
-        if self._running is None or not self._config.output.response:
-            return {}
-        with Strain.open(self._running.folder / STRAIN) as strain:
-            maps = {name: strain.maps(name, 0) for name in strain.whole_names}
+        names, found = shown_names(self._config.output.response), dict[str, Any]()
+        if self._running is None or not names:
+            return found
+        try:
+            maps = whole_maps(self._running.folder / STRAIN)
+        except DataError:  # which the end of the run has told
+            return found
         self.map.response = lambda: maps
-        found: dict[str, Any] = {
-            "whole": [name for name in shown_names(self._config.output.response) if name in maps]
-        }
-        for name in found["whole"]:
+        for name in (name for name in names if name in maps):
             self.layers[name], shown = self.map.draw(m, name)
             found[name] = self._shown_after(m, shown, f"&layer={name}")
-        return found
+        return found | {"whole": [*found]}
 
     def _shown_after(self, m: Measurement, shown: dict[str, Any], layer: str = "") -> dict[str, Any]:
         address = f"/picture?side={self._side}&after={self._shown}{layer}"

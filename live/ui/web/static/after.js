@@ -99,14 +99,24 @@ function showMaps() {
   showLegend($("peaklegend"), shown);
 }
 
+// A few stand side by side, more in a list.
 function choices(box, list, now, choose) {
+  const isLong = list.length > 3, take = (value) => { choose(value); showMaps(); };
   box.hidden = !list.length;
-  fill(box, list, ([value, words]) => {
+  box.className = isLong ? "box" : "segments";
+  fill(box, isLong ? [list] : list, isLong ? listed : ([value, words]) => {
     const button = el("button", { type: "button", class: "button" }, el("span", { text: words }));
-    button.addEventListener("click", () => { choose(value); showMaps(); });
+    button.addEventListener("click", () => take(value));
     return button;
   });
-  list.forEach(([value], k) => box.children[k].setAttribute("aria-pressed", String(value === now)));
+  if (isLong) box.firstChild.value = now;
+  else list.forEach(([value], k) => box.children[k].setAttribute("aria-pressed", String(value === now)));
+
+  function listed(all) {
+    const select = el("select", { "aria-label": t("Time of the map") }, ...all.map(([value, words]) => el("option", { value, text: words })));
+    select.addEventListener("change", () => take(select.value));
+    return select;
+  }
 }
 
 // The report opens in a window of its own, or the page shows why there is none.

@@ -31,8 +31,8 @@ const WORDS = {
   e1: "Largest principal strain", e2: "Smallest principal strain", u: "Displacement to the right", v: "Displacement downwards",
   sigma: "Uncertainty of a point", residual: "Misfit of a point", status: "State of the points",
   amplification: "Amplification of the strain", compliance: "Strain over stress", rate: "Strain rate of the whole test",
-  chi2: "Misfit of the line of a point", leaves_at_stress: "Stress where a point leaves its line",
-  leaves_at_strain: "Strain where a point leaves its line",
+  chi2: "Misfit of the line", leaves_at_stress: "Line ends at this stress",
+  leaves_at_strain: "Line ends at this strain",
 };
 export const isExpert = () => localStorage.getItem("expert") === "1";
 
