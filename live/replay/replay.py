@@ -189,7 +189,7 @@ def _run(
     stored = StoredResults.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements
     bursts = _not_empty(stored.bursts() if stored else source.bursts, request, source.count)
-    check_channel(request.response, ready.plan.config, forces=len(source.loads) > 0)
+    check_channel(ready.plan.config, forces=len(source.loads) > 0)
     folder = make_folder(ready.plan.config.output.dir, datetime.datetime.now(datetime.UTC))
     config = _with_final_folder(with_mask(ready.plan.config, ready.plan.mask, folder), request.final_folder)
     run_state = RunState(
@@ -209,7 +209,6 @@ def _run(
         ready.plan.grid,
         source.start,
         deferred=request.final_folder is not None,
-        response=request.response,
     )
     made = with_force_watch(consumers(about, run_state), run_state)
     stream = Stream()
@@ -262,8 +261,7 @@ def _run(
     code = EXIT_INTERRUPTED if stopping.is_set() else LOSS if lossy else 0
     at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
     start_t = source.start.monotonic
-    test = finished(folder, config, run_state, code, at_reference, start_t, request.response, lines)
-    lines = [*test.response, *lines]
+    test = finished(folder, config, run_state, code, at_reference, start_t, lines)
     return Replayed(folder, run_state, config, code, test, tuple(lines), left_out)
 
 

@@ -46,8 +46,6 @@ class ReplayRequest:
         Files of ``measure_part`` for the whole session, in order: joined, and not measured again.
     final_folder : Path or None
         The later folder of the results, where it is not the one they are written to.
-    response : str
-        "stress", "mean", "time" or a gauge: what the response of each place is over; empty: none.
     """
 
     source: str
@@ -61,7 +59,6 @@ class ReplayRequest:
     numbers: range | None = None
     parts: Sequence[Path] = ()
     final_folder: Path | None = None
-    response: str = ""
 
 
 Work = Burst | NewReference

@@ -65,7 +65,7 @@ class ViewSetup:
     scale : "symmetric" | "automatic"
         Colour range of the maps: symmetric about zero; or that of the values, about zero where they have both signs.
     whole : sequence of str
-        Further maps: those of the whole test, of a finished one.
+        Further maps: those of the whole test.
     """
 
     title: str
