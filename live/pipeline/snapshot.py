@@ -7,14 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from acquire.text import Message
-from live.config.channels import CYCLE_CHANNELS, SYSTEM_CHANNELS, is_joint
+from live.config.figures import CYCLE_CHANNELS, LIVE, figure_of
 from live.pipeline.measurement import TimeStep
 from live.pipeline.timed.figure import TimedFigure
 
 FORCE, STRESS, AXIAL, BURST, FPS, DISK = "force", "stress", "axial", "burst", "fps", "disk"
-"""Names of figures; those of gauges and of the region are the names of their channels (``live.config.channels``)."""
-_OF_CHANNEL = {"force_N": FORCE, "stress_MPa": STRESS}
-_OF_REGION = ("exx", "eyy", "exy", "largest")
+"""Names of figures; those of gauges and of the region are the names of their channels (``live.config.figures``)."""
+_OF_STEP = {one.plain for one in LIVE}
 _NO_FIGURE = TimedFigure()
 
 
@@ -87,10 +86,10 @@ class Snapshot:
 
     def of_channel(self, channel: str) -> TimedFigure:
         """The figure that a channel has its value from."""
-        if is_joint(channel) or channel in SYSTEM_CHANNELS:
+        one = figure_of(channel)
+        if one.channel in ("both", "machine"):
             return _NO_FIGURE
-        name = _OF_CHANNEL.get(channel, channel.removeprefix("sigma_"))
-        return self.figure(name if name in self.figures or channel in _OF_CHANNEL else BURST)
+        return self.figure(one.of if one.of in self.figures and one.part != "age" else BURST)
 
     @property
     def doing(self) -> str:
@@ -108,7 +107,7 @@ class Snapshot:
         lacking = (
             figure.trouble(names.get(name, name.removeprefix("gauge_")))
             for name, figure in self.figures.items()
-            if name not in (STRESS, BURST, *_OF_REGION)
+            if name not in (STRESS, BURST, *_OF_STEP)
         )
         return tuple(dict.fromkeys(filter(None, (*self.alarms, *lacking, *self.faults))))
 
