@@ -51,7 +51,7 @@ class LiveFigure:
     terminal : int
         Its rank in the status line, which loses the highest first; 0: not there.
     page, display, report : bool
-        It is a fact of the page, stands below the large figures, has a curve in the report.
+        It is a fact of the page, stands below the large figures, has a curve in the report where it changes.
     above, below : float
         Beyond these it matters, in SI units.
     hidden : bool
@@ -154,7 +154,7 @@ FIGURES = (
     _F("misfit", "that variation over what noise makes of it; about 1 in a uniform strain", "step.misfit"),
     _F("blur_px", "", "step.blur", sigma=True),
     _F("area_share", "share of the region that its strains stand for; below 1 where a block was lost",
-       "step.area_share"),
+       "step.area_share", kind="share", label=Message("share of the area"), report=True),
     # Columns of some tests.
     _F("stress_Pa", "force over the undeformed section", "row", only="section"),
     _F("true_strain", "logarithm of one plus the axial engineering strain", "row", only="section", kind="strain"),
@@ -191,7 +191,8 @@ FIGURES = (
     _F("force_state", "of the force: as state, and overload, underload", "", "state", output=11, load=True),
     _F("largest", "strain of the largest magnitude of any ZOI", kind="strain", live=True),
     _F("lost_share", "share of the ZOIs without a value, 0 to 1", "", "step.lost_share", output=12),
-    _F("cycle", "number of the last whole cycle of a cyclic test", "", "cycle", kind="count"),
+    _F("cycle", "number of the last whole cycle of a cyclic test", "", "cycle", kind="count", label=Message("cycle"),
+       page=True),
     _F("peak_strain", "highest axial strain in it", "", "cycle", kind="strain"),
     _F("range_strain", "range of the axial strain in it", "", "cycle", kind="strain"),
     _F("peak_N", "highest force in it", "", "cycle", load=True),
@@ -205,6 +206,16 @@ FIGURES = (
     _F("mean_axial", "axial strain then, mean of front and back", "", "both", kind="strain"),
     _F("bending_axial", "axial strain of the front then, minus that mean", "", "both", kind="strain"),
     _F("sigma_mean_axial", "standard uncertainty of mean_axial and of bending_axial", "", "both", kind="strain"),
+    # Shown alone: counts of frames (``FrameCounts``), and what the machine does.
+    _F("fps", kind="count", label=Message("frames/s"), terminal=9, page=True),
+    _F("recorded", kind="count", label=Message("recorded"), page=True),
+    _F("measured", kind="count", label=Message("measured"), terminal=12, hidden=True),
+    _F("skipped", kind="count", label=Message("skipped"), terminal=11, page=True, above=0, hidden=True),
+    _F("lost_frames", kind="count", label=Message("lost"), terminal=13, page=True, above=0),
+    _F("delay", kind="delay", label=Message("delay"), terminal=12, page=True, above=0.5),
+    _F("disk", kind="rest", label=Message("disk"), terminal=14, page=True, below=30 * 60),
+    _F("without_force", kind="count", label=Message("without a force"), terminal=6, page=True,
+       display=True, above=0, hidden=True),
 )
 # fmt: on
 _BY_NAME = {figure.name: figure for figure in FIGURES}

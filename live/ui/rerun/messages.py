@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
+from acquire.text.printable import share_text
+from acquire.text.quantity import UNITS
 from analysis.field import Measure, StrainField, ZoiGrid
 from live.pipeline.measurement import Measurement
 from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
@@ -98,9 +100,49 @@ For 20 megapixels, slicing takes 0.7 ms of the test, sending them whole 4 ms, an
 COLUMNS = {Kind.MEANS: 1 + 2 * len(STRAINS), Kind.LOADS: 2, Kind.POINTS: 2, Kind.GAUGE: 3}
 """Columns: t and mean, sigma of each strain; t and N; strain and N; t and strain, sigma of a gauge."""
 
-_NUMBERS = ("t", "area_share")
-_FIGURES = (AXIAL, FORCE, STRESS)
-_TEXTS = ("alarms", "faults")
+_LARGE = (("STRAIN", "strain", AXIAL), ("FORCE", "force", FORCE), ("STRESS", "stress", STRESS))
+
+
+@dataclass(frozen=True, slots=True)
+class LargeFigures:
+    """What is painted large.
+
+    Attributes
+    ----------
+    t : float, s
+        Monotonic.
+    state : str
+        What is done with the frames.
+    figures : tuple of (label, kind of quantity, TimedFigure)
+    line : str
+        Stands below them.
+    alarmed : bool
+        There are alarms or other troubles.
+    """
+
+    t: float
+    state: str
+    figures: tuple[tuple[str, str, TimedFigure], ...]
+    line: str
+    alarmed: bool
+
+    @classmethod
+    def of(cls, s: Snapshot) -> LargeFigures:
+        """Those of a test."""
+        figures = tuple((label, kind, s.figure(name)) for label, kind, name in _LARGE)
+        return cls(s.t, "PAUSED" if s.paused else s.state, figures, _line(s), bool(s.troubles))
+
+
+def _line(s: Snapshot) -> str:
+    if s.alarms:
+        return "ALARM  " + "   ".join(s.alarms)
+    if s.troubles:
+        return "   ".join(s.troubles)
+    if not s.zois:
+        return "nothing measured yet"
+    lost, part = s.zois - s.valid, share_text(s.area_share)
+    words = f"{s.valid} of {s.zois} ZOIs" + f", {lost} LOST" * (lost > 0) + f"; strain {part}" * bool(part)
+    return "   ".join((words, *(f"{row.figure.said} {row.amount}" for row in s.rows("display"))))
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,49 +285,33 @@ def events_of(message: Parcel) -> list[Event]:
 
 def figures_message(snapshot: Snapshot) -> Parcel:
     """The large figures of ``snapshot``."""
-    meta = {
-        name: getattr(snapshot, name)
-        for name in (*_NUMBERS, "valid", "zois", "state", "paused", "axial_name", *_TEXTS)
-    }
-    figures = {
-        name: [
-            one if isinstance(one, str) or math.isfinite(one) else None
-            for one in astuple(snapshot.figures[name])
-        ]
-        for name in _FIGURES
-        if name in snapshot.figures
-    }
-    return Parcel(Kind.FIGURES, {**meta, "figures": figures})  # NaN is no JSON
+    shown = LargeFigures.of(snapshot)
+    figures = [[label, kind, *map(_plain, astuple(one))] for label, kind, one in shown.figures]
+    meta = {"t": shown.t, "state": shown.state, "line": shown.line, "alarmed": shown.alarmed}
+    return Parcel(Kind.FIGURES, {**meta, "figures": figures})
 
 
-def figures_of(message: Parcel) -> Snapshot:
-    """The large figures, as a snapshot without the rest."""
+def _plain(value: Any) -> Any:
+    return value if isinstance(value, str) or math.isfinite(value) else None  # NaN is no JSON
+
+
+def figures_of(message: Parcel) -> LargeFigures:
+    """The content of ``figures_message``."""
     meta = message.meta
     try:
-        shown: dict[str, Any] = {name: float(meta.get(name, math.nan)) for name in _NUMBERS}
-        shown |= {name: int(meta[name]) for name in ("valid", "zois")}
-        shown |= {name: tuple(str(text) for text in meta[name]) for name in _TEXTS}
-        figures = {str(name): _figure(*values) for name, values in meta["figures"].items()}
-        return Snapshot(
-            **shown,
-            state=str(meta["state"]),
-            paused=bool(meta["paused"]),
-            axial_name=str(meta["axial_name"]),
-            figures=figures,
-        )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        figures = tuple((str(label), str(kind), _figure(*rest)) for label, kind, *rest in meta["figures"])
+        if unknown := {kind for _, kind, _ in figures} - UNITS.keys():
+            raise ValueError(f"no kinds of quantity: {unknown}")
+        shown = (str(meta["state"]), figures, str(meta["line"]), bool(meta["alarmed"]))
+        return LargeFigures(float(meta["t"]), *shown)
+    except (KeyError, TypeError, ValueError) as error:
         raise WireError("figures to the view are damaged: {why}", error) from error
 
 
 def _figure(
-    value: float | None,
-    sigma: float | None,
-    t: float | None,
-    age: float | None,
-    state: str,
-    why: str,
+    value: float | None, sigma: float | None, t: float | None, age: float | None, state: str, why: str,
     last: float | None,
-) -> TimedFigure:
+) -> TimedFigure:  # fmt: skip
     value, sigma, t, last = (math.nan if one is None else float(one) for one in (value, sigma, t, last))
     return TimedFigure(
         value, sigma, t, math.inf if age is None else float(age), FigureState(state), str(why), last

@@ -27,7 +27,7 @@ from live.pipeline.event_log import counted_text, sentence
 from live.pipeline.measurement import AXIAL, Measurement, TimeStep
 from live.pipeline.repeats import Repeats
 from live.pipeline.run_state import RunState
-from live.pipeline.snapshot import BURST, DISK, FORCE, FPS, STRESS, Snapshot, peak_force
+from live.pipeline.snapshot import BURST, FORCE, STRESS, ShownFigure, Snapshot, peak_force
 from live.pipeline.timed.figure import TimedFigure
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.cameras_panel import CamerasPanel
@@ -265,11 +265,7 @@ class PageConsumer(Consumer):
                 **self._scale,
             },
             "events": [self._shown_event(*one) for one in [*self._events][-MAX_EVENTS:]],
-            "late_s": s.latency_p95_s if s.figure(BURST).known else math.nan,
-            "fps": s.figure(FPS).value,
-            "cycle": s.cycles["cycle"],
-            "ledger": s.frames,
-            "disk_min": s.figure(DISK).value / 60,
+            "facts": [fact(row) for row in s.rows("page")],
             "sides": None if self._cameras is None else self._cameras.state(),
         }
         return values | _measured(s, self._colours)
@@ -339,6 +335,11 @@ def shown(figure: TimedFigure) -> dict[str, Any]:
         "state": str(figure.state), "value": figure.value, "last": figure.last, "age_s": figure.age, "why": figure.why,
         "sigma": figure.sigma,
     }  # fmt: skip
+
+
+def fact(row: ShownFigure) -> dict[str, Any]:
+    """A small figure as the page writes it."""
+    return {"label": row.figure.said, "amount": row.amount, "matters": row.matters, "why": row.now.why}
 
 
 def _gauges(
