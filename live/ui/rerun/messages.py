@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.text.printable import share_text
-from acquire.text.quantity import UNITS
+from acquire.text.quantity import PLUS_MINUS, Amount
 from analysis.field import Measure, StrainField, ZoiGrid
 from live.pipeline.measurement import Measurement
 from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
-from live.pipeline.timed.figure import FigureState, TimedFigure
+from live.pipeline.timed.figure import BEYOND, LACKING, FigureState, TimedFigure
 from live.ui.rerun.wire import Kind, Parcel, WireError
 
 STRAINS = ("exx", "eyy", "exy")
@@ -100,7 +100,7 @@ For 20 megapixels, slicing takes 0.7 ms of the test, sending them whole 4 ms, an
 COLUMNS = {Kind.MEANS: 1 + 2 * len(STRAINS), Kind.LOADS: 2, Kind.POINTS: 2, Kind.GAUGE: 3}
 """Columns: t and mean, sigma of each strain; t and N; strain and N; t and strain, sigma of a gauge."""
 
-_LARGE = (("STRAIN", "strain", AXIAL), ("FORCE", "force", FORCE), ("STRESS", "stress", STRESS))
+_LARGE = {"STRAIN": AXIAL, "FORCE": FORCE, "STRESS": STRESS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,9 +111,9 @@ class LargeFigures:
     ----------
     t : float, s
         Monotonic.
-    state : str
-        What is done with the frames.
-    figures : tuple of (label, kind of quantity, TimedFigure)
+    cells : sequence of (label, value, tone)
+        The state, then strain, force and stress. The tone of the first is its value; of others "live", "old" or
+        "beyond".
     line : str
         Stands below them.
     alarmed : bool
@@ -121,16 +121,30 @@ class LargeFigures:
     """
 
     t: float
-    state: str
-    figures: tuple[tuple[str, str, TimedFigure], ...]
+    cells: Sequence[tuple[str, str, str]]
     line: str
     alarmed: bool
 
     @classmethod
     def of(cls, s: Snapshot) -> LargeFigures:
         """Those of a test."""
-        figures = tuple((label, kind, s.figure(name)) for label, kind, name in _LARGE)
-        return cls(s.t, "PAUSED" if s.paused else s.state, figures, _line(s), bool(s.troubles))
+        state = "PAUSED" if s.paused else s.state
+        cells = [("STATE", state, state), *(_cell(label, s.figure(name)) for label, name in _LARGE.items())]
+        return cls(s.t, cells, _line(s), bool(s.troubles))
+
+
+def _cell(name: str, figure: TimedFigure) -> tuple[str, str, str]:
+    """Label, value and tone; without a value what is there instead: the last one, with its age in the label."""
+    shown = Amount(name.lower(), figure.last, figure.sigma).printed()
+    label = f"{name} {shown.unit}"
+    if figure.known:
+        sigma = f"{PLUS_MINUS} {shown.sigma} " if shown.sigma else ""
+        return f"{name} {sigma}{shown.unit}", shown.value, "live"
+    if figure.state in BEYOND:
+        return label, figure.state.upper(), "beyond"
+    if figure.state in LACKING and figure.last == figure.last:
+        return f"{label}  {figure.age:.0f} s old", shown.value, "old"
+    return label if figure.state is FigureState.NONE else f"{label}  {figure.state}", "-", "old"
 
 
 def _line(s: Snapshot) -> str:
@@ -286,36 +300,17 @@ def events_of(message: Parcel) -> list[Event]:
 def figures_message(snapshot: Snapshot) -> Parcel:
     """The large figures of ``snapshot``."""
     shown = LargeFigures.of(snapshot)
-    figures = [[label, kind, *map(_plain, astuple(one))] for label, kind, one in shown.figures]
-    meta = {"t": shown.t, "state": shown.state, "line": shown.line, "alarmed": shown.alarmed}
-    return Parcel(Kind.FIGURES, {**meta, "figures": figures})
-
-
-def _plain(value: Any) -> Any:
-    return value if isinstance(value, str) or math.isfinite(value) else None  # NaN is no JSON
+    return Parcel(Kind.FIGURES, {name: getattr(shown, name) for name in ("t", "cells", "line", "alarmed")})
 
 
 def figures_of(message: Parcel) -> LargeFigures:
     """The content of ``figures_message``."""
     meta = message.meta
     try:
-        figures = tuple((str(label), str(kind), _figure(*rest)) for label, kind, *rest in meta["figures"])
-        if unknown := {kind for _, kind, _ in figures} - UNITS.keys():
-            raise ValueError(f"no kinds of quantity: {unknown}")
-        shown = (str(meta["state"]), figures, str(meta["line"]), bool(meta["alarmed"]))
-        return LargeFigures(float(meta["t"]), *shown)
+        cells = [(str(label), str(value), str(tone)) for label, value, tone in meta["cells"]]
+        return LargeFigures(float(meta["t"]), cells, str(meta["line"]), bool(meta["alarmed"]))
     except (KeyError, TypeError, ValueError) as error:
         raise WireError("figures to the view are damaged: {why}", error) from error
-
-
-def _figure(
-    value: float | None, sigma: float | None, t: float | None, age: float | None, state: str, why: str,
-    last: float | None,
-) -> TimedFigure:  # fmt: skip
-    value, sigma, t, last = (math.nan if one is None else float(one) for one in (value, sigma, t, last))
-    return TimedFigure(
-        value, sigma, t, math.inf if age is None else float(age), FigureState(state), str(why), last
-    )
 
 
 def _measure(message: Parcel) -> Measure:

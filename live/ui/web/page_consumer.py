@@ -252,9 +252,7 @@ class PageConsumer(Consumer):
             "recording": None if running is None else running.recording,
             "figures": {name: self._figure(s, name) for name in (FORCE, STRESS, AXIAL)},
             "troubles": [printable(text) for text in s.troubles],
-            "force_N": s.figure(FORCE).value,
             "peak_N": s.peak_N,
-            "stress_Pa": s.figure(STRESS).value,
             "strain_rate": self._rate if s.figure(BURST).known else math.nan,
             "elongation_mm": self._elongation(s),
             "points": self.curve.position,
@@ -366,14 +364,10 @@ def _measured(s: Snapshot, colours: Mapping[str, int]) -> dict[str, Any]:
     return {
         "axial": {
             "name": s.axial_name,
-            "value": s.figure(AXIAL).value,
-            "sigma": s.figure(AXIAL).sigma,
             "assumed": Message("axis assumed") if s.axis_assumed else "",
         },
         "gauges": _gauges(i, s.figures, colours),
         "valid": s.valid,
         "zois": s.zois if s.figure(BURST).known else None,
-        "refused": i.refused,
         "part": share_text(s.area_share),
-        "kernel_s": i.measure_s,
     }
