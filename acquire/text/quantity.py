@@ -51,6 +51,7 @@ UNITS = {
     "force": (ShownUnit("N", 1.0, 0.0, 1), ShownUnit("kN", 1e3, 1e4, 3)),
     "stress": (ShownUnit("MPa", 1e6, 0.0, 1), ShownUnit("GPa", 1e9, 1e10, 2)),
     "time": (ShownUnit("s", 1.0, 0.0, 1), ShownUnit("min", 60.0, 120.0, 1)),
+    "rest": (ShownUnit("min", 60.0, 0.0, 0), ShownUnit("h", 3600.0, 36e3, 0)),
     "delay": (ShownUnit("ms", 1e-3, 0.0, 0),),
     "length": (ShownUnit("mm", 1e-3, 0.0, 2),),
     "size": (ShownUnit("MB", 1e6, 0.0, 1), ShownUnit("GB", 1e9, 1e9, 2)),

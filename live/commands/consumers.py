@@ -9,7 +9,7 @@ from functools import partial
 from acquire.addresses import Options, parse_address
 from acquire.events import EventKind, Level
 from acquire.serial_line.ports import LineSettings
-from live.config.channels import DEFAULT_CHANNELS, OF_LOAD, joint_channels
+from live.config.figures import DEFAULT_CHANNELS, OF_LOAD, joint_channels
 from live.config.gauges import gauge_colours, outlines
 from live.config.listen_address import ListenAddress, read_token
 from live.config.loading import Config

@@ -138,6 +138,7 @@ def _figures(run: RunFolder, curve: EvaluatedCurve) -> tuple[Plot, ...]:
         curves.gauge_strains(run),
         curves.mean_strains(run),
         curves.valid_share(run),
+        *curves.others(run),
     ]
     return tuple(figure for figure in found if figure is not None)
 
