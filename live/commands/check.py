@@ -35,8 +35,8 @@ from live.setup.check.disk import disk_lines, write_rate
 from live.setup.check.sample import take
 from live.setup.check.verdict import DEFAULT_TARGET, check_lines
 from live.setup.devices import check_load_port, open_load
+from live.setup.frames import report_warnings
 from live.setup.placement import with_auto_gauges
-from live.setup.region import report_warnings
 from live.setup.specimen_drawing import Overlay, snapshot
 from live.ui.terminal.screen import TerminalScreen
 

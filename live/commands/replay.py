@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquire.errors import exit_code_of_all
-from live.commands.arguments import not_empty
 from live.commands.finishing import finish_test
 from live.commands.options import (
     FORCES,
@@ -45,9 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     words = "forces: the export of a testing machine, or a CSV with a header such as file,force_kN or time_s,force_N"
     parser.add_argument("--load", dest="forces", metavar="FILE.csv", help=words)
     add_options(parser, "file of forces", *FORCES)
-    words = "maps of what each place does over all instants: strain over stress, over that of the region (mean) or of a"
-    words += " gauge, or over time, and where it leaves its line"
-    parser.add_argument("--response", metavar="stress|mean|GAUGE|time", type=not_empty, help=words)
     add_measure(parser, measure=OF_PICTURES)
 
 
@@ -66,7 +62,6 @@ def command(arguments: argparse.Namespace) -> int:
         config_file=Path(arguments.config) if arguments.config else None,
         overrides=_overrides(arguments),
         forces=Path(arguments.forces) if arguments.forces else None,
-        response=arguments.response or "",
     )
     screen, stopping = TerminalScreen(), threading.Event()
     every, requests = CamerasScreen(screen), _of_each(request)

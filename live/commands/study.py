@@ -85,7 +85,7 @@ def command(arguments: argparse.Namespace) -> int:
     settings, found = _settings(arguments), []
     config_file = Path(arguments.config) if arguments.config else None
     source = in_picture_order(arguments.source, arguments.picture_order)
-    request = ReplayRequest(source, False, None, None, arguments.reference, config_file, overrides(arguments))
+    request = ReplayRequest(source, config_file, overrides(arguments), reference=arguments.reference)
     with open_source(request) as (material, config):
         screen.print(material.words)
         if AUTO in (config.measure.roi, config.measure.gauges):

@@ -232,7 +232,7 @@ class StrainOutConfig:
     format: str = key(choice("json", "csv"), "json",
         "format of a line; csv begins with the names of the channels", Option("strain-format", expert=True))
     channels: tuple[str, ...] | None = key(NAMES, None,
-        "channels of a line (docs/guide.md; default: time, frame, axial strain and its sigma and rate, force,"
+        "channels of a line (docs/control.md; default: time, frame, axial strain and its sigma and rate, force,"
         " stress, lost share, latency and all gauges)",
         Option("strain-channels", "NAME,NAME", expert=True))
 
@@ -241,7 +241,7 @@ class StrainOutConfig:
 class AlarmConfig:
     """[[alarm]]: any number of them; exactly one of above and below."""
 
-    channel: str = key(TEXT, "", "channel that is watched (docs/guide.md)")
+    channel: str = key(TEXT, "", "channel that is watched (docs/control.md)")
     above: float | None = key(number(), None, "the alarm is on above this value")
     below: float | None = key(number(), None, "the alarm is on below this value")
     hysteresis: float = key(number(0), 0.0, "distance back from the limit at which the alarm ends")
@@ -338,4 +338,8 @@ class OutputConfig:
         "folder for the files (default: a new one in runs/, named by the UTC time)",
         Option("out", "DIR"))
     seconds: float | None = key(number(0.01, 1e7), None, "end after this time, s", Option("seconds", "S"))
+    response: str | None = key(TEXT, None,
+        "maps of what each place does over all instants: strain over stress, over that of the region (mean) or of a"
+        " gauge, or over time, and where it leaves its line",
+        Option("response", "stress|mean|GAUGE|time"))
     report: bool = key(FLAG, False, "write report.html at the end of the test", Option("report", on=True))

@@ -46,7 +46,7 @@ from live.results.finished.finished_test import FinishedTest
 from live.results.folder import LOG, BurstFailures, check_folder, make_folder
 from live.results.response.rising import check_channel
 from live.results.writer import write_results
-from live.setup.devices import open_rig
+from live.setup.frames import camera_of
 from live.setup.pictures import with_film, with_mask
 from live.setup.region import is_auto_region
 from live.stream.adapted import Outputs
@@ -116,17 +116,14 @@ def _replay_pictures(
         config, load=replace(config.load, address="none:"), measure=replace(config.measure, roi=region)
     )
     event_log = EventLog()
-    rig = open_rig(config.camera.address, "none:", _in_test_time(event_log), crop=config.camera.crop)
-    try:
-        with rig.camera as camera:
-            found = picture_source(camera, request, config)
-            screen.print(found.words)
-            for warning in camera.info.warnings:
-                screen.print(f"warning: {warning}")
-            source = _with_forces(found, request, config, screen)
-            return _run(source, config, request, screen, stopping, event_log, consumers)
-    finally:
-        rig.close()
+    into = _in_test_time(event_log)
+    with camera_of(config.camera.address, into, crop=config.camera.crop) as camera, camera:
+        found = picture_source(camera, request, config)
+        screen.print(found.words)
+        for warning in camera.info.warnings:
+            screen.print(f"warning: {warning}")
+        source = _with_forces(found, request, config, screen)
+        return _run(source, config, request, screen, stopping, event_log, consumers)
 
 
 def _with_forces(
@@ -185,7 +182,7 @@ def _run(
     stored = StoredResults.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements
     bursts = _not_empty(stored.bursts() if stored else source.bursts, request, source.count)
-    check_channel(request.response, ready.plan.config, forces=len(source.loads) > 0)
+    check_channel(ready.plan.config, forces=len(source.loads) > 0)
     folder = make_folder(ready.plan.config.output.dir, datetime.datetime.now(datetime.UTC))
     config = _with_final_folder(with_mask(ready.plan.config, ready.plan.mask, folder), request.final_folder)
     run_state = RunState(
@@ -205,7 +202,6 @@ def _run(
         ready.plan.grid,
         source.start,
         deferred=request.final_folder is not None,
-        response=request.response,
     )
     made = with_force_watch(consumers(about, run_state), run_state)
     stream = Stream()
@@ -233,12 +229,19 @@ def _run(
         run_state.health.ended = True
         outputs.end()
         folder = held.end()
-    speed = f"joined of {len(request.parts)} chunks" if request.parts else speed_line(run_state.history, took)
+    chunks = len(request.parts)
+    speed = Message("joined of {chunks} chunks", chunks) if chunks else speed_line(run_state.history, took)
     lines = [*_account(source, run_state), speed]
     left_out = source.count.left_out if source.count else 0
     cut_off = [e.text for e in event_log.events("warning") if "missing" in e.data and not stopping.is_set()]
-    stopped = [f"{report.name} stopped: {report.failed}" for report in outputs.reports if report.failed]
-    failed = f"{counted(failures.count, 'burst')} could not be measured; {folder / LOG} has the details"
+    stopped = [
+        Message("{name} stopped: {why}", one.name, one.failed) for one in outputs.reports if one.failed
+    ]
+    failed = Message(
+        "{bursts} could not be measured; {log} has the details",
+        counted(failures.count, "burst"),
+        folder / LOG,
+    )
     lines = [*[failed] * (failures.count > 0), *cut_off, *source.doubts, *stopped, *lines]
     lossy = (
         outputs.failed
@@ -251,8 +254,7 @@ def _run(
     code = EXIT_INTERRUPTED if stopping.is_set() else LOSS if lossy else 0
     at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
     start_t = source.start.monotonic
-    test = finished(folder, config, run_state, code, at_reference, start_t, request.response)
-    lines = [*test.response, *lines]
+    test = finished(folder, config, run_state, code, at_reference, start_t, lines)
     return Replayed(folder, run_state, config, code, test, tuple(lines), left_out)
 
 

@@ -187,8 +187,8 @@ def _about(job: ExportJob) -> dict[str, Any]:
     names = {mean_name(name): name for name in job.strain.values}
     units = {name: job.display.unit(name) or "1" for name in ("x", "y", *job.fields)}
     units |= {shown: job.display.unit(name) or "1" for shown, name in names.items()}
-    words = {name: quantity_of(name).words for name in ("x", "y", *job.fields)}
-    words |= {shown: quantity_of(name).words for shown, name in names.items()}
+    words = {name: str(quantity_of(name).words) for name in ("x", "y", *job.fields)}
+    words |= {shown: str(quantity_of(name).words) for shown, name in names.items()}
     return {"notes": job.notes(), "units": units, "definitions": words}
 
 

@@ -22,7 +22,7 @@ LATE_S = 1.0
 
 
 class JointChannels:
-    """The channels of front and back together (``live.config.channels.JOINT_CHANNELS``); for any thread."""
+    """The channels of front and back together (``live.config.figures.JOINT_CHANNELS``); for any thread."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock

@@ -85,7 +85,7 @@ class PageConsumers:
             return b""
         consumer = self._of(query.get("side", ""))
         layer = query.get("layer", "")
-        return consumer.layers.get(layer, b"") if layer in ("map", "last") else consumer.picture
+        return consumer.layers.get(layer, b"") if layer != "picture" and layer else consumer.picture
 
     def select_map(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Show another map, on the pictures of all cameras."""

@@ -24,10 +24,10 @@ from acquire.text.printable import brief, printable
 from analysis.evaluate import GAUGE_KINDS
 from live.config.loading import Config
 from live.config.new_files import free_name
-from live.results.maps.field_maps import FIELD_MAPS
 from live.run.control import ONCE, Answer, Controls, carry_out, refusal
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
+from live.ui.web.map_view import map_choices
 from live.ui.web.page_consumer import PageConsumer, RunningTest
 from live.ui.web.page_consumers import PageConsumers
 from live.ui.web.painting import as_png
@@ -89,6 +89,7 @@ class PageController:
         self._message = ""
         self._what: dict[str, Any] | None = None
         self._before: dict[str, Any] | None = None
+        self._maps: tuple[str, ...] = ()
         self.viewer: Callable[[int], Answer] = lambda port: refusal("there is no viewer here")
         gets = {
             "/points": lambda query: self._consumers.points(query),
@@ -170,8 +171,9 @@ class PageController:
 
     def begin(self, configs: Mapping[str, Config]) -> Mapping[str, PageConsumer]:
         """Begin the stage of a run with these cameras, by name; the consumers of their data."""
-        what = _described(next(iter(configs.values())))
-        self._before, self._what = self._outline(what), what
+        config = next(iter(configs.values()))
+        what = _described(config)
+        self._before, self._what, self._maps = self._outline(what), what, map_choices(config)
         self._consumers, self._live = PageConsumers(self._broadcaster, configs, self._last_pictures), None
         self._enter(RUN, "")
         return self._consumers.by_name
@@ -241,7 +243,7 @@ class PageController:
             {"kind": name, "label": one.label, "hint": one.hint, "gesture": one.gesture}
             for name, one in GAUGE_KINDS.items()
         ]
-        self._broadcaster.publish("stage", stage | {"components": FIELD_MAPS, "kinds": kinds})
+        self._broadcaster.publish("stage", stage | {"components": self._maps, "kinds": kinds})
 
     # -- requests of the page -----------------------------------------------------------------
 

@@ -25,7 +25,7 @@ from live.pipeline.timed.force_watch import ForceWatch
 from live.run.alarms import ActionMeans, Alarm, AlarmWatch, actions_of
 from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
 from live.run.strain_output import LineFormat
-from live.ui.rerun.drawing.large_figures import _cells
+from live.ui.rerun.messages import LargeFigures
 from live.ui.terminal.status_line import status_line
 from live.ui.web.broadcaster import Broadcaster, plain
 from live.ui.web.page_consumer import PageConsumer
@@ -177,9 +177,9 @@ def test_the_force_on_every_screen_and_line(kind: str) -> None:
     page = page_of(state)
     figure = page["figures"]["force"]
     assert (figure["state"], figure["value"], figure["last"]) == (word, value, last)
-    assert page["force_N"] == value and page["figures"]["stress"]["state"] == word
+    assert page["figures"]["stress"]["state"] == word
     assert page["troubles"] == ([why] if on else []), "the state is green only where there is none"
-    cells = _cells(now)
+    cells = LargeFigures.of(now).cells
     assert in_ascii(cells[2][1]) == display and ("24 s old" in cells[2][0]) is (
         kind in ("old", "unknown", "stale")
     )

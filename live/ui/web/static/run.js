@@ -212,27 +212,16 @@ function showState(value) {
 }
 
 // Small and grey; each turns amber on its own when it counts.
-const CELLS = ["cycle", "frames/s", "recorded", "lost", "skipped", "delay", "disk", "ZOIs", "without a force"];
-const DELAY_S = 0.5, DISK_MIN = 30;
-function showMachine(value) {
-  const l = value.ledger ?? {}, lost = (l.lost ?? 0) + (l.unrecorded ?? 0);
-  const facts = {
-    cycle: value.cycle == null ? null : [fixed(value.cycle), false],
-    "frames/s": [fixed(value.fps), false], recorded: [fixed(l.recorded), false], lost: [fixed(lost), lost > 0],
-    skipped: l.skipped ? [fixed(l.skipped), true] : null, delay: value.late_s == null ? null : [`${fixed(value.late_s * 1e3)} ms`, value.late_s > DELAY_S],
-    disk: value.disk_min == null ? null : [disk(value.disk_min), value.disk_min < DISK_MIN],
-    ZOIs: value.zois == null ? null : [`${fixed(value.valid)} / ${fixed(value.zois)}`, Boolean(value.part)],
-    "without a force": l.without_force ? [fixed(l.without_force), true] : null,
-  };
-  const shown = CELLS.filter((name) => facts[name]);
-  fill($("strip"), shown, (name) => el("span", {}, el("b"), " ", el("span", { t: name })));
-  shown.forEach((name, i) => {
-    put($("strip").children[i].firstChild, facts[name][0]);
-    $("strip").children[i].classList.toggle("matters", facts[name][1]);
+function showMachine({ facts = [], zois, valid, part }) {
+  const shown = [...facts.map((one) => [one.label, quantityText(one.amount), one.matters, one.why])];
+  if (zois != null) shown.push(["ZOIs", `${fixed(valid)} / ${fixed(zois)}`, Boolean(part)]);
+  fill($("strip"), shown.map(([label]) => label), (label) => el("span", {}, el("b"), " ", el("span", { t: label })));
+  shown.forEach(([, text, matters, why], i) => {
+    put($("strip").children[i].firstChild, text);
+    $("strip").children[i].title = why ? t(why) : "";
+    $("strip").children[i].classList.toggle("matters", matters);
   });
 }
-
-const disk = (minutes) => (minutes > 600 ? `${fixed(minutes / 60)} h` : `${fixed(minutes)} min`);
 
 function showEvents(list) {
   const newest = list.at(-1);
