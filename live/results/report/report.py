@@ -303,8 +303,7 @@ def _about_curves(curve: EvaluatedCurve) -> Html:
     if not curve.has_load:
         none = Message("No force is known at any instant, so there is no stress-strain curve.")
         return paragraph(none, "dim")
-    words = [Message("Bands: one standard uncertainty on either side.")]
-    figures = curve.figures
+    words, figures = [Message("Bands: one standard uncertainty on either side.")], curve.figures
     if not figures.E.known:
         words.append(Message("E is not known: {why}", figures.E.why))
     if figures.span is not None:
