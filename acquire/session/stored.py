@@ -233,15 +233,7 @@ def usable(
     outside = {name: what.outside(table[name]) for name, what in declared.items()}
     beyond = np.logical_or.reduce([*outside.values()], axis=0)
     if whole and beyond.any():
-        raise DataError(
-            _beyond(
-                about(group.file.filename, group.name),
-                table,
-                outside,
-                declared,
-                first,
-            )
-        )
+        raise DataError(_beyond(about(group.file.filename, group.name), table, outside, declared, first))
     return np.asarray(~(beyond | np.isnan(table["monotonic_s"])), np.bool_)
 
 

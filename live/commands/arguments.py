@@ -83,10 +83,7 @@ COMMANDS = {
         "live.commands.export", "export a finished run as csv, npz, mat, vtk, tiff, png, mp4, gif, r3xa"
     ),
     "report": Entry("live.commands.report", "report one or several finished runs as a page: HTML, PDF"),
-    "characterise": Entry(
-        "live.commands.characterise",
-        "measure the accuracy that your own pattern allows",
-    ),
+    "characterise": Entry("live.commands.characterise", "measure the accuracy that your own pattern allows"),
     "inspect": Entry("live.commands.inspect", "show one ZOI of a session: its spectrum and phases"),
     "init": Entry(
         "live.commands.init", "find devices and specimen and write a rig.toml: region, ZOIs, gauges"

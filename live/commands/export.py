@@ -109,10 +109,5 @@ def _request(arguments: argparse.Namespace, run: RunFolder) -> ExportRequest:
         arguments.start_s,
         arguments.end_s,
         display_of(arguments, run.mm_per_px),
-        ExportOptions(
-            arguments.layout or "long",
-            arguments.fps,
-            arguments.limit,
-            not arguments.no_picture,
-        ),
+        ExportOptions(arguments.layout or "long", arguments.fps, arguments.limit, not arguments.no_picture),
     )

@@ -5,14 +5,13 @@ from __future__ import annotations
 import argparse
 import os
 from contextlib import ExitStack
-from itertools import chain, count
 from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
 from acquire.text.message import about
 from live.commands.more_gauges import add_gauges
 from live.commands.options import add_gauge_option
-from live.config.new_files import check_free, new_file
+from live.config.new_files import check_free, free_name, new_file
 from live.pipeline.screen import Screen
 from live.results.finished.figures_file import FILE, FiguresFile
 from live.results.quantities import Display
@@ -146,9 +145,12 @@ def _targets(out: Path, arguments: argparse.Namespace) -> list[Path]:
 
 def _first_free(page: Path, arguments: argparse.Namespace) -> Path:
     """The page, or the same with a number, so that neither it nor what is saved beside it is there."""
-    names = (page.with_stem(f"{page.stem}-{k}") for k in count(2))
     beside = argparse.Namespace(**{**vars(arguments), "figures": None})
-    return next(out for out in chain([page], names) if not any(f.exists() for f in _targets(out, beside)))
+
+    def is_taken(stem: str) -> bool:
+        return any(file.exists() for file in _targets(page.with_stem(stem), beside))
+
+    return page.with_stem(free_name(page.stem, is_taken))
 
 
 def _save(report: Report, out: Path, arguments: argparse.Namespace, screen: Screen) -> None:

@@ -35,14 +35,7 @@ from live.replay.export_numbers import (
     two_readings,
     vote,
 )
-from live.replay.export_table import (
-    Table,
-    blocks,
-    cell_of,
-    find_table,
-    is_heading,
-    is_remark,
-)
+from live.replay.export_table import Table, blocks, cell_of, find_table, is_heading, is_remark
 from live.replay.export_text import Rows
 
 MAX_ROWS, MAX_NAMES = 20_000_000, 1_000_000

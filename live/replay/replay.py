@@ -113,9 +113,7 @@ def _replay_pictures(
     config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
     region = AUTO if is_auto_region(config) else config.measure.roi
     config = replace(
-        config,
-        load=replace(config.load, address="none:"),
-        measure=replace(config.measure, roi=region),
+        config, load=replace(config.load, address="none:"), measure=replace(config.measure, roi=region)
     )
     event_log = EventLog()
     into = _in_test_time(event_log)
@@ -141,12 +139,7 @@ def _with_forces(
     times = source.times if pictures is None else np.array([*pictures.values()])
     placed = placed.at_pictures(str(request.forces), config.load, times)
     screen.print("; ".join([f"{request.forces.name}: {table.export.taken}", *placed.remarks]))
-    return replace(
-        source,
-        samples=placed.samples(),
-        loads=placed.log(config.load),
-        doubts=placed.doubts,
-    )
+    return replace(source, samples=placed.samples(), loads=placed.log(config.load), doubts=placed.doubts)
 
 
 def _picture_times(source: str, *, named: bool) -> dict[str, float] | None:
@@ -279,9 +272,7 @@ def _with_final_folder(config: Config, folder: Path | None) -> Config:
         return config
     mask = config.measure.mask and str(folder / "mask.png")
     return replace(
-        config,
-        measure=replace(config.measure, mask=mask),
-        output=replace(config.output, dir=str(folder)),
+        config, measure=replace(config.measure, mask=mask), output=replace(config.output, dir=str(folder))
     )
 
 

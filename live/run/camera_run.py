@@ -23,12 +23,7 @@ from live.run.camera_source import CameraSource, GrabPlan
 from live.run.control import ControlRefused
 from live.run.incoming_bursts import TAKING, IncomingBursts
 from live.run.measurer import Measurer
-from live.run.outcome import (
-    INTERRUPTED,
-    TIME_IS_OVER,
-    Outcome,
-    StopSignal,
-)
+from live.run.outcome import INTERRUPTED, TIME_IS_OVER, Outcome, StopSignal
 from live.run.pre_trigger import PreTriggerBuffer
 from live.run.prepared_run import PreparedRun
 from live.run.recorder import open_recording

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from live.results.report.page import Html, element, page, paragraph, section, ta
 from live.results.report.report import Report, budget_table, plots
 from live.results.report.svg import COLOURS, Plot, PlotLine
 from live.results.run_folder import RunFolder
-from live.results.sides.together import SidesOfTest
+from live.results.sides.together import SidesOfTest, at_end
 
 ALIKE = Message(
     "The mean of both sides has neither bending nor motion towards a camera; front minus mean has both, which one "
@@ -26,15 +25,8 @@ ALIKE = Message(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class _Parts:
-    """What a report of sides and one of fields have of their own; ``found`` are figures by whose strain they are."""
-
-    title: str
-    about: str
-    figures: tuple[Plot, ...]
-    found: Mapping[str, TensileFigures]
-    sections: list[Html]
+_Parts = tuple[str, str, tuple[Plot, ...], Mapping[str, TensileFigures], list[Html]]
+"""What sides and fields have of their own: title, words on the test, plots, figures by whose strain, sections."""
 
 
 def report_of_cameras(runs: Mapping[str, RunFolder], reports: Mapping[str, str]) -> Report:
@@ -54,8 +46,8 @@ def report_of_cameras(runs: Mapping[str, RunFolder], reports: Mapping[str, str])
     """
     first = next(iter(runs.values()))
     stresses = first.specimen.area_m2 is not None
-    parts = (_of_sides if FRONT in runs else _of_fields)(runs, stresses)
-    found = {name: headline(one, stresses=stresses) for name, one in parts.found.items()}
+    title, words, figures, by_strain, sections = (_of_sides if FRONT in runs else _of_fields)(runs, stresses)
+    found = {name: headline(one, stresses=stresses) for name, one in by_strain.items()}
     heads = (Message("by the strain of"), *(row.name for row in next(iter(found.values()))))
     rows = [(Message("{where}", name), *(row.text for row in one)) for name, one in found.items()]
     links = (
@@ -63,22 +55,22 @@ def report_of_cameras(runs: Mapping[str, RunFolder], reports: Mapping[str, str])
         for side, name in reports.items()
     )
     content = [
-        element("h1", parts.title),
-        paragraph(parts.about, "dim"),
-        section(Message("Curves"), plots(parts.figures)),
+        element("h1", title),
+        paragraph(words, "dim"),
+        section(Message("Curves"), plots(figures)),
         section(Message("Figures of the test"), table(heads, rows)),
-        *parts.sections,
+        *sections,
         section(Message("The cameras"), *links),
     ]
-    title = Message("{title}: phasedic report of {n} cameras", first.title, len(runs))
-    return Report(page(title, content), parts.figures)
+    head = Message("{title}: phasedic report of {n} cameras", first.title, len(runs))
+    return Report(page(head, content), figures)
 
 
 def _of_sides(runs: Mapping[str, RunFolder], stresses: bool) -> _Parts:
     front = runs[FRONT]
     sides = SidesOfTest.of_folders(front, runs[BACK])
     budget = budget_table(front, _evaluated(sides, stresses), both_sides=True)
-    return _Parts(
+    return (
         Message("{title}: front and back", front.title),
         Message("Test of {start}. {alike}", front.strain.start_utc, ALIKE),
         (_stress_strain(sides, stresses), _over_time(sides, "mean"), _over_time(sides, "bending")),
@@ -104,7 +96,7 @@ def _of_fields(runs: Mapping[str, RunFolder], stresses: bool) -> _Parts:
         )
         for k, (name, curve) in enumerate(curves.items())
     )
-    return _Parts(
+    return (
         Message("{title}: {n} fields of view", first.title, len(runs)),
         Message("Test of {start}, with one load cell and one clock.", first.strain.start_utc),
         (Plot("strain-time", Message("Strain along the load"), TIME, strain_label(e), lines),),
@@ -125,13 +117,8 @@ def _evaluated(sides: SidesOfTest, stresses: bool) -> EvaluatedCurve:
 
 
 def _strains(sides: SidesOfTest) -> Html:
-    rows = []
-    for name, one in sides.courses.items():
-        known = np.flatnonzero(np.isfinite(one.mean))
-        if len(known):
-            k = known[-1]
-            ends = (values[k] * 1e6 for values in (one.mean, one.bending, one.sigma))
-            rows.append((name, *(Message("{strain:.1f}", end) for end in ends)))
+    ends = at_end(sides.courses).items()
+    rows = [(name, *(Message("{strain:.1f}", value * 1e6) for value in one[:3])) for name, one in ends]
     heads = "µm/m", Message("mean"), Message("front minus mean"), Message("sigma of either")
     return table(heads, rows, (1, 2, 3))
 
@@ -153,11 +140,7 @@ def _stress_strain(sides: SidesOfTest, stresses: bool) -> Plot:
     """The load over the axial strain of each side and of the mean, at the instants of the front."""
     axial, load = sides.courses[AXIAL], sides.curve.stress
     name, factor = ("MPa", 1e-6) if stresses else _force(load)
-    strains = {
-        "mean": axial.mean,
-        "front": axial.mean + axial.bending,
-        "back": axial.mean - axial.bending,
-    }
+    strains = {"mean": axial.mean, "front": axial.mean + axial.bending, "back": axial.mean - axial.bending}
     e = strain_unit(*strains.values())
     lines = tuple(
         PlotLine(Message("{side}", side), strain * e.factor, load * factor, colour=k)

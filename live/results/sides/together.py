@@ -86,7 +86,7 @@ class SideOfTest:
             value, sigma = steps.gauge(name), steps.gauge_sigma(name)
             if value is not None and sigma is not None:
                 courses[name] = Course(t, value[: len(t)], sigma[: len(t)])
-        curve = history.curve(force / (specimen.area_m2 or 1.0), history.current_axis)
+        curve = history.curve(specimen.load(force), history.current_axis)
         return cls(courses, curve, force)
 
 
@@ -182,14 +182,18 @@ def newest(states: Mapping[str, RunState], now: float | None = None) -> dict[str
     one, other = (_recent(states[side]) for side in SIDES)
     if not one or not other:
         return {}
+    return at_end(two_sides(one, other, longest_gap(other[AXIAL].t)))
+
+
+def at_end(courses: Mapping[str, TwoSides]) -> dict[str, JointStrain]:
+    """The last instant of each strain that both sides have."""
     found = {}
-    for name, both in two_sides(one, other, longest_gap(other[AXIAL].t)).items():
+    for name, both in courses.items():
         known = np.flatnonzero(np.isfinite(both.mean))
         if len(known):
             k = known[-1]
-            found[name] = JointStrain(
-                *(float(one[k]) for one in (both.mean, both.bending, both.sigma, both.t))
-            )
+            values = both.mean[k], both.bending[k], both.sigma[k], both.t[k]
+            found[name] = JointStrain(*map(float, values))
     return found
 
 

@@ -163,10 +163,7 @@ class KernelFigures:
 
 
 def examine(
-    stack: FrameStack,
-    config: Config,
-    load: LoadReport | None = None,
-    table: bool = True,
+    stack: FrameStack, config: Config, load: LoadReport | None = None, table: bool = True
 ) -> CheckFigures:
     """All figures from frames of a still specimen.
 

@@ -237,11 +237,7 @@ def spawn_viewer(
     try:
         # A separate session: Ctrl-C in this terminal must not end the viewer.
         process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=words,
-            start_new_session=True,
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=words, start_new_session=True
         )
     except OSError as error:
         words.close()

@@ -23,6 +23,7 @@ from acquire.text import Message
 from acquire.text.printable import brief, printable
 from analysis.evaluate import GAUGE_KINDS
 from live.config.loading import Config
+from live.config.new_files import free_name
 from live.run.control import ONCE, Answer, Controls, carry_out, refusal
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
@@ -153,9 +154,8 @@ class PageController:
     def _to_run(self, sessions: SetupSessions) -> Config:
         config, *self.others = sessions.configs(Path(self._folder.name))
         wanted = self._folder_of(str(config.metadata["specimen"]))
-        tries = (wanted.with_name(f"{wanted.name}_{n}") for n in range(2, 10_000))
-        folder = next(one for one in tries if not one.exists()) if wanted.exists() else wanted
-        return replace(config, output=replace(config.output, dir=str(folder)))
+        name = free_name(wanted.name, lambda name: wanted.with_name(name).exists(), "_")
+        return replace(config, output=replace(config.output, dir=str(wanted.with_name(name))))
 
     def _folder_of(self, name: str) -> Path:
         """The folder for the files of a specimen."""

@@ -104,13 +104,7 @@ def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str
     first = {row.name for row in headline(figures, stresses=specimen.area_m2 is not None)}
     found = [_figure(row) | {"head": row.name in first} for row in _rows(figures, specimen)]
     if figures.E.known and figures.elastic_strain:
-        found.append(
-            {
-                "name": Message("strain of E and nu"),
-                "text": figures.elastic_strain,
-                "words": True,
-            }
-        )
+        found.append({"name": Message("strain of E and nu"), "text": figures.elastic_strain, "words": True})
     if figures.E.known:
         found.append(_interval_of_e(figures))
     return found + [{"name": Message("of the test"), "text": note, "words": True} for note in figures.notes]
@@ -142,7 +136,7 @@ def _lines(
     """The lines and marks of the report's curve, in SI units."""
     history, loads = run_state.history, run_state.loads
     axial, transverse = history.along(specimen.axis)
-    load = history.forces(loads) / (specimen.area_m2 or 1.0)
+    load = specimen.load(history.forces(loads))
     if not np.isfinite(load).any():
         return
     curve = EvaluatedCurve(

@@ -16,6 +16,7 @@ import pytest
 
 from acquire.errors import DataError
 from analysis.evaluate import Curve, GaugeValue, TwoSides
+from live.config.sections import SpecimenConfig
 from live.pipeline.run_state import RunState
 from live.results.report.cameras import _strains, _stress_strain, report_of_cameras
 from live.results.run_folder import open_run
@@ -203,7 +204,7 @@ def test_a_gauge_named_axial_has_both_names() -> None:
     joint.attach(states, live=True)
     shown = joint.read(START)
     assert shown["mean_axial"] == shown["mean_gauge_axial"] == pytest.approx(7e-3)
-    side = SideOfTest.of_state(states["front"], SimpleNamespace(area_m2=None))  # type: ignore[arg-type]
+    side = SideOfTest.of_state(states["front"], SpecimenConfig())
     assert side.courses["wide"].value.tolist() == pytest.approx([1e-3, 5e-3])
     assert side.courses["wide"].sigma.tolist() == pytest.approx([1e-6, 1e-6])
     assert side.courses["wide"].t.tolist() == pytest.approx([START, START + 0.1])

@@ -61,9 +61,7 @@ def blueprint(setup: ViewSetup) -> Any:
             row_shares=_rows(setup),
         ),
         rrb.TimePanel(
-            state="collapsed",
-            timeline="time",
-            play_state="paused" if setup.finished else "following",
+            state="collapsed", timeline="time", play_state="paused" if setup.finished else "following"
         ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="expanded" if setup.finished else "collapsed"),

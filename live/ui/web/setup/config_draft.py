@@ -18,6 +18,7 @@ from acquire.text import Message
 from live.config.cameras import camera_configs, other_cameras
 from live.config.gauges import GaugeTable
 from live.config.loading import Config, from_dict, load_config, settings_in
+from live.config.new_files import free_name
 from live.config.rig_file import write_rig
 
 CHANGEABLE = frozenset(
@@ -124,8 +125,8 @@ class ConfigDraft:
     def _write_mask(self, mask: NDArray[np.bool_]) -> Path:
         """Write a new file each time: a rig file kept as .bak refers to the old one."""
         stem = self.path.resolve().with_suffix("")
-        tries = (stem.with_name(f"{stem.name}-mask-{n}.png") for n in range(1, 10_000))
-        path = next(one for one in tries if not one.exists())
+        name = free_name(f"{stem.name}-mask", lambda name: stem.with_name(f"{name}.png").exists())
+        path = stem.with_name(f"{name}.png")
         try:
             write_picture(path, mask.astype(np.uint8) * 255)
         except DataError as error:
