@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from acquire.text import Message
 from live.commands.arguments import not_empty
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import (
@@ -100,7 +101,7 @@ def _print(done: Replayed, screen: Screen, *, verbose: bool = False, with_report
 
 def _ended(code: int, screen: Screen) -> int:
     if code in EXIT_WORDS:
-        screen.print(f"exit code {code}: {EXIT_WORDS[code]}")
+        screen.print(Message("exit code {code}: {words}", code, EXIT_WORDS[code]))
     return code
 
 

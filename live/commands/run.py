@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from acquire.errors import PhasedicError
+from acquire.text import Message
 from live.commands.attended import attended, page_opened
 from live.commands.consumers import standard_consumers
 from live.commands.exit_codes import EXIT_WORDS, LOSS
@@ -156,14 +157,14 @@ def finish(outcome: OutcomeOfTest, screen: Screen, *, verbose: bool = False) -> 
         try:
             put_together(outcome.folder / FRONT, outcome.folder / BACK, outcome.folder / TABLE, screen)
         except PhasedicError as error:
-            screen.print(f"warning: front and back were not put together: {error}")
+            screen.print(Message("warning: front and back were not put together: {why}", error))
             code = code or LOSS
     if report:
         from live.commands.report import write_report
 
         write_report(outcome.folder, screen)
     if code in EXIT_WORDS:
-        screen.print(f"exit code {code}: {EXIT_WORDS[code]}")
+        screen.print(Message("exit code {code}: {words}", code, EXIT_WORDS[code]))
     return code
 
 
@@ -175,5 +176,5 @@ def print_outcome(
     lines = [*trouble_lines(run_state, outcome.outputs.reports, verbose=verbose)]
     rrd = folder / "view.rrd"
     if verbose and rrd.exists():
-        lines.append(f"open the recorded view with: {rerun_command()} {rrd}")
+        lines.append(Message("open the recorded view with: {command}", f"{rerun_command()} {rrd}"))
     print_summary(screen, run_state, outcome.test, folder, lines, verbose=verbose, with_report=with_report)
