@@ -13,11 +13,16 @@ from _pytest.runner import runtestprotocol
 # the time of the tests, and more of a busy machine. Set before numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# No example has a time limit of its own, which a busy machine would exceed; pytest's is that of the whole test.
-hypothesis.settings.register_profile(
-    "any machine", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
-)
-hypothesis.settings.load_profile("any machine")
+# No example has a time limit of its own, which a busy machine would exceed; pytest's is that of the whole test. One
+# state of the code has one answer; ``--hypothesis-profile explore`` draws new examples.
+for profile, fixed in (("same examples", True), ("explore", False)):
+    hypothesis.settings.register_profile(
+        profile,
+        deadline=None,
+        derandomize=fixed,
+        suppress_health_check=[hypothesis.HealthCheck.too_slow],
+    )
+hypothesis.settings.load_profile("same examples")
 
 MEASURING = {"accuracy", "adversary", "analysis", "bench", "contracts", "live"}
 

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from acquire.errors import PhasedicError
+from acquire.errors import EXIT_CODES, PhasedicError
 from acquire.text import Message
-from live.commands.exit_codes import EXIT_CODES
 from live.commands.words import understood
 from live.words.language import said_here
 

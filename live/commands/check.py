@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.errors import ConfigError
+from acquire.errors import NOT_READY, ConfigError
 from acquire.files.picture import write_picture
 from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
 from acquire.text import Message
 from live.commands.check_watch import watch
-from live.commands.exit_codes import NOT_READY
 from live.commands.options import (
     MEASURE,
     PICTURES,
@@ -37,8 +36,8 @@ from live.setup.check.disk import disk_lines, write_rate
 from live.setup.check.sample import take
 from live.setup.check.verdict import DEFAULT_TARGET, check_lines
 from live.setup.devices import check_load_port, open_load
+from live.setup.frames import report_warnings
 from live.setup.placement import with_auto_gauges
-from live.setup.region import report_warnings
 from live.setup.specimen_drawing import Overlay, snapshot
 from live.ui.terminal.screen import TerminalScreen
 

@@ -10,7 +10,7 @@ from acquire.addresses import Options, parse_address
 from acquire.events import EventKind, Level
 from acquire.serial_line.ports import LineSettings
 from acquire.text import Message
-from live.config.channels import DEFAULT_CHANNELS, OF_LOAD, joint_channels
+from live.config.figures import DEFAULT_CHANNELS, OF_LOAD, joint_channels
 from live.config.gauges import gauge_colours, outlines
 from live.config.listen_address import ListenAddress, read_token
 from live.config.loading import Config
@@ -18,6 +18,7 @@ from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Compose, Consumer, RunInfo
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
+from live.pipeline.timed.response import shown_names
 from live.results.sides.channels import JointChannels
 from live.results.summary import StatusCard
 from live.results.writer import write_results
@@ -169,6 +170,7 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
         colours=gauge_colours(about.config.gauges),
         light=v.light,
         picture_hz=1.0 if v.light else 5.0,
+        whole=shown_names(about.config.output.response),
         scale="symmetric" if v.scale == "symmetric" else "automatic",
     )
     rrd = about.folder / "view.rrd" if v.rrd else None

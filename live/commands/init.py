@@ -9,12 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquire.addresses import parse_address
-from acquire.errors import DeviceError
+from acquire.errors import LOSS, DeviceError
 from acquire.files.picture import write_picture
 from acquire.text import Message
 from acquire.text.message import about, joined
 from acquire.text.printable import printable
-from live.commands.exit_codes import LOSS
 from live.commands.options import (
     PICTURES,
     add_help_all,

@@ -22,7 +22,9 @@ MEASURE = (
     "roi", "mask", "zoi", "step", "gauges", "scale", "burst", "reference-burst", "window", "estimator", "strain",
     "order", "bending", "noise",
 )  # fmt: skip
-OUTPUT = ("out", "no-view", "no-rrd", "light", "axis", "standard", "test", "zero", "lag", "report")
+OUTPUT = (
+    "out", "no-view", "no-rrd", "light", "axis", "standard", "test", "zero", "lag", "response", "report",
+)  # fmt: skip
 FORCES = ("load-unit", "load-column", "load-decimal", "load-sign")
 PICTURES = (".png", ".tif")
 PICTURE_ORDERS = ("name", "time")

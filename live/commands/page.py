@@ -8,11 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from acquire.errors import DeviceError, PhasedicError
+from acquire.errors import EXIT_INTERRUPTED, DeviceError, PhasedicError
 from acquire.text import Message
 from acquire.text.printable import brief
 from live.commands.attended import page_opened
-from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.init import find_devices
 from live.commands.options import OUTPUT, add_measure, add_options, overrides
 from live.commands.report import write_report

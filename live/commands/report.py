@@ -13,12 +13,11 @@ from acquire.text import Message
 from acquire.text.message import about
 from live.commands.more_gauges import add_gauges
 from live.commands.options import add_gauge_option
-from live.config.cameras import BACK, FRONT, SIDES
+from live.config.new_files import check_free, new_file
 from live.pipeline.screen import Screen
-from live.results.export.atomic_file import check_free, new_file
 from live.results.finished.figures_file import FILE, FiguresFile
 from live.results.quantities import Display
-from live.results.report.cameras import report_of_fields, report_of_sides
+from live.results.report.cameras import report_of_cameras
 from live.results.report.comparison import compare, tests_of, write_table
 from live.results.report.report import Report, ReportRequest, make_report
 from live.results.report.saving import NO_BROWSER, find_browser, save_figures, save_page, save_pdf
@@ -103,22 +102,19 @@ def _report_of_cameras(folder: Path, out: Path, screen: Screen) -> Report:
     with ExitStack() as opened:
         runs = {name: opened.enter_context(open_run(folder / name)) for name in pages}
         names = {name: os.path.relpath(page, out.parent) for name, page in pages.items() if page.exists()}
-        if tuple(runs) == SIDES:
-            return report_of_sides(runs[FRONT], runs[BACK], names)
-        return report_of_fields(runs, names)
+        return report_of_cameras(runs, names)
 
 
 def write_report(folder: Path, screen: Screen) -> str:
     """``report.html`` in the folder of a run; an error is printed, returned, and does not affect the run."""
     try:
+        page = folder / "report.html"
         if cameras_in(folder):
-            save_page(_report_of_cameras(folder, folder / "report.html", screen), folder / "report.html")
-            screen.print(f"  {folder / 'report.html'}")
-            return ""
-        with open_run(folder) as run:
-            report = _reported(run, ReportRequest(mm_per_px=run.mm_per_px), screen)
-            save_page(report, folder / "report.html")
-        screen.print(f"  {folder / 'report.html'}")
+            save_page(_report_of_cameras(folder, page, screen), page)
+        else:
+            with open_run(folder) as run:
+                save_page(_reported(run, ReportRequest(mm_per_px=run.mm_per_px), screen), page)
+        screen.print(f"  {page}")
     except PhasedicError as error:
         screen.print(Message("warning: no report was made: {why}", error))
         return error.text

@@ -48,7 +48,7 @@ def put_together(front: Path, back: Path, out: Path, screen: Screen) -> None:
     ConfigError, DataError
         The file exists, a run cannot be read, or they are not of one test.
     """
-    from live.results.export.atomic_file import new_file
+    from live.config.new_files import new_file
     from live.results.run_folder import open_run
     from live.results.sides.together import SidesOfTest, write_sides
 

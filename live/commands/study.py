@@ -23,8 +23,8 @@ from live.commands.options import (
     in_picture_order,
     overrides,
 )
+from live.config.new_files import check_free, new_folder
 from live.config.values import AUTO
-from live.results.export.atomic_file import check_free, new_folder
 from live.results.report.saving import save_figures
 from live.results.report.svg import Plot, PlotLine
 from live.setup.compiling import compile_ahead
@@ -85,7 +85,7 @@ def command(arguments: argparse.Namespace) -> int:
     settings, found = _settings(arguments), []
     config_file = Path(arguments.config) if arguments.config else None
     source = in_picture_order(arguments.source, arguments.picture_order)
-    request = ReplayRequest(source, False, None, None, arguments.reference, config_file, overrides(arguments))
+    request = ReplayRequest(source, config_file, overrides(arguments), reference=arguments.reference)
     with open_source(request) as (material, config):
         screen.print(material.words)
         if AUTO in (config.measure.roi, config.measure.gauges):

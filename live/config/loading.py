@@ -21,7 +21,7 @@ from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
 from acquire.text import Message
-from live.config.channels import CYCLE_CHANNELS, channel_names
+from live.config.figures import CYCLE_CHANNELS, channel_names
 from live.config.gauges import DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_checks
 from live.config.sections import (
     AlarmConfig,

@@ -330,4 +330,8 @@ class OutputConfig:
         "folder for the files (default: a new one in runs/, named by the UTC time)",
         Option("out", "DIR"))
     seconds: float | None = key(number(0.01, 1e7), None, "end after this time, s", Option("seconds", "S"))
+    response: str | None = key(TEXT, None,
+        "maps of what each place does over all instants: strain over stress, over that of the region (mean) or of a"
+        " gauge, or over time, and where it leaves its line",
+        Option("response", "stress|mean|GAUGE|time"))
     report: bool = key(FLAG, False, "write report.html at the end of the test", Option("report", on=True))

@@ -19,7 +19,7 @@ import numpy as np
 
 from acquire.addresses import parse_address
 from acquire.camera import with_scheme
-from acquire.errors import ConfigError, DataError
+from acquire.errors import EXIT_INTERRUPTED, LOSS, ConfigError, DataError
 from acquire.events import Event, EventKind, EventSink
 from acquire.frame import Burst, Frame
 from acquire.hdf5 import FolderWatch
@@ -46,7 +46,7 @@ from live.results.finished.finished_test import FinishedTest
 from live.results.folder import LOG, BurstFailures, check_folder, make_folder
 from live.results.response.rising import check_channel
 from live.results.writer import write_results
-from live.setup.devices import open_rig
+from live.setup.frames import camera_of
 from live.setup.pictures import with_film, with_mask
 from live.setup.region import is_auto_region
 from live.stream.adapted import Outputs
@@ -118,17 +118,14 @@ def _replay_pictures(
         measure=replace(config.measure, roi=region),
     )
     event_log = EventLog()
-    rig = open_rig(config.camera.address, "none:", _in_test_time(event_log), crop=config.camera.crop)
-    try:
-        with rig.camera as camera:
-            found = picture_source(camera, request, config)
-            screen.print(found.words)
-            for warning in camera.info.warnings:
-                screen.print(Message("warning: {what}", warning))
-            source = _with_forces(found, request, config, screen)
-            return _run(source, config, request, screen, stopping, event_log, consumers)
-    finally:
-        rig.close()
+    into = _in_test_time(event_log)
+    with camera_of(config.camera.address, into, crop=config.camera.crop) as camera, camera:
+        found = picture_source(camera, request, config)
+        screen.print(found.words)
+        for warning in camera.info.warnings:
+            screen.print(Message("warning: {what}", warning))
+        source = _with_forces(found, request, config, screen)
+        return _run(source, config, request, screen, stopping, event_log, consumers)
 
 
 def _with_forces(
@@ -192,7 +189,7 @@ def _run(
     stored = StoredResults.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements
     bursts = _not_empty(stored.bursts() if stored else source.bursts, request, source.count)
-    check_channel(request.response, ready.plan.config, forces=len(source.loads) > 0)
+    check_channel(ready.plan.config, forces=len(source.loads) > 0)
     folder = make_folder(ready.plan.config.output.dir, datetime.datetime.now(datetime.UTC))
     config = _with_final_folder(with_mask(ready.plan.config, ready.plan.mask, folder), request.final_folder)
     run_state = RunState(
@@ -212,7 +209,6 @@ def _run(
         ready.plan.grid,
         source.start,
         deferred=request.final_folder is not None,
-        response=request.response,
     )
     made = with_force_watch(consumers(about, run_state), run_state)
     stream = Stream()
@@ -262,11 +258,10 @@ def _run(
         or cut_off
         or failures.count
     )
-    code = 130 if stopping.is_set() else 5 if lossy else 0
+    code = EXIT_INTERRUPTED if stopping.is_set() else LOSS if lossy else 0
     at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
     start_t = source.start.monotonic
-    test = finished(folder, config, run_state, code, at_reference, start_t, request.response, lines)
-    lines = [*test.response, *lines]
+    test = finished(folder, config, run_state, code, at_reference, start_t, lines)
     return Replayed(folder, run_state, config, code, test, tuple(lines), left_out)
 
 

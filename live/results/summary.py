@@ -124,7 +124,7 @@ def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     lines += sharpness_line(history.column("blur").tolist(), history.column("sigma_blur").tolist())
     found = findings(test)
     lines += [*latency_lines(history), *film_line(specimen), checks_line(found), *look_lines(found)]
-    figures = [*test.cycles.lines(), *figure_lines(test.figures, specimen)]
+    figures = [*test.cycles.lines(), *test.response, *figure_lines(test.figures, specimen)]
     if figures:
         figures += tare_line(history, run_state.loads) + lag_line(history, run_state.loads, specimen)
     return lines + figures + alignment_line(history, specimen)
@@ -175,13 +175,16 @@ class StatusCard:
         figures = evaluate(history, self._loads, self._specimen)
         lines += [told(line).replace("  ", ", ") for line in elastic_lines(figures, self._specimen)]
         recorded, measured, skipped = (
-            Amount("count", frames[one]) for one in ("recorded", "measured", "skipped")
+            Amount("count", frames[name]) for name in ("recorded", "measured", "skipped")
         )
-        more = Message("**{lost}**", lost) if lost else 0
+        lost_text = Message("**{lost}**", lost) if lost else 0
         lines.append(
             Message(
                 "recorded {recorded}, measured {measured}, skipped {skipped}, lost {lost}",
-                recorded, measured, skipped, more,
+                recorded,
+                measured,
+                skipped,
+                lost_text,
             )
-        )  # fmt: skip
+        )
         return lines

@@ -21,6 +21,7 @@ from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.results.folder import make_folder
+from live.results.response.rising import check_channel
 from live.run.alarms import check_alarms
 from live.run.outcome import StopSignal
 from live.setup.devices import Rig
@@ -104,6 +105,7 @@ def set_up(config: Config, rig: Rig, event_log: EventLog, screen: Screen, stop: 
     """
     camera = rig.camera.info
     plan = MeasurePlan.of(config, camera, _mask(config, rig))
+    check_channel(plan.config, forces=config.load.address != "none:")
     bursts = _burst_lengths(config, camera.live)
     took = plan.compile(camera, screen.status, lambda: stop.requested)
     if took > 0:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
-from live.results.export.atomic_file import new_file, new_folder
+from live.config.new_files import new_file, new_folder
 from live.results.export.job import ExportJob
 from live.results.maps.painting import Levels, Painter, caption
 from live.results.maps.scale import ColourScale

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from live.results.export.atomic_file import new_file, new_folder
+from live.config.new_files import new_file, new_folder
 from live.results.export.job import ExportJob
 from live.results.quantities import mean_name, quantity_of
 from live.results.run_folder import RunFolder

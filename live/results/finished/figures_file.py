@@ -16,8 +16,8 @@ from acquire.text.message import kept, taken
 from analysis.evaluate import CONFIDENCE, Figure
 from analysis.evaluate.elastic import FILM
 from live.config.loading import Config
+from live.config.new_files import new_file
 from live.pipeline.run_state import RunState
-from live.results.export.atomic_file import new_file
 from live.results.figures import tensile_table
 from live.results.finished.findings import DataCheck, findings
 from live.results.finished.finished_test import FinishedTest
@@ -98,19 +98,18 @@ def finished(
     exit_code: int,
     reference_N: float,
     start_t: float = 0.0,
-    response: str = "",
     remarks: Sequence[str] = (),
 ) -> FinishedTest:
     """Evaluate a run or replay that has just ended, and write its ``figures.json`` and ``cycles.csv``.
 
     Where writing fails it is an event. ``reference_N`` is the force at the reference, N; NaN where it is not known;
-    ``start_t`` the time, s, that times of the results count from; ``response`` the channel that a response of the
-    places is wanted over, ``remarks`` what the summary says beside the figures.
+    ``start_t`` the time, s, that times of the results count from; ``remarks`` what the summary says beside the
+    figures. A response of the places that is wanted is evaluated.
     """
     test = FinishedTest.of_run(run_state, config.specimen, config.gauges, reference_N, start_t)
     further: Sequence[NamedFigure] = ()
-    if response:
-        lines, further = response_of(folder, test.figures, response)
+    if config.output.response:
+        lines, further = response_of(folder, test.figures, config.output.response)
         test = replace(test, response=tuple(lines))
     try:
         test.cycles.write(folder)

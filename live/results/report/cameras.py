@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from acquire.text import Message
-from live.config.cameras import SIDES
+from analysis.evaluate import TensileFigures
+from live.config.cameras import BACK, FRONT
 from live.pipeline.measurement import AXIAL
 from live.results.figures import headline
 from live.results.report.curves import TIME, axial_label, force_unit, load_labels, strain_label, strain_unit
@@ -24,92 +26,102 @@ ALIKE = Message(
 )
 
 
-def report_of_sides(front: RunFolder, back: RunFolder, reports: dict[str, str]) -> Report:
-    """The report of both sides.
+@dataclass(frozen=True, slots=True)
+class _Parts:
+    """What a report of sides and one of fields have of their own; ``found`` are figures by whose strain they are."""
+
+    title: str
+    about: str
+    figures: tuple[Plot, ...]
+    found: Mapping[str, TensileFigures]
+    sections: list[Html]
+
+
+def report_of_cameras(runs: Mapping[str, RunFolder], reports: Mapping[str, str]) -> Report:
+    """The report of all cameras of a test: the figures by each; of sides mean and bending, and the budget of the mean.
 
     Parameters
     ----------
-    front, back : RunFolder
-    reports : mapping of side to str
-        Relative addresses of the reports of the sides.
+    runs : mapping of str to RunFolder
+        By the names of the cameras.
+    reports : mapping of str to str
+        Relative addresses of the report of each.
 
     Raises
     ------
     DataError
         They are not of one test, or cannot be read.
     """
-    sides = SidesOfTest.of_folders(front, back)
-    stresses = front.specimen.area_m2 is not None
-    figures = _stress_strain(sides, stresses), _over_time(sides, "mean"), _over_time(sides, "bending")
-    parts = [
-        element("h1", Message("{title}: front and back", front.title)),
-        paragraph(Message("Test of {start}. {alike}", front.strain.start_utc, ALIKE), "dim"),
-        section(Message("Curves"), plots(figures)),
-        section(Message("Figures of the test"), _figures(sides, stresses)),
-        section(Message("Strains at the end"), _strains(sides)),
-        section(
-            Message("Budget of E of the mean"),
-            *budget_table(front, _evaluated(sides, stresses), both_sides=True),
-        ),
-        section(Message("The sides"), *_links(reports)),
-    ]
-    return Report(page(Message("{title}: phasedic report of two cameras", front.title), parts), figures)
-
-
-def report_of_fields(runs: Mapping[str, RunFolder], reports: Mapping[str, str]) -> Report:
-    """The report of several fields of view, each with its own strains; parameters as of ``report_of_sides``."""
     first = next(iter(runs.values()))
     stresses = first.specimen.area_m2 is not None
+    parts = (_of_sides if FRONT in runs else _of_fields)(runs, stresses)
+    found = {name: headline(one, stresses=stresses) for name, one in parts.found.items()}
+    heads = (Message("by the strain of"), *(row.name for row in next(iter(found.values()))))
+    rows = [(Message("{where}", name), *(row.text for row in one)) for name, one in found.items()]
+    links = (
+        element("p", element("a", Message("report of the {side}", Message("{side}", side)), href=name))
+        for side, name in reports.items()
+    )
+    content = [
+        element("h1", parts.title),
+        paragraph(parts.about, "dim"),
+        section(Message("Curves"), plots(parts.figures)),
+        section(Message("Figures of the test"), table(heads, rows)),
+        *parts.sections,
+        section(Message("The cameras"), *links),
+    ]
+    title = Message("{title}: phasedic report of {n} cameras", first.title, len(runs))
+    return Report(page(title, content), parts.figures)
+
+
+def _of_sides(runs: Mapping[str, RunFolder], stresses: bool) -> _Parts:
+    front = runs[FRONT]
+    sides = SidesOfTest.of_folders(front, runs[BACK])
+    budget = budget_table(front, _evaluated(sides, stresses), both_sides=True)
+    return _Parts(
+        Message("{title}: front and back", front.title),
+        Message("Test of {start}. {alike}", front.strain.start_utc, ALIKE),
+        (_stress_strain(sides, stresses), _over_time(sides, "mean"), _over_time(sides, "bending")),
+        sides.figures,
+        [
+            section(Message("Strains at the end"), _strains(sides)),
+            section(Message("Budget of E of the mean"), *budget),
+        ],
+    )
+
+
+def _of_fields(runs: Mapping[str, RunFolder], stresses: bool) -> _Parts:
+    """Several fields of view, each with its own strains."""
+    first = next(iter(runs.values()))
     curves = {name: EvaluatedCurve.of(run) for name, run in runs.items()}
-    found = {name: headline(curve.figures, stresses=stresses) for name, curve in curves.items()}
     e = strain_unit(*(curve.axial for curve in curves.values()))
     lines = tuple(
-        PlotLine(name, np.asarray(runs[name].strain.time_s, np.float64), curve.axial * e.factor, colour=k)
+        PlotLine(
+            Message("{side}", name),
+            np.asarray(runs[name].strain.time_s, np.float64),
+            curve.axial * e.factor,
+            colour=k,
+        )
         for k, (name, curve) in enumerate(curves.items())
     )
-    figures = (Plot("strain-time", Message("Strain along the load"), TIME, strain_label(e), lines),)
-    heads = (Message("field"), *(row.name for row in next(iter(found.values()))))
-    rows = [(name, *(row.text for row in one)) for name, one in found.items()]
-    budgets = [
-        section(Message("Budget of E, {name}", name), *budget_table(runs[name], curve))
-        for name, curve in curves.items()
-    ]
-    parts = [
-        element("h1", Message("{title}: {n} fields of view", first.title, len(runs))),
-        paragraph(
-            Message("Test of {start}, with one load cell and one clock.", first.strain.start_utc), "dim"
-        ),
-        section(Message("Curves"), plots(figures)),
-        section(Message("Figures of the test"), table(heads, rows)),
-        *budgets,
-        section(Message("The fields"), *_links(reports)),
-    ]
-    return Report(
-        page(Message("{title}: phasedic report of {n} fields", first.title, len(runs)), parts), figures
+    return _Parts(
+        Message("{title}: {n} fields of view", first.title, len(runs)),
+        Message("Test of {start}, with one load cell and one clock.", first.strain.start_utc),
+        (Plot("strain-time", Message("Strain along the load"), TIME, strain_label(e), lines),),
+        {name: curve.figures for name, curve in curves.items()},
+        [
+            section(Message("Budget of E, {name}", name), *budget_table(runs[name], curve))
+            for name, curve in curves.items()
+        ],
     )
-
-
-def _links(reports: Mapping[str, str]) -> list[Html]:
-    links = (
-        (Message("report of the {side}", Message("{side}", side)), name) for side, name in reports.items()
-    )
-    return [element("p", element("a", words, href=name)) for words, name in links]
 
 
 def _evaluated(sides: SidesOfTest, stresses: bool) -> EvaluatedCurve:
-    curve, figures = sides.curve, sides.both
+    curve, figures = sides.curve, sides.figures["both"]
     nothing = np.full(len(curve.t), np.nan)
     across = nothing if curve.transverse is None else curve.transverse
     at = intercept_of(curve.strain, curve.stress, figures)
     return EvaluatedCurve(curve.strain, across, curve.stress, stresses, figures, at)
-
-
-def _figures(sides: SidesOfTest, stresses: bool) -> Html:
-    found = {where: headline(getattr(sides, where), stresses=stresses) for where in ("both", *SIDES)}
-    heads = (Message("by the strain of"), *(row.name for row in found["both"]))
-    return table(
-        heads, [(Message("{where}", where), *(row.text for row in rows)) for where, rows in found.items()]
-    )
 
 
 def _strains(sides: SidesOfTest) -> Html:

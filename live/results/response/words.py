@@ -9,10 +9,11 @@ import numpy as np
 from acquire.text import Message
 from analysis.evaluate import Figure
 from analysis.evaluate.response.departures import FIRST, WINDOW
+from live.pipeline.timed.response import STRESS, TIME, leaves_name, slope_name
 from live.results.maps.scale import shown_unit
 from live.results.quantities import quantity_of
 from live.results.reader import Strain
-from live.results.response.stored import FATE, STRESS, TIME, StoredResponse, leaves_name, slope_name
+from live.results.response.stored import FATE, StoredResponse
 
 
 def response_title(strain: Strain, name: str) -> str:

@@ -22,7 +22,7 @@ import sys
 import tempfile
 import threading
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from acquire.frame import Frame
     from live.pipeline.measurement import Measurement
     from live.pipeline.snapshot import Snapshot
+    from live.pipeline.timed.response import Floats
 
 _log = logging.getLogger(__name__)
 
@@ -125,6 +126,10 @@ class View:
     def figures(self, snapshot: Snapshot) -> None:
         """Set the large figures."""
         self._pending.figures = snapshot
+
+    def whole(self, maps: Mapping[str, Floats]) -> None:
+        """Set the maps of the whole test so far; none are left as they are."""
+        self._pending.whole = maps or self._pending.whole
 
     def close(self, seconds: float) -> None:
         """Draw what waits and close the file; a process that takes longer than ``seconds`` is killed with a warning."""

@@ -92,6 +92,7 @@ def _ranked(run_state: RunState, test: FinishedTest) -> list[Ranked]:
         (0, _figures(run_state, test)),
         (2, test.figures.notes if test.has_force else ()),
         (0, test.cycles.lines()),
+        (2, test.response),
         (2, _remarks(run_state, test)),
     )
     ranks: dict[str, int] = {}

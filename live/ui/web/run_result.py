@@ -87,14 +87,12 @@ def cameras_result(
 
 
 def peaks(consumers: Mapping[str, PageConsumer]) -> dict[str, Any]:
-    """The maps and gauges at the highest force: those of the first camera, and of another one by its name."""
-    if not consumers:
-        return {}
-    (name, first), *others = ((name, consumer.at_peak()) for name, consumer in consumers.items())
-    if not others:
-        return first
-    gauges = [{**gauge, "side": side} for side, one in ((name, first), *others) for gauge in one["gauges"]]
-    return {**first, "gauges": gauges, "side": name, "second": {**others[0][1], "side": others[0][0]}}
+    """The maps and gauges at the highest force: those of the first camera, and of each where there are several."""
+    found = [{**consumer.at_peak(), "side": name} for name, consumer in consumers.items()]
+    if len(found) < 2:
+        return found[0] if found else {}
+    gauges = [{**gauge, "side": one["side"]} for one in found for gauge in one["gauges"]]
+    return {**found[0], "gauges": gauges, "cameras": found}
 
 
 def _belief(figures: TensileFigures, specimen: SpecimenConfig, troubles: Sequence[str]) -> dict[str, Any]:

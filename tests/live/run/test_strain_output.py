@@ -21,7 +21,7 @@ from acquire.serial_line.ports import LineSettings
 from examples.strain_rate import main
 from hw_mocks.indicator_server import PtyPort
 from hw_mocks.machine import ELASTIC_SHARE, Machine
-from live.config.channels import DEFAULT_CHANNELS
+from live.config.figures import DEFAULT_CHANNELS
 from live.config.listen_address import ListenAddress
 from live.config.loading import load_config
 from live.config.sections import SpecimenConfig
