@@ -121,7 +121,7 @@ def _replay_pictures(
         found = picture_source(camera, request, config)
         screen.print(found.words)
         for warning in camera.info.warnings:
-            screen.print(f"warning: {warning}")
+            screen.print(Message("warning: {what}", warning))
         source = _with_forces(found, request, config, screen)
         return _run(source, config, request, screen, stopping, event_log, consumers)
 
@@ -194,7 +194,7 @@ def _run(
         with_load=len(source.loads) > 0,
     )
     write_names(request.source, folder / "pictures.csv")
-    screen.print(f"replaying {request.source} into {request.final_folder or folder}")
+    screen.print(Message("replaying {source} into {folder}", request.source, request.final_folder or folder))
     about = RunInfo(
         config,
         folder,
