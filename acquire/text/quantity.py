@@ -54,6 +54,7 @@ UNITS = {
     "rest": (ShownUnit("min", 60.0, 0.0, 0), ShownUnit("h", 3600.0, 36e3, 0)),
     "delay": (ShownUnit("ms", 1e-3, 0.0, 0),),
     "length": (ShownUnit("mm", 1e-3, 0.0, 2),),
+    "pixels": (ShownUnit("px", 1.0, 0.0, 2),),
     "size": (ShownUnit("MB", 1e6, 0.0, 1), ShownUnit("GB", 1e9, 1e9, 2)),
     "count": (ShownUnit("", 1.0, 0.0, 0),),
 }

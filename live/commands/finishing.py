@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 from acquire.errors import EXIT_WORDS, LOSS, PhasedicError
+from acquire.text import Message
 from live.commands.sides import TABLE, put_together
 from live.config.cameras import BACK, FRONT
 from live.config.loading import Config
@@ -59,12 +60,12 @@ def finish_test(
         try:
             put_together(folder / FRONT, folder / BACK, folder / TABLE, screen)
         except PhasedicError as error:
-            screen.print(f"warning: front and back were not put together: {error}")
+            screen.print(Message("warning: front and back were not put together: {why}", error))
             code = code or LOSS
     if report:
         from live.commands.report import write_report
 
         write_report(folder, screen)
     if code in EXIT_WORDS:
-        screen.print(f"exit code {code}: {EXIT_WORDS[code]}")
+        screen.print(Message("exit code {code}: {words}", code, EXIT_WORDS[code]))
     return code

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError
+from acquire.text import Message
 from analysis.optics import Readout
 from live.commands.options import add_config_file, add_options, add_verbose, overrides
 from live.config.rig_file import write_rig
@@ -38,7 +39,7 @@ def command(arguments: argparse.Namespace) -> int:
     )
     if arguments.config:
         write_rig(Path(arguments.config), changes)
-        screen.print(f"written to {arguments.config}; the former file is {arguments.config}.bak")
+        screen.print(Message("written to {path}; the former file is {path}.bak", arguments.config))
     return 0
 
 

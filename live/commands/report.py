@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
+from acquire.text import Message
 from acquire.text.message import about
 from live.commands.more_gauges import add_gauges
 from live.commands.options import add_gauge_option
@@ -73,7 +74,7 @@ def command(arguments: argparse.Namespace) -> int:
         else:
             report = _reported(found[0], _request(arguments, found[0]), screen)
         for note in (note for run in found for note in run.notes):
-            screen.print(f"note: {note}")
+            screen.print(Message("note: {what}", note))
     _save(report, out, arguments, screen)
     return 0
 
@@ -114,7 +115,7 @@ def write_report(folder: Path, screen: Screen) -> str:
                 save_page(_reported(run, ReportRequest(mm_per_px=run.mm_per_px), screen), page)
         screen.print(f"  {page}")
     except PhasedicError as error:
-        screen.print(f"warning: no report was made: {error}")
+        screen.print(Message("warning: no report was made: {why}", error))
         return error.text
     return ""
 
@@ -127,7 +128,7 @@ def _reported(run: RunFolder, wanted: ReportRequest, screen: Screen) -> Report:
             report.test.cycles.write(run.path)
             FiguresFile.of(report.test, run.frame_counts or {}, 0).write(run.path)
         except PhasedicError as error:
-            screen.print(f"note: {error}")
+            screen.print(Message("note: {what}", error))
     return report
 
 

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from acquire.errors import EXIT_WORDS
+from acquire.text import Message
 from live.commands.attended import attended, page_opened
 from live.commands.consumers import standard_consumers
 from live.commands.finishing import finish_test
@@ -156,5 +157,5 @@ def _lines(outcome: Outcome, *, verbose: bool) -> list[str]:
         outcome.folder / "view.rrd",
     )
     if verbose and rrd.exists():
-        lines.append(f"open the recorded view with: {rerun_command()} {rrd}")
+        lines.append(Message("open the recorded view with: {command}", f"{rerun_command()} {rrd}"))
     return lines

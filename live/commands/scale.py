@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 from live.commands.options import add_options, add_verbose, configured
 from live.config.loading import Config
 from live.config.rig_file import write_rig
@@ -71,11 +72,11 @@ def command(arguments: argparse.Namespace) -> int:
         f"scale: {scale.mm_per_px:.6g} ± {scale.sigma:.2g} mm/px ({scale.relative:.2%}), {scale.method}"
     )
     for remark in scale.remarks:
-        screen.print(f"LOOK  {remark}")
+        screen.print(Message("LOOK  {what}", remark))
     _print_false_strain(stand_off, screen)
     if arguments.config:
         write_rig(Path(arguments.config), scale.changes(arguments.stand_off))
-        screen.print(f"written to {arguments.config}; the former file is {arguments.config}.bak")
+        screen.print(Message("written to {path}; the former file is {path}.bak", arguments.config))
     return 0
 
 

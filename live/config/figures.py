@@ -12,7 +12,7 @@ from acquire.text import Message
 
 _UNITS = {
     "N": ("force", 1.0), "Pa": ("stress", 1.0), "MPa": ("stress", 1e6), "s": ("", 1.0), "min": ("", 60.0),
-    "px": ("", 1.0), "GL": ("", 1.0), "": ("", 1.0),
+    "px": ("pixels", 1.0), "GL": ("", 1.0), "": ("", 1.0),
 }  # fmt: skip
 """Unit in a name -> kind of quantity for a person, and what one is in SI units."""
 

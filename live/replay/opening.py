@@ -12,6 +12,7 @@ from acquire.errors import ConfigError
 from acquire.events import ignore_event
 from acquire.frame import Burst, CameraInfo
 from acquire.session import Session
+from acquire.text import Message
 from live.config.gauges import gauges_for
 from live.config.loading import AUTO_GAUGES, Config, load_config, settings_in
 from live.config.values import AUTO
@@ -46,7 +47,7 @@ def open_session_source(
         source = session_source(session, request, config, path)
         screen.print(source.words)
         for note in _notes(session, request):
-            screen.print(f"note: {note}")
+            screen.print(Message("note: {what}", note))
         yield source, _with_fitting_gauges(config, session.camera, request, screen)
 
 
@@ -68,7 +69,10 @@ def _with_fitting_gauges(
         except ConfigError:
             del gauges[name]
             screen.print(
-                f"note: the automatic gauge {name} of the run has no ZOI in this grid, and is left out"
+                Message(
+                    "note: the automatic gauge {name} of the run has no ZOI in this grid, and is left out",
+                    name,
+                )
             )
     return replace(config, gauges=gauges)
 

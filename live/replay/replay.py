@@ -25,6 +25,7 @@ from acquire.frame import Burst, Frame
 from acquire.hdf5 import FolderWatch
 from acquire.opencv.images import picture_times
 from acquire.text import Message
+from acquire.text.message import about, joined
 from acquire.text.printable import counted
 from acquire.text.quantity import Amount
 from live.config.loading import Config, load_config
@@ -121,7 +122,7 @@ def _replay_pictures(
         found = picture_source(camera, request, config)
         screen.print(found.words)
         for warning in camera.info.warnings:
-            screen.print(f"warning: {warning}")
+            screen.print(Message("warning: {what}", warning))
         source = _with_forces(found, request, config, screen)
         return _run(source, config, request, screen, stopping, event_log, consumers)
 
@@ -138,7 +139,7 @@ def _with_forces(
     placed = table.placed(pictures, source.start, recorded=source.count is None)
     times = source.times if pictures is None else np.array([*pictures.values()])
     placed = placed.at_pictures(str(request.forces), config.load, times)
-    screen.print("; ".join([f"{request.forces.name}: {table.export.taken}", *placed.remarks]))
+    screen.print(joined("; ", (about(request.forces.name, table.export.taken), *placed.remarks)))
     return replace(source, samples=placed.samples(), loads=placed.log(config.load), doubts=placed.doubts)
 
 
@@ -194,7 +195,7 @@ def _run(
         with_load=len(source.loads) > 0,
     )
     write_names(request.source, folder / "pictures.csv")
-    screen.print(f"replaying {request.source} into {request.final_folder or folder}")
+    screen.print(Message("replaying {source} into {folder}", request.source, request.final_folder or folder))
     about = RunInfo(
         config,
         folder,

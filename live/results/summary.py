@@ -174,11 +174,17 @@ class StatusCard:
             lines.append(Message("axis of the load **{axis}**, assumed", snapshot.axis))
         figures = evaluate(history, self._loads, self._specimen)
         lines += [told(line).replace("  ", ", ") for line in elastic_lines(figures, self._specimen)]
-        counts = (Amount("count", frames[name]) for name in ("recorded", "measured", "skipped"))
+        recorded, measured, skipped = (
+            Amount("count", frames[name]) for name in ("recorded", "measured", "skipped")
+        )
         lost_text = Message("**{lost}**", lost) if lost else 0
         lines.append(
             Message(
-                "recorded {recorded}, measured {measured}, skipped {skipped}, lost {lost}", *counts, lost_text
+                "recorded {recorded}, measured {measured}, skipped {skipped}, lost {lost}",
+                recorded,
+                measured,
+                skipped,
+                lost_text,
             )
         )
         return lines

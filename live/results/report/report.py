@@ -132,14 +132,13 @@ def _content(run: RunFolder, wanted: ReportRequest, screen: Screen) -> _Content:
 
 def _figures(run: RunFolder, curve: EvaluatedCurve) -> tuple[Plot, ...]:
     first = [curves.stress_strain(curve), curves.true_stress_strain(curve)] if curve.has_load else []
-    found = [
-        *first,
+    over_time = [
         curves.force(run),
         curves.gauge_strains(run),
         curves.mean_strains(run),
         curves.valid_share(run),
-        *curves.others(run),
     ]
+    found = [*first, *over_time, *curves.others(run)]
     return tuple(figure for figure in found if figure is not None)
 
 
@@ -304,8 +303,7 @@ def _about_curves(curve: EvaluatedCurve) -> Html:
     if not curve.has_load:
         none = Message("No force is known at any instant, so there is no stress-strain curve.")
         return paragraph(none, "dim")
-    words = [Message("Bands: one standard uncertainty on either side.")]
-    figures = curve.figures
+    words, figures = [Message("Bands: one standard uncertainty on either side.")], curve.figures
     if not figures.E.known:
         words.append(Message("E is not known: {why}", figures.E.why))
     if figures.span is not None:

@@ -111,7 +111,7 @@ def save_figures(figures: Sequence[Plot], folder: Path, screen: Screen) -> None:
             svg.write_text(draw(figure, standalone=True), encoding="utf-8")
             (part / f"{figure.name}.csv").write_text(as_csv(figure), encoding="utf-8")
         if trouble := _png_trouble([part / f"{figure.name}.svg" for figure in figures]):
-            screen.print(f"warning: {trouble}")
+            screen.print(Message("warning: {what}", trouble))
 
 
 def _png_trouble(pictures: Sequence[Path]) -> str:

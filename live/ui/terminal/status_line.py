@@ -120,9 +120,8 @@ def _machine(s: Snapshot) -> list[Item]:
 
 def _item(row: ShownFigure) -> Item:
     """A figure with its name; one that matters in capitals, and kept longer."""
-    amount = figure_text(
-        row.now, joined("", [row.amount]), joined("", [replace(row.amount, value=row.now.last)])
-    )
+    last = "" if row.now.why else joined("", [replace(row.amount, value=row.now.last)])
+    amount = figure_text(row.now, joined("", [row.amount]), last)
     if row.matters:
         return min(_MATTERS, row.figure.terminal), joined(" ", (said_here(row.figure.said).upper(), amount))
     return row.figure.terminal, joined(" ", (row.figure.said, amount))

@@ -359,7 +359,8 @@ def shown(figure: TimedFigure) -> dict[str, Any]:
 
 def fact(row: ShownFigure) -> dict[str, Any]:
     """A small figure as the page writes it."""
-    return {"label": row.figure.said, "amount": row.amount, "matters": row.matters, "why": row.now.why}
+    said = row.figure.said
+    return {"label": said, "amount": row.amount, "matters": row.matters, "why": row.now.trouble(said)}
 
 
 def _gauges(

@@ -12,6 +12,7 @@ const UNITS = {
   rest: [["min", 60, 0, 0], ["h", 3600, 36e3, 0]],
   delay: [["ms", 1e-3, 0, 0]],
   length: [["mm", 1e-3, 0, 2]],
+  pixels: [["px", 1, 0, 2]],
   size: [["MB", 1e6, 0, 1], ["GB", 1e9, 1e9, 2]],
   count: [["", 1, 0, 0]],
 };

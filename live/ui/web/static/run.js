@@ -218,7 +218,7 @@ function showMachine({ facts = [], zois, valid, part }) {
   fill($("strip"), shown.map(([label]) => label), (label) => el("span", {}, el("b"), " ", el("span", { t: label })));
   shown.forEach(([, text, matters, why], i) => {
     put($("strip").children[i].firstChild, text);
-    $("strip").children[i].title = why ? t(why) : "";
+    $("strip").children[i].title = t(why);
     $("strip").children[i].classList.toggle("matters", matters);
   });
 }
