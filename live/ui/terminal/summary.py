@@ -67,8 +67,7 @@ def brief_lines(run_state: RunState, test: FinishedTest) -> list[str]:
         noise_line(history),
         *belief_lines(test),
         *_figures(run_state, test),
-        *test.cycles.lines(),
-        *test.response,
+        *test.longer,
         *_remarks(run_state, test),
     ]
 
