@@ -17,6 +17,7 @@ from acquire.errors import ConfigError
 from acquire.text import Message
 from live.commands.arguments import HELP_ALL, bad_value, not_empty
 from live.config.loading import Config, lens_in, load_config, options
+from live.config.values import numbers_of
 
 MEASURE = (
     "roi", "mask", "zoi", "step", "gauges", "scale", "burst", "reference-burst", "window", "estimator", "strain",
@@ -201,7 +202,7 @@ def configured(arguments: argparse.Namespace, defaults: dict[str, Any] | None = 
 
 def _section(text: str) -> dict[str, float]:
     try:
-        width, thickness = (float(part) for part in text.split(","))
+        width, thickness = numbers_of(text, float, 2)
     except ValueError:
         raise ConfigError("--section {given}: give width,thickness in mm, for example 10,2", text) from None
     return {"specimen.width_mm": width, "specimen.thickness_mm": thickness}

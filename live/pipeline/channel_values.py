@@ -7,9 +7,11 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 
+from live.config.figures import OF_SNAPSHOT, attributes
 from live.pipeline.measurement import Measurement, TimeStep
-from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
+from live.pipeline.snapshot import AXIAL, FORCE, Snapshot
 
+_OF_STEP, _OF_BURST = attributes("step", channel=True), attributes("burst", channel=True)
 RATE_S = 1.0
 """The strain rate is the slope of the axial strain over this time."""
 
@@ -49,38 +51,21 @@ class ChannelValues:
         """All channels by name, NaN where one is not known; without a measurement those of this moment."""
         step = None if measurement is None else measurement.time_step
         self.now = now = self._snapshot(self._clock(), step)
-        axial, force = now.figure(AXIAL), now.figure(FORCE)
-        values = {
-            "time_s": (now.t if step is None else step.t) - self._start,
-            "axial": axial.value,
-            "sigma_axial": axial.sigma,
-            "age_s": axial.age,
-            "force_N": force.value,
-            "force_age_s": force.age,
-            "stress_MPa": now.figure(STRESS).value * 1e-6,
-            **now.cycles,
-        }
-        if measurement is not None:
-            values |= self._measured(measurement, measurement.time_step)
+        values = {one.name: getattr(now.figure(one.of), one.part) / one.one for one in OF_SNAPSHOT}
+        values |= {"time_s": (now.t if step is None else step.t) - self._start, **now.cycles}
+        if measurement is not None and step is not None:
+            values |= {name: getattr(step, of) for name, of in _OF_STEP.items()}
+            values |= {name: getattr(measurement.burst, of) for name, of in _OF_BURST.items()}
+            values["strain_rate"] = self._rate(step.t, now.figure(AXIAL).value)
+            for name in (f"gauge_{gauge}" for gauge in step.gauges):
+                figure = now.figure(name)
+                values |= {name: figure.value, f"sigma_{name}": figure.sigma}
         return {**values, **self._more()}
 
     @property
     def states(self) -> dict[str, str]:
         """The channels that are words, of the last reading."""
         return {"state": str(self.now.figure(AXIAL).state), "force_state": str(self.now.figure(FORCE).state)}
-
-    def _measured(self, measurement: Measurement, step: TimeStep) -> dict[str, float]:
-        values: dict[str, float] = {
-            "frame": measurement.burst.first_index,
-            "strain_rate": self._rate(step.t, self.now.figure(AXIAL).value),
-            "lost_share": 1 - step.n_valid / max(step.n_zoi, 1),
-        }
-        values |= {name: getattr(step, name) for name in ("latency_s", "noise_GL")}
-        values |= {name: self.now.figure(name).value for name in ("exx", "eyy", "exy", "largest")}
-        for name in (f"gauge_{gauge}" for gauge in step.gauges):
-            figure = self.now.figure(name)
-            values |= {name: figure.value, f"sigma_{name}": figure.sigma}
-        return values
 
     def _rate(self, t: float, axial: float) -> float:
         """The slope of the least-squares line through the last second, three points or more."""

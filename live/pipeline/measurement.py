@@ -20,6 +20,7 @@ from acquire.text import Message
 from analysis.evaluate import COME_APART, REGION, AreaStrain, GaugeSet, GaugeValue
 from analysis.field import StrainField, area_share, mean_blur
 from analysis.optics import ApparentMotion, LensReading
+from live.config.figures import LIVE
 
 AXIAL, TRANSVERSE = "axial", "transverse"
 """Gauges of these names are the strain along and across the load."""
@@ -121,6 +122,11 @@ class TimeStep:
         return COME_APART if self.n_parts > 1 else ""
 
     @property
+    def lost_share(self) -> float:
+        """Share of the ZOIs without a value."""
+        return 1 - self.n_valid / max(self.n_zoi, 1)
+
+    @property
     def least_share(self) -> float:
         """The smallest share of an area that the strains of the region and of the gauges stand for."""
         return min(self.area_share, *(gauge.share for gauge in self.gauges.values() if not gauge.reason), 1.0)
@@ -136,12 +142,13 @@ class TimeStep:
         """Value, sigma and why there is none: of ``axial``, of the region, of gauges; of ``burst`` the valid share."""
         why = self.refused or Message("no ZOI has a value")
         region = {
-            name: (getattr(self, name), getattr(self, f"sigma_{name}"), why) for name in ("exx", "eyy", "exy")
+            one.plain: (getattr(self, one.plain), getattr(self, f"sigma_{one.plain}", math.nan), why)
+            for one in LIVE
         }
         gauges = {f"gauge_{name}": (one.value, one.sigma, one.reason) for name, one in self.gauges.items()}
         along, _ = strains_along(self.gauges, axis)
-        found = {"largest": (self.largest, math.nan, why), **region, **gauges}
-        burst = (self.n_valid / max(self.n_zoi, 1), math.nan, "")
+        found = {**region, **gauges}
+        burst = (1 - self.lost_share, math.nan, "")
         return {"axial": found[f"gauge_{along}" if along == AXIAL else along], "burst": burst, **found}
 
 

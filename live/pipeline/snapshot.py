@@ -7,15 +7,33 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from acquire.text import Message
-from live.config.channels import CYCLE_CHANNELS, SYSTEM_CHANNELS, is_joint
+from acquire.text.quantity import Amount
+from live.config.figures import CYCLE_CHANNELS, FIGURES, LIVE, LiveFigure, figure_of
 from live.pipeline.measurement import TimeStep
-from live.pipeline.timed.figure import TimedFigure
+from live.pipeline.timed.figure import FigureState, TimedFigure
 
 FORCE, STRESS, AXIAL, BURST, FPS, DISK = "force", "stress", "axial", "burst", "fps", "disk"
-"""Names of figures; those of gauges and of the region are the names of their channels (``live.config.channels``)."""
-_OF_CHANNEL = {"force_N": FORCE, "stress_MPa": STRESS}
-_OF_REGION = ("exx", "eyy", "exy", "largest")
+"""Names of figures; those of gauges and of the region are the names of their channels (``live.config.figures``)."""
+_OF_STEP = {one.plain for one in LIVE}
 _NO_FIGURE = TimedFigure()
+
+
+@dataclass(frozen=True, slots=True)
+class ShownFigure:
+    """A figure of the table as it stands at one moment."""
+
+    figure: LiveFigure
+    now: TimedFigure
+
+    @property
+    def amount(self) -> Amount:
+        """Its value and sigma; NaN where it is not live."""
+        return Amount(self.figure.kind, self.now.value, self.now.sigma)
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is beyond what is usual."""
+        return self.now.known and not self.figure.below <= self.now.value <= self.figure.above
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,14 +101,28 @@ class Snapshot:
 
     def figure(self, name: str) -> TimedFigure:
         """The figure of this name, of state "none" where there is no such source."""
-        return self.figures.get(name, _NO_FIGURE)
+        if name in self.figures:
+            return self.figures[name]
+        late = self.latency_p95_s if self.figures.get(BURST, _NO_FIGURE).known else math.nan
+        counts = {**self.frames, **self.cycles, "lost_frames": self.lost, "delay": late}
+        value = counts.get(name, math.nan)
+        return TimedFigure.at(self.t, self.t, value) if math.isfinite(value) else _NO_FIGURE
+
+    def rows(self, place: str) -> list[ShownFigure]:
+        """The figures that are shown on "terminal", "page" or "display", in the order of the table."""
+        found = (ShownFigure(one, self.figure(one.plain)) for one in FIGURES if getattr(one, place))
+        return [
+            row
+            for row in found
+            if row.now.state is not FigureState.NONE and (row.now.value or not row.figure.hidden)
+        ]
 
     def of_channel(self, channel: str) -> TimedFigure:
         """The figure that a channel has its value from."""
-        if is_joint(channel) or channel in SYSTEM_CHANNELS:
+        one = figure_of(channel)
+        if one.channel in ("both", "machine"):
             return _NO_FIGURE
-        name = _OF_CHANNEL.get(channel, channel.removeprefix("sigma_"))
-        return self.figure(name if name in self.figures or channel in _OF_CHANNEL else BURST)
+        return self.figure(one.of if one.of in self.figures and one.part != "age" else BURST)
 
     @property
     def doing(self) -> str:
@@ -108,7 +140,7 @@ class Snapshot:
         lacking = (
             figure.trouble(names.get(name, name.removeprefix("gauge_")))
             for name, figure in self.figures.items()
-            if name not in (STRESS, BURST, *_OF_REGION)
+            if name not in (STRESS, BURST, *_OF_STEP)
         )
         return tuple(dict.fromkeys(filter(None, (*self.alarms, *lacking, *self.faults))))
 

@@ -31,15 +31,15 @@ class ReplayRequest:
     ----------
     source : str
         Path of a session, or an address of pictures (``files:shots/*.tif``, ``video:...``).
+    forces : Path or None
+        A file with the forces (``live.replay.forces``).
+    config_file : Path or None
+    overrides : mapping of "section.key" to value
     as_measured : bool
     start_s, end_s : float or None, s
         Part of the session, in seconds since its start.
     reference : str or None
         An image file as the reference, or the name of one of the pictures, in place of the first.
-    forces : Path or None
-        A file with the forces (``live.replay.forces``).
-    config_file : Path or None
-    overrides : mapping of "section.key" to value
     numbers : range or None
         Numbers of the bursts to measure, in the order within that part; only of a session.
     parts : sequence of Path
@@ -49,12 +49,12 @@ class ReplayRequest:
     """
 
     source: str
-    as_measured: bool
-    start_s: float | None
-    end_s: float | None
-    reference: str | None
     config_file: Path | None
     overrides: Mapping[str, Any]
+    as_measured: bool = False
+    start_s: float | None = None
+    end_s: float | None = None
+    reference: str | None = None
     forces: Path | None = None
     numbers: range | None = None
     parts: Sequence[Path] = ()

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from itertools import chain
 
 from acquire.hdf5 import Declared
-from live.results.row import BLUR, EXTENSIONS, GRADIENTS, STRAINS, UNEVEN, gauge_columns
+from live.config.figures import FIGURES, columns
+from live.results.row import BLUR, GRADIENTS, STRAINS, gauge_columns
 from live.results.strain_csv import COLUMNS
 
 FORMAT, FORMAT_VERSION = "phasedic-strain", 1
@@ -14,15 +15,13 @@ PLAIN_MAPS = ("u", "v", *GRADIENTS, *STRAINS)
 MAPS = (*PLAIN_MAPS, *(f"sigma_{name}" for name in PLAIN_MAPS), "residual", "status", "iterations")
 ADDED_MAPS = BLUR  # that files of earlier versions do not have
 BYTES = {"status", "iterations"}  # maps of whole numbers; the others are float32
-WHOLE = {"frame", "last_frame", "n_frames", "lost", "n_valid", "n_zoi"}  # columns; the others are float64
+WHOLE = {
+    figure.name for figure in FIGURES if figure.column and figure.kind == "count"
+}  # columns; the others are float64
 ANY_COLUMN = Declared("number", (None,))  # of a gauge, or added by another version
 # The columns that every file of this version has, and those that it may have.
-REQUIRED = {*COLUMNS} - {
-    *("latency_s", "kernel_s", "zero_N", "blur_px", "sigma_blur_px", "area_share"),
-    *EXTENSIONS,
-    *UNEVEN,
-}
-KNOWN = {*COLUMNS, "stress_Pa", "true_strain", "true_stress_Pa", "force_raw_N"}
+REQUIRED = {*COLUMNS[: COLUMNS.index("latency_s")]}
+KNOWN = {*COLUMNS, *columns(["section", "lag"])}
 ERRORS = "_errors"  # NeXus: the uncertainty of NAME is also called NAME_errors
 # Of each reference, from the row of its first measurement on: upper triangles of the normal matrices of all ZOIs.
 REFERENCES, NORMAL, FIRST_ROW, N_PAIRS = "references", "normal", "first_row", 21

@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 from analysis.field import ZoiGrid
+from live.config.figures import FIGURES
 
 UNITLESS = ""
 
@@ -47,8 +49,8 @@ class Quantity:
         return self.name in _TURNING
 
 
-_EXTENSIONS = ("extension_x", "extension_y", "uneven_exx", "uneven_eyy")
-_STRAINS = ("exx", "eyy", "exy", "true_strain", "du_dx", "du_dy", "dv_dx", "dv_dy", *_EXTENSIONS)
+_GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
+_STRAINS = {*_GRADIENTS, *(one.plain for one in FIGURES if one.column and one.kind == "strain")}
 # One index y (of place or of displacement) changes the sign, two restore it.
 _TURNING = ("v", "exy", "du_dy", "dv_dx", "y")
 
@@ -67,6 +69,7 @@ _FIELDS = (
     Quantity("status", UNITLESS, "0 where the ZOI has a value, else the reason why it has none"),
     Quantity("iterations", UNITLESS, "iterations of the fit"),
 )
+_MAPS = {q.name for q in _FIELDS}
 _RESPONSES = (
     Quantity("compliance", "1/Pa", "strain along the load over stress, slope over all instants"),
     Quantity(
@@ -93,90 +96,43 @@ _PLACES = (
     Quantity("column", UNITLESS, "column of the ZOI in the grid, from 0"),
     Quantity("instant", UNITLESS, "number of the measurement in strain.h5, from 0"),
 )
-_INSTANTS = (
-    Quantity("time", "s", "middle of the burst, since the start of the test"),
-    Quantity("force", "N", "force at that time, tension positive; nan where it is not known"),
-    Quantity("stress", "Pa", "force over the undeformed section"),
-    Quantity("true_strain", UNITLESS, "logarithm of one plus the axial engineering strain"),
-    Quantity(
-        "true_stress", "Pa", "stress times one plus the axial engineering strain; volume taken as constant"
-    ),
-    Quantity(
-        "extension_x", UNITLESS, "(L - L0)/L0 between strips at the left and the right end of the region"
-    ),
-    Quantity(
-        "extension_y", UNITLESS, "(L - L0)/L0 between strips at the upper and the lower end of the region"
-    ),
-    Quantity("uneven_exx", UNITLESS, "variation of exx over the region, rms, up to the second degree"),
-    Quantity("uneven_eyy", UNITLESS, "variation of eyy over the region, rms, up to the second degree"),
-    Quantity("misfit", UNITLESS, "that variation over what noise makes of it; about 1 in a uniform strain"),
-    Quantity(
-        "area_share",
-        UNITLESS,
-        "share of the region that its strains stand for; below 1 where a block was lost",
-    ),
-    Quantity("force_raw", "N", "force as stamped, not corrected for the lag of the load"),
-    Quantity("zero", "N", "sum of the tares before, subtracted from the force"),
-    *(
-        Quantity(f"raw_{e}", UNITLESS, f"{e} of the region before the correction by plates")
-        for e in ("exx", "eyy", "exy")
-    ),
-    Quantity("lens_exx", UNITLESS, "exx of the region that the lens made, and that was removed"),
-    Quantity("lens_eyy", UNITLESS, "the same of eyy"),
-    Quantity(
-        "corrected", UNITLESS, "1 where the plates were measured, 0 where their last motion was removed"
-    ),
-    Quantity("plate_shift_x", UNITLESS, "motion of the plates along x over half the diagonal of all ZOIs"),
-    Quantity("plate_shift_y", UNITLESS, "the same along y"),
-    Quantity("plate_scale", UNITLESS, "change of scale of the plates"),
-    Quantity("plate_turn", UNITLESS, "rotation of the plates, rad, clockwise"),
-    Quantity(
-        "plate_keystone_x", UNITLESS, "change of their scale along x over half the diagonal of all ZOIs"
-    ),
-    Quantity("plate_keystone_y", UNITLESS, "the same along y"),
-    Quantity("plate_stretch", UNITLESS, "half the difference of their strains along x and y"),
-    Quantity("plate_shear", UNITLESS, "their shear strain"),
-    Quantity("n_valid", UNITLESS, "ZOIs with a value"),
-    Quantity("n_zoi", UNITLESS, "ZOIs to measure"),
-    Quantity("noise", "GL", "temporal standard deviation of one frame; nan for a burst of one"),
-    Quantity("frame", UNITLESS, "sequence number of the first frame of the burst"),
-    Quantity("last_frame", UNITLESS, "sequence number of the last frame of the burst"),
-    Quantity("n_frames", UNITLESS, "frames averaged"),
-    Quantity("lost", UNITLESS, "frames lost or damaged since the burst before"),
-    Quantity("duration", "s", "time of the last frame of the burst minus that of the first"),
-    Quantity("kernel", "s", "time that the kernel took; nan where it was not measured"),
-    Quantity("latency", "s", "from the stamp of the last frame of the burst to the result; nan in a replay"),
-)
 _GAUGE, _SHARE = "gauge_", "share_gauge_"
-_KNOWN = {q.name: q for q in (*_FIELDS, *_RESPONSES, *_PLACES, *_INSTANTS)}
+KNOWN = {q.name: q for q in (*_FIELDS, *_RESPONSES, *_PLACES)} | {
+    one.plain: Quantity(one.plain, one.unit, one.words) for one in FIGURES if one.column and one.words
+}
 
 MEANS = {
-    "time_s": "time", "force_N": "force", "stress_Pa": "stress", "true_stress_Pa": "true_stress",
-    "force_raw_N": "force_raw", "zero_N": "zero", "noise_GL": "noise",
-    "duration_s": "duration", "kernel_s": "kernel", "latency_s": "latency", "u_px": "u", "v_px": "v",
-    "blur_px": "blur", "sigma_blur_px": "sigma_blur",
-}  # fmt: skip
+    name: name.removesuffix(f"_{one.unit}")
+    for one in FIGURES
+    if one.column and one.unit
+    for name in one.columns
+}
 """Column of ``Strain.values`` with the unit in its name -> quantity; other columns have the name of their quantity."""
 
 
 def quantity_of(name: str) -> Quantity:
     """The quantity of a map or column; one that is not known refers to the description of the format."""
     plain = MEANS.get(name, name)
-    if plain in _KNOWN:
-        return _KNOWN[plain]
+    if plain in KNOWN:
+        return KNOWN[plain]
     gauge = plain.removeprefix("sigma_")
     if plain.startswith(_SHARE):
-        words = f"share of its area that {plain.removeprefix('share_')} stands for, at either end"
+        words = Message(
+            "share of its area that {name} stands for, at either end", plain.removeprefix("share_")
+        )
         return Quantity(plain, UNITLESS, words)
     if gauge.startswith(_GAUGE):
-        words = f"strain of the virtual gauge {gauge.removeprefix(_GAUGE)!r}; nan where it was lost"
-        return Quantity(
-            plain, UNITLESS, words if plain == gauge else f"standard uncertainty (1 sigma) of {gauge}"
-        )
-    of = _KNOWN.get(plain.removeprefix("sigma_"))
+        named = repr(gauge.removeprefix(_GAUGE))
+        words = Message("strain of the virtual gauge {name}; nan where it was lost", named)
+        return Quantity(plain, UNITLESS, words if plain == gauge else _sigma_of(gauge))
+    of = KNOWN.get(plain.removeprefix("sigma_"))
     if of is None or not plain.startswith("sigma_"):
         return Quantity(plain, UNITLESS, "see docs/strain-format.md")
-    return Quantity(plain, of.unit, f"standard uncertainty (1 sigma) of {of.name}")
+    return Quantity(plain, of.unit, _sigma_of(of.name))
+
+
+def _sigma_of(name: str) -> str:
+    return Message("standard uncertainty (1 sigma) of {name}", name)
 
 
 def mean_name(name: str) -> str:
@@ -185,8 +141,7 @@ def mean_name(name: str) -> str:
     if plain.removeprefix("sigma_").startswith(_GAUGE):
         return plain
     of = plain.removeprefix("sigma_")
-    averaged = (quantity_of(of).is_strain and of not in _EXTENSIONS) or of in ("u", "v", "blur")
-    return f"mean_{plain}" if averaged else plain
+    return f"mean_{plain}" if of in _MAPS or of == "true_strain" else plain
 
 
 @dataclass(frozen=True, slots=True)

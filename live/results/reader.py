@@ -219,7 +219,7 @@ class Strain(Closing):
         display = display or Display()
 
         def variable(axes: Any, name: str, values: NDArray[Any]) -> tuple[Any, NDArray[Any], dict[str, str]]:
-            return axes, values, {"units": display.unit(name), "long_name": quantity_of(name).words}
+            return axes, values, {"units": display.unit(name), "long_name": str(quantity_of(name).words)}
 
         names = [name for name in self.values if name != "time_s"]
         data = {

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from analysis.evaluate import AreaStrain
 from analysis.field import PAIR_INDEX, Sums, blur_maps
-from analysis.optics import NAMES
+from live.config.figures import attributes, columns
 from live.pipeline.measurement import AXIAL, extension_along, strains_along
 
 if TYPE_CHECKING:
@@ -22,14 +22,10 @@ if TYPE_CHECKING:
 
 StrainMeasure = Literal["small", "engineering", "green", "hencky"]
 STRAINS = ("exx", "eyy", "exy")
-EXTENSIONS = ("extension_x", "extension_y", "sigma_extension_x", "sigma_extension_y")
 BLUR = ("blur", "sigma_blur")
-UNEVEN = ("uneven_exx", "uneven_eyy", "misfit")
-RAW = ("raw_exx", "raw_eyy", "raw_exy")
-PLATES = (*RAW, "corrected", *(f"plate_{name}" for name in NAMES), "sigma_plate_scale")
-"""Columns of a test with plates: strains as measured, whether the plates were good, and their motion."""
-LENS = ("lens_exx", "lens_eyy", "sigma_lens_exx", "sigma_lens_eyy")
+LENS = columns(["lens"])
 """Columns of a test whose lens is corrected: the strain that was removed, and its standard uncertainty."""
+_OF_STEP, _OF_BURST = attributes("step"), attributes("burst")
 GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
 
 
@@ -81,9 +77,13 @@ class ResultsInfo:
     @property
     def extras(self) -> tuple[str, ...]:
         """The columns that only some tests have, without those of gauges."""
-        stress = ("stress_Pa", "true_strain", "true_stress_Pa") if self.area_m2 is not None else ()
-        optics = (*(LENS if self.lens else ()), *(PLATES if self.plates else ()))
-        return (*stress, *(("force_raw_N",) if self.lagged else ()), *optics)
+        has = {
+            "section": self.area_m2 is not None,
+            "lag": self.lagged,
+            "lens": self.lens,
+            "plates": self.plates,
+        }
+        return columns(name for name, there in has.items() if there)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,39 +147,16 @@ def _values(
     measurement: Measurement, maps: dict[str, NDArray[Any]], info: ResultsInfo, axis: str
 ) -> dict[str, float | int]:
     burst, time_step = measurement.burst, measurement.time_step
-    values: dict[str, float | int] = {
-        "frame": burst.first_index,
-        "time_s": burst.t - info.start_monotonic,
-        "force_N": time_step.force,
-    }
+    values: dict[str, float | int] = {name: getattr(time_step, of) for name, of in _OF_STEP.items()}
+    values |= {name: getattr(burst, of) for name, of in _OF_BURST.items()}
+    values |= {"time_s": burst.t - info.start_monotonic, "kernel_s": time_step.measure_s or math.nan}
     values |= _strains(measurement, info.strain_measure)
-    values |= {name: getattr(time_step, name) for name in (*EXTENSIONS, *UNEVEN)}
-    values |= {f"sigma_{name}": getattr(time_step, f"sigma_{name}") for name in STRAINS}
-    values |= {
-        "n_valid": time_step.n_valid,
-        "n_zoi": time_step.n_zoi,
-        "noise_GL": burst.noise,
-        "n_frames": burst.n,
-        "last_frame": burst.last_index,
-        "lost": burst.lost,
-        "duration_s": burst.duration,
-        "u_px": time_step.u,
-        "v_px": time_step.v,
-        "latency_s": time_step.latency_s,
-        "kernel_s": time_step.measure_s or math.nan,
-        "zero_N": time_step.zero,
-        "blur_px": time_step.blur,
-        "sigma_blur_px": time_step.sigma_blur,
-        "area_share": time_step.area_share,
-    }
     for name, gauge in time_step.gauges.items():
         values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma, gauge.share), strict=True))
     if info.area_m2 is not None:
         values["stress_Pa"] = stress = time_step.force / info.area_m2
         stretch = _stretch(measurement, info.strain_measure, axis)
         values |= {"true_strain": math.log(stretch), "true_stress_Pa": stress * stretch}
-    if info.lagged:
-        values["force_raw_N"] = time_step.force_raw
     if info.lens:
         values |= dict(zip(LENS, measurement.lens or [math.nan] * len(LENS), strict=True))
     if info.plates:
@@ -188,12 +165,12 @@ def _values(
 
 
 def _plates(measurement: Measurement) -> dict[str, float]:
-    read = measurement.plates
+    read, names = measurement.plates, columns(["plates"])
     if read is None:
-        return dict.fromkeys(PLATES, math.nan)
+        return dict.fromkeys(names, math.nan)
     values = [*(read.raw_strain(name) for name in STRAINS), float(read.corrected)]
     values += [*read.motion.parameters.tolist(), read.sigma_scale]
-    return dict(zip(PLATES, values, strict=True))
+    return dict(zip(names, values, strict=True))
 
 
 def _strains(measurement: Measurement, measure: StrainMeasure) -> dict[str, float]:

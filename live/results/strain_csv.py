@@ -7,13 +7,10 @@ from itertools import chain
 from pathlib import Path
 
 from acquire.errors import DataError
-from live.results.row import EXTENSIONS, UNEVEN, StrainRow, gauge_columns
+from live.config.figures import columns
+from live.results.row import StrainRow, gauge_columns
 
-COLUMNS = (
-    *("frame", "time_s", "force_N", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy"),
-    *("n_valid", "n_zoi", "noise_GL", "n_frames", "last_frame", "lost", "duration_s", "u_px", "v_px"),
-    *("latency_s", "kernel_s", "zero_N", *EXTENSIONS, *UNEVEN, "blur_px", "sigma_blur_px", "area_share"),
-)
+COLUMNS = columns()
 """Of all valid ZOIs; strains are dimensionless. Then come those of ``ResultsInfo.extras``, and value,
 sigma and share of each virtual gauge."""
 
@@ -56,7 +53,7 @@ class CsvWriter:
 
     def _trouble(self, error: OSError) -> DataError:
         return DataError(
-            "{path}: cannot be written ({why}); make room or choose another --out", self._path, error.strerror
+            "{path}: cannot be written ({why}); make room or choose another place", self._path, error.strerror
         )
 
 

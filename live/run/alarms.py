@@ -17,7 +17,7 @@ from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.text import Message
 from acquire.text.quantity import Amount
-from live.config.channels import OF_LOAD, OF_SECTION, is_joint
+from live.config.figures import OF_LOAD, OF_SECTION, figure_of, is_joint
 from live.config.loading import Config
 from live.config.sections import AlarmConfig
 from live.pipeline.channel_values import ChannelValues
@@ -32,15 +32,7 @@ log = logging.getLogger(__name__)
 
 EVERY_S = 0.2
 """What changes without a measurement is checked at this interval."""
-_STRAINS = ("axial", "exx", "eyy", "exy", "largest", "peak_strain", "range_strain")
 _TWO_CAMERAS = Message("a camera on each side: give --back")
-_UNITS = {"_N": "N", "_MPa": "MPa", "_s": "s", "_min": "min", "_GL": "GL", "": ""}
-_KINDS = {"_N": ("force", 1.0), "_MPa": ("stress", 1e6)}
-_LABELS = {
-    "silent_s": Message("no frame for"),
-    "load_silent_s": Message("no force for"),
-    "disk_min": Message("disk full in"),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +121,7 @@ def check_alarms(config: Config, *, both_sides: bool = False) -> None:
     joint = next((one for one in config.strain_out.channels or () if is_joint(one)), "")
     if joint and not both_sides:
         raise ConfigError("strain_out.channels: {joint} needs {TWO_CAMERAS}", joint, _TWO_CAMERAS)
-    missing = dict.fromkeys((*OF_LOAD, "load_silent_s"), Message("a load cell: give --load ADDRESS"))
+    missing = dict.fromkeys(OF_LOAD, Message("a load cell: give --load ADDRESS"))
     if config.load.address != "none:":
         missing.clear()
     if config.specimen.area_m2 is None:
@@ -153,20 +145,11 @@ def check_alarms(config: Config, *, both_sides: bool = False) -> None:
 
 def in_words(channel: str, value: float, limit: float) -> str:
     """A channel at its value beyond its limit, for a person: ``axial 4 450 µm/m, limit 4 000 µm/m``."""
-    plain = channel
-    for prefix in ("sigma_", "mean_", "bending_"):
-        plain = plain.removeprefix(prefix)
-    suffix = next((one for one in _UNITS if plain.endswith(one)), "")
-    label = _LABELS.get(channel, channel.removesuffix(suffix).replace("_", " "))
-    kind, one = _KINDS.get(suffix, ("", 1.0))
-    if plain == "secant_modulus":
-        kind, label = "stress", channel.replace("_", " ")
-    if plain in _STRAINS or plain.startswith("gauge_"):
-        kind, one, label = "strain", 1.0, channel.replace("_", " ")
-    if kind:
-        value_of, limit_of = Amount(kind, value * one), Amount(kind, limit * one)
-        return Message("{channel} {value}, limit {limit}", label, value_of, limit_of)
-    return Message("{label} {value:.6g} {UNITS}", label, value, _UNITS[suffix]).rstrip() + Message(
+    one = figure_of(channel)
+    if one.kind:
+        value_of, limit_of = Amount(one.kind, value * one.one), Amount(one.kind, limit * one.one)
+        return Message("{channel} {value}, limit {limit}", one.said, value_of, limit_of)
+    return Message("{label} {value:.6g} {UNITS}", one.said, value, one.unit).rstrip() + Message(
         ", limit {limit:.6g}", limit
     )
 
@@ -324,7 +307,7 @@ class AlarmWatch(Consumer):
                 value /= self._values.now.at_cycle(channel, alarm.config.of_cycle) or math.nan
             figure = self._values.now.of_channel(channel)
             changed, words = alarm.judge(figure, value), channel.replace("_", " ")
-            instead = figure.trouble(channel.removesuffix("_N").removesuffix("_MPa").replace("_", " "))
+            instead = figure.trouble(figure_of(channel).said)
             if not (instead or figure.known or figure.state is FigureState.NONE):
                 instead = Message("{words}: {state}", words, figure.state)
             text = alarm.message(value, instead)

@@ -22,6 +22,7 @@ from typing import Any
 from acquire.errors import DeviceError, PhasedicError
 from acquire.events import Event, Level
 from acquire.serial_line.ports import LineSettings, open_port
+from live.config.figures import OF_SNAPSHOT
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
 from live.pipeline.measurement import Measurement
@@ -30,7 +31,7 @@ from live.run.tcp_lines import LineServer
 
 EVERY_S = 0.4
 """After this time without a measurement comes a heartbeat: every 0.5 s with what a busy machine adds."""
-_OF_NOW = ("age_s", "force_N", "force_age_s", "stress_MPa")
+_OF_NOW = [one.name for one in OF_SNAPSHOT if one.load or one.part == "age"]
 """Channels of a heartbeat that are not those of the last measurement."""
 AGAIN_S = 5.0
 MISSED = "a reader does not read, or is not there: it misses lines; end it, or let it read faster"

@@ -20,9 +20,10 @@ from live.pipeline.history import History
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.results import Results, ResultsInfo, Strain
-from live.results.report.curves import parts
+from live.results.report.curves import others, parts
 from live.results.summary import StatusCard, summary_lines
 from live.ui.rerun.drawing.large_figures import paint
+from live.ui.rerun.messages import LargeFigures
 from live.ui.terminal.status_line import gauge_texts, status_line
 from tests.live.made_run import finished
 from tests.live.made_up import START, make_grid, make_measurement
@@ -92,7 +93,8 @@ def test_status_line_card_summary_and_view_are_marked(lost: bool) -> None:
     mean, least = (f"of {math.floor(100 * share_of(GRID, gauge))} % of the area" for gauge in (None, HALF))
     assert (mean in status_line(now, 300)) == lost
     assert (least in card) == (least in summary) == lost
-    assert (paint(now).tobytes() != paint(replace(now, area_share=1.0)).tobytes()) == lost
+    shown, whole = (LargeFigures.of(one) for one in (now, replace(now, area_share=1.0)))
+    assert (paint(shown).tobytes() != paint(whole).tobytes()) == lost
 
 
 def test_only_the_gauge_over_the_block_is_marked() -> None:
@@ -125,4 +127,7 @@ def test_the_curves_of_the_report_are_marked() -> None:
     text = parts(run_with(area_share=[1.0, 0.9, 0.84], share_gauge_axial=[1.0, 1.0, 0.7]))
     assert "2 of 3 instants, from 1.5 to 3 s" in text and "at least 70 %" in text
     assert parts(run_with(area_share=[1.0, 1.0, 1.0])) == ""
+    (plot,) = others(run_with(area_share=[1.0, 0.9, 0.84]))
+    assert plot.curves[0].y.tolist() == pytest.approx([100, 90, 84]) and "share of the area, %" in str(plot)
+    assert others(run_with(area_share=[1.0, 1.0, math.nan])) == []
     assert parts(run_with(n_valid=[3.0, 2.0, 1.0])) == ""  # a file of an earlier version

@@ -13,7 +13,7 @@ from acquire.load_cell import LoadLog
 from analysis.evaluate.cyclic.cycles import Cycle, CycleCounter
 from analysis.evaluate.cyclic.loop import BurstStrains
 from analysis.evaluate.lag import Track
-from live.config.channels import CYCLE_CHANNELS
+from live.config.figures import CYCLE_CHANNELS
 from live.pipeline.measurement import TimeStep
 
 NONE = dict.fromkeys(CYCLE_CHANNELS, math.nan)

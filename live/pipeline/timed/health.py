@@ -100,7 +100,7 @@ class Health:
         self.rooms.add(t)
 
     def channels(self, now: float) -> dict[str, float]:
-        """The channels of the machine (``live.config.channels``) at ``now``, monotonic s.
+        """The channels of the machine (``live.config.figures``) at ``now``, monotonic s.
 
         Before the first frame or sample, the silence is that since the test began.
         """

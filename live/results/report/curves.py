@@ -7,12 +7,16 @@ import math
 import numpy as np
 
 from acquire.text import Message
+from acquire.text.message import joined
+from acquire.text.quantity import unit_of
 from analysis.evaluate import true_curve
 from analysis.evaluate.creep import Creep
+from live.config.figures import FIGURES
 from live.config.gauges import gauge_colours
 from live.results.maps.colours import Unit, unit_for
 from live.results.report.evaluation import EvaluatedCurve
-from live.results.report.page import Html, captioned, element, joined
+from live.results.report.page import Html, captioned, element
+from live.results.report.page import joined as joined_html
 from live.results.report.svg import Array, Mark, Plot, PlotLine, draw
 from live.results.run_folder import RunFolder
 
@@ -141,6 +145,24 @@ def force(run: RunFolder) -> Plot | None:
     return Plot("force-time", Message("Force"), TIME, up, (curve,), x_range=time_range(run))
 
 
+def others(run: RunFolder) -> list[Plot]:
+    """The figures of the table that have a curve in the report, of a test in which they change."""
+    found = []
+    for one in FIGURES:
+        values = np.asarray(run.strain.values.get(one.name, math.nan), np.float64)
+        if not one.report or not np.isfinite(values).any() or np.nanmin(values) == np.nanmax(values):
+            continue
+        unit, sigma = (
+            unit_of(one.kind, float(np.nanmax(np.abs(values)))),
+            run.strain.values.get(f"sigma_{one.name}"),
+        )
+        band = None if sigma is None else np.asarray(sigma, np.float64) / unit.one
+        curve = PlotLine("", run.strain.time_s, values / unit.one, band)
+        up = joined(", ", (one.said, unit.name or one.unit))
+        found.append(Plot(f"{one.plain}-time", one.said, TIME, up, (curve,), x_range=time_range(run)))
+    return found
+
+
 def valid_share(run: RunFolder) -> Plot:
     """Share of ZOIs with a value against time."""
     values = run.strain.values
@@ -189,4 +211,4 @@ def plots(figures: tuple[Plot, ...]) -> Html:
         captioned(Html(draw(figure).replace("<svg ", '<svg class="plot" ', 1)), figure.title)
         for figure in figures
     ]
-    return element("div", joined(found), class_="plots")
+    return element("div", joined_html(found), class_="plots")

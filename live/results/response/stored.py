@@ -60,7 +60,7 @@ def add_group(entry: Any, channel: str, shape: tuple[int, int]) -> None:
             name, (0,) * grows + rest, "f4", maxshape=(None,) * grows + rest, chunks=True, fletcher32=True,
             fillvalue=np.nan,
         )  # fmt: skip
-        dataset.attrs.update(units=quantity_of(name).unit, long_name=quantity_of(name).words)
+        dataset.attrs.update(units=quantity_of(name).unit, long_name=str(quantity_of(name).words))
     for name in ("x", "y"):
         group[name] = entry[f"strain/{name}"]
 

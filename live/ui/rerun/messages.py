@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
+from acquire.text.printable import share_text
+from acquire.text.quantity import PLUS_MINUS, Amount
 from analysis.field import Measure, StrainField, ZoiGrid
 from live.pipeline.measurement import Measurement
 from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
-from live.pipeline.timed.figure import FigureState, TimedFigure
+from live.pipeline.timed.figure import BEYOND, LACKING, FigureState, TimedFigure
 from live.ui.rerun.wire import Kind, Parcel, WireError
+from live.words.language import told
 
 STRAINS = ("exx", "eyy", "exy")
 MAPS = (*STRAINS, "e1", "e2", "sigma", "residual", "status")
@@ -98,9 +101,63 @@ For 20 megapixels, slicing takes 0.7 ms of the test, sending them whole 4 ms, an
 COLUMNS = {Kind.MEANS: 1 + 2 * len(STRAINS), Kind.LOADS: 2, Kind.POINTS: 2, Kind.GAUGE: 3}
 """Columns: t and mean, sigma of each strain; t and N; strain and N; t and strain, sigma of a gauge."""
 
-_NUMBERS = ("t", "area_share")
-_FIGURES = (AXIAL, FORCE, STRESS)
-_TEXTS = ("alarms", "faults")
+_LARGE = {"STRAIN": AXIAL, "FORCE": FORCE, "STRESS": STRESS}
+
+
+@dataclass(frozen=True, slots=True)
+class LargeFigures:
+    """What is painted large.
+
+    Attributes
+    ----------
+    t : float, s
+        Monotonic.
+    cells : sequence of (label, value, tone)
+        The state, then strain, force and stress. The tone of the first is its value; of others "live", "old" or
+        "beyond".
+    line : str
+        Stands below them.
+    alarmed : bool
+        There are alarms or other troubles.
+    """
+
+    t: float
+    cells: Sequence[tuple[str, str, str]]
+    line: str
+    alarmed: bool
+
+    @classmethod
+    def of(cls, s: Snapshot) -> LargeFigures:
+        """Those of a test."""
+        state = "PAUSED" if s.paused else s.state
+        cells = [("STATE", state, state), *(_cell(label, s.figure(name)) for label, name in _LARGE.items())]
+        return cls(s.t, cells, _line(s), bool(s.troubles))
+
+
+def _cell(name: str, figure: TimedFigure) -> tuple[str, str, str]:
+    """Label, value and tone; without a value what is there instead: the last one, with its age in the label."""
+    shown = Amount(name.lower(), figure.last, figure.sigma).printed()
+    label = f"{name} {shown.unit}"
+    if figure.known:
+        sigma = f"{PLUS_MINUS} {shown.sigma} " if shown.sigma else ""
+        return f"{name} {sigma}{shown.unit}", shown.value, "live"
+    if figure.state in BEYOND:
+        return label, figure.state.upper(), "beyond"
+    if figure.state in LACKING and figure.last == figure.last:
+        return f"{label}  {figure.age:.0f} s old", shown.value, "old"
+    return label if figure.state is FigureState.NONE else f"{label}  {figure.state}", "-", "old"
+
+
+def _line(s: Snapshot) -> str:
+    if s.alarms:
+        return "ALARM  " + "   ".join(s.alarms)
+    if s.troubles:
+        return "   ".join(s.troubles)
+    if not s.zois:
+        return "nothing measured yet"
+    lost, part = s.zois - s.valid, share_text(s.area_share)
+    words = f"{s.valid} of {s.zois} ZOIs" + f", {lost} LOST" * (lost > 0) + f"; strain {part}" * bool(part)
+    return "   ".join((words, *(f"{row.figure.said} {row.amount}" for row in s.rows("display"))))
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,8 +283,8 @@ def picture_of(message: Parcel) -> PictureMessage:
 
 
 def events_message(events: Sequence[Event]) -> Parcel:
-    """Events, without their data."""
-    return Parcel(Kind.EVENTS, {"events": [[e.t, e.kind, e.source, e.text, e.level] for e in events]})
+    """Events in the language of the terminal, without their data."""
+    return Parcel(Kind.EVENTS, {"events": [[e.t, e.kind, e.source, told(e.text), e.level] for e in events]})
 
 
 def events_of(message: Parcel) -> list[Event]:
@@ -243,53 +300,18 @@ def events_of(message: Parcel) -> list[Event]:
 
 def figures_message(snapshot: Snapshot) -> Parcel:
     """The large figures of ``snapshot``."""
-    meta = {
-        name: getattr(snapshot, name)
-        for name in (*_NUMBERS, "valid", "zois", "state", "paused", "axial_name", *_TEXTS)
-    }
-    figures = {
-        name: [
-            one if isinstance(one, str) or math.isfinite(one) else None
-            for one in astuple(snapshot.figures[name])
-        ]
-        for name in _FIGURES
-        if name in snapshot.figures
-    }
-    return Parcel(Kind.FIGURES, {**meta, "figures": figures})  # NaN is no JSON
+    shown = LargeFigures.of(snapshot)
+    return Parcel(Kind.FIGURES, {name: getattr(shown, name) for name in ("t", "cells", "line", "alarmed")})
 
 
-def figures_of(message: Parcel) -> Snapshot:
-    """The large figures, as a snapshot without the rest."""
+def figures_of(message: Parcel) -> LargeFigures:
+    """The content of ``figures_message``."""
     meta = message.meta
     try:
-        shown: dict[str, Any] = {name: float(meta.get(name, math.nan)) for name in _NUMBERS}
-        shown |= {name: int(meta[name]) for name in ("valid", "zois")}
-        shown |= {name: tuple(str(text) for text in meta[name]) for name in _TEXTS}
-        figures = {str(name): _figure(*values) for name, values in meta["figures"].items()}
-        return Snapshot(
-            **shown,
-            state=str(meta["state"]),
-            paused=bool(meta["paused"]),
-            axial_name=str(meta["axial_name"]),
-            figures=figures,
-        )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        cells = [(str(label), str(value), str(tone)) for label, value, tone in meta["cells"]]
+        return LargeFigures(float(meta["t"]), cells, str(meta["line"]), bool(meta["alarmed"]))
+    except (KeyError, TypeError, ValueError) as error:
         raise WireError("figures to the view are damaged: {why}", error) from error
-
-
-def _figure(
-    value: float | None,
-    sigma: float | None,
-    t: float | None,
-    age: float | None,
-    state: str,
-    why: str,
-    last: float | None,
-) -> TimedFigure:
-    value, sigma, t, last = (math.nan if one is None else float(one) for one in (value, sigma, t, last))
-    return TimedFigure(
-        value, sigma, t, math.inf if age is None else float(age), FigureState(state), str(why), last
-    )
 
 
 def _measure(message: Parcel) -> Measure:

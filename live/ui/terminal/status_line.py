@@ -4,28 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from acquire.text import Message
 from acquire.text.message import joined
 from acquire.text.printable import duration, share_text
 from acquire.text.quantity import UNKNOWN, Amount
-from live.pipeline.snapshot import AXIAL, BURST, DISK, FORCE, FPS, STRESS
+from live.pipeline.snapshot import AXIAL, BURST, FORCE, STRESS
 from live.pipeline.timed.figure import BEYOND, LACKING, FigureState
 from live.words.language import said_here
 
 if TYPE_CHECKING:
     from analysis.evaluate import GaugeValue
     from live.pipeline.measurement import TimeStep
-    from live.pipeline.snapshot import Snapshot
+    from live.pipeline.snapshot import ShownFigure, Snapshot
     from live.pipeline.timed.figure import TimedFigure
 
 GAP = "  "
 MAX_GAUGES = 4
+_MATTERS = 6
+_OF_CAMERA = ("skipped", "lost_frames")
 Item = tuple[int, str]
 """Rank and text; a line that is too long loses the items with the highest rank first."""
-SideValues = tuple[float, float, float]
-"""Mean of front and back, front minus mean, and the standard uncertainty of either."""
 
 
 def status_line(s: Snapshot, width: int, words: str = "") -> str:
@@ -34,7 +35,7 @@ def status_line(s: Snapshot, width: int, words: str = "") -> str:
 
 
 def cameras_line(
-    cameras: Mapping[str, Snapshot], both: Mapping[str, SideValues], width: int, words: str = ""
+    cameras: Mapping[str, Snapshot], both: Mapping[str, Sequence[float]], width: int, words: str = ""
 ) -> str:
     """The line of a test with several cameras: strains, of sides mean and bending, and what each camera does.
 
@@ -43,6 +44,7 @@ def cameras_line(
     cameras : mapping of str to Snapshot
         By name, the leading one first.
     both : mapping of str to (mean, bending, sigma)
+        Mean of front and back, front minus mean, and the standard uncertainty of either; more is not read.
     width : int
     words : str
     """
@@ -59,8 +61,8 @@ def _each(cameras: Mapping[str, Snapshot]) -> Iterator[Item]:
             yield 5, joined(" ", (name, text))
 
 
-def _both(both: Mapping[str, SideValues]) -> Iterator[Item]:
-    for number, (name, (mean, bending, sigma)) in enumerate(both.items()):
+def _both(both: Mapping[str, Sequence[float]]) -> Iterator[Item]:
+    for number, (name, (mean, bending, sigma, *_)) in enumerate(both.items()):
         text = Message(
             "{name} {mean}, bending {bending}", name, strain_text(mean, sigma), strain_text(bending, sigma)
         )
@@ -69,10 +71,8 @@ def _both(both: Mapping[str, SideValues]) -> Iterator[Item]:
 
 def _machines(cameras: Mapping[str, Snapshot]) -> Iterator[Item]:
     for name, s in cameras.items():
-        frames = s.frames
-        yield 8, joined(" ", (name, _zois(s.valid, s.zois) if s.time_step is not None else _frames(frames)))
-        yield 11, Message("skipped {n}", frames["skipped"])
-        yield _lost(s)
+        yield 8, joined(" ", (name, _zois(s.valid, s.zois) if s.time_step is not None else _frames(s)))
+        yield from (_item(row) for row in s.rows("terminal") if row.figure.name in _OF_CAMERA)
 
 
 def fitted(items: Sequence[Item], width: int) -> str:
@@ -115,35 +115,24 @@ def _assumed(s: Snapshot) -> Item:
 
 
 def _machine(s: Snapshot) -> list[Item]:
-    frames = s.frames
-    late = "" if math.isnan(s.latency_p95_s) else Message("p95 {ms:.0f} ms", s.latency_p95_s * 1e3)
-    measured = Message("measured {n}", frames["measured"]) if s.time_step is not None else _frames(frames)
-    fps, disk = s.figure(FPS), s.figure(DISK)
-    bare = frames.get("without_force", 0)
-    return [
-        (9, Message("{rate} fps", figure_text(fps, f"{fps.value:.0f}"))),
-        (6, Message("WITHOUT FORCE {bare}", bare) if bare else ""),
-        (12, measured),
-        (11, Message("skipped {n}", frames["skipped"])),
-        _lost(s),
-        (12, late),
-        (
-            14,
-            Message("disk {text} min", text) if (text := figure_text(disk, f"{disk.value / 60:.0f}")) else "",
-        ),
-    ]
+    return [(12, "" if s.time_step is not None else _frames(s)), *map(_item, s.rows("terminal"))]
+
+
+def _item(row: ShownFigure) -> Item:
+    """A figure with its name; one that matters in capitals, and kept longer."""
+    last = "" if row.now.why else joined("", [replace(row.amount, value=row.now.last)])
+    amount = figure_text(row.now, joined("", [row.amount]), last)
+    if row.matters:
+        return min(_MATTERS, row.figure.terminal), joined(" ", (said_here(row.figure.said).upper(), amount))
+    return row.figure.terminal, joined(" ", (row.figure.said, amount))
 
 
 def _zois(valid: int, zois: int) -> str:
     return Message("{valid}/{zois} ZOIs", valid, zois)
 
 
-def _frames(counts: Mapping[str, int]) -> str:
-    return Message("{n} frames", counts["grabbed"])
-
-
-def _lost(s: Snapshot) -> Item:
-    return (6, Message("LOST {n}", s.lost)) if s.lost else (13, Message("lost {n}", 0))
+def _frames(s: Snapshot) -> str:
+    return Message("{n} frames", s.frames["grabbed"])
 
 
 def figure_text(figure: TimedFigure, live: str, last: str = "") -> str:

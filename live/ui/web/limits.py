@@ -7,14 +7,14 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from live.config.figures import figure_of
 from live.config.sections import AlarmConfig
-from live.pipeline.snapshot import AXIAL, FORCE, STRESS
+from live.pipeline.snapshot import AXIAL
 
 NEAR, SOON_S = 0.9, 10.0
 """A figure is near its limit from this share of it, or where it reaches it within this time at the present rate."""
 RATE_S, LEAST_S = 2.0, 0.5
 """The rate is that of the last ``RATE_S``; over less than ``LEAST_S`` there is none."""
-_CHANNELS = {"force_N": (FORCE, 1.0), "stress_MPa": (STRESS, 1e6), AXIAL: (AXIAL, 1.0)}
 
 
 class FigureLimits:
@@ -67,8 +67,9 @@ class FigureLimits:
     def _one(self, k: int, name: str, value: float, axial_name: str) -> dict[str, Any] | None:
         alarm = self._alarms[k]
         own = {axial_name, f"gauge_{axial_name}"} if axial_name else set()
-        figure, unit = (AXIAL, 1.0) if alarm.channel in own else _CHANNELS.get(alarm.channel, ("", 1.0))
-        if figure != name or not math.isfinite(value):
+        channel = figure_of(AXIAL if alarm.channel in own else alarm.channel)
+        unit = channel.one
+        if (channel.of, channel.part) != (name, "value") or not math.isfinite(value):
             return None
         sign, limit = (1.0, alarm.above) if alarm.above is not None else (-1.0, alarm.below or 0.0)
         limit, over = limit * unit, sign * (value - limit * unit)

@@ -28,7 +28,7 @@ from live.pipeline.event_log import counted_text, sentence
 from live.pipeline.measurement import AXIAL, Measurement, TimeStep
 from live.pipeline.repeats import Repeats
 from live.pipeline.run_state import RunState
-from live.pipeline.snapshot import BURST, DISK, FORCE, FPS, STRESS, Snapshot, peak_force
+from live.pipeline.snapshot import BURST, FORCE, STRESS, ShownFigure, Snapshot, peak_force
 from live.pipeline.timed.figure import TimedFigure
 from live.pipeline.timed.response import shown_names
 from live.results.reader import whole_maps
@@ -273,9 +273,7 @@ class PageConsumer(Consumer):
             "recording": None if running is None else running.recording,
             "figures": {name: self._figure(s, name) for name in (FORCE, STRESS, AXIAL)},
             "troubles": [printable(text) for text in s.troubles],
-            "force_N": s.figure(FORCE).value,
             "peak_N": s.peak_N,
-            "stress_Pa": s.figure(STRESS).value,
             "strain_rate": self._rate if s.figure(BURST).known else math.nan,
             "elongation_mm": self._elongation(s),
             "points": self.curve.position,
@@ -286,11 +284,7 @@ class PageConsumer(Consumer):
                 **self._scale,
             },
             "events": [self._shown_event(*one) for one in [*self._events][-MAX_EVENTS:]],
-            "late_s": s.latency_p95_s if s.figure(BURST).known else math.nan,
-            "fps": s.figure(FPS).value,
-            "cycle": s.cycles["cycle"],
-            "ledger": s.frames,
-            "disk_min": s.figure(DISK).value / 60,
+            "facts": [fact(row) for row in s.rows("page")],
             "sides": None if self._cameras is None else self._cameras.state(),
         }
         return values | _measured(s, self._colours)
@@ -362,6 +356,12 @@ def shown(figure: TimedFigure) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def fact(row: ShownFigure) -> dict[str, Any]:
+    """A small figure as the page writes it."""
+    said = row.figure.said
+    return {"label": said, "amount": row.amount, "matters": row.matters, "why": row.now.trouble(said)}
+
+
 def _gauges(
     step: TimeStep, figures: Mapping[str, TimedFigure], colours: Mapping[str, int]
 ) -> list[dict[str, Any]]:
@@ -386,14 +386,10 @@ def _measured(s: Snapshot, colours: Mapping[str, int]) -> dict[str, Any]:
     return {
         "axial": {
             "name": s.axial_name,
-            "value": s.figure(AXIAL).value,
-            "sigma": s.figure(AXIAL).sigma,
             "assumed": Message("axis assumed") if s.axis_assumed else "",
         },
         "gauges": _gauges(i, s.figures, colours),
         "valid": s.valid,
         "zois": s.zois if s.figure(BURST).known else None,
-        "refused": i.refused,
         "part": share_text(s.area_share),
-        "kernel_s": i.measure_s,
     }

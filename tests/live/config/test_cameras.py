@@ -8,7 +8,7 @@ import pytest
 
 from acquire.errors import ConfigError
 from live.config.cameras import camera_configs, names_of, other_cameras
-from live.config.channels import JOINT_CHANNELS, channel_names, is_joint, joint_channels
+from live.config.figures import JOINT_CHANNELS, channel_names, is_joint, joint_channels
 from live.config.loading import load_config
 
 ALARM = [{"channel": "axial", "above": 0.5}]

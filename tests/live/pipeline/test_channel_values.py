@@ -9,7 +9,7 @@ import pytest
 
 from acquire.load_sample import LoadSample
 from analysis.evaluate import GaugeValue
-from live.config.channels import CYCLE_CHANNELS, MEASURED_CHANNELS
+from live.config.figures import CYCLE_CHANNELS, MEASURED_CHANNELS
 from live.config.sections import SpecimenConfig
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.measurement import Measurement

@@ -25,7 +25,7 @@ from live.pipeline.timed.force_watch import ForceWatch
 from live.run.alarms import ActionMeans, Alarm, AlarmWatch, actions_of
 from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
 from live.run.strain_output import LineFormat
-from live.ui.rerun.drawing.large_figures import _cells
+from live.ui.rerun.messages import LargeFigures
 from live.ui.terminal.status_line import status_line
 from live.ui.web.broadcaster import Broadcaster, plain
 from live.ui.web.page_consumer import PageConsumer
@@ -177,9 +177,9 @@ def test_the_force_on_every_screen_and_line(kind: str) -> None:
     page = page_of(state)
     figure = page["figures"]["force"]
     assert (figure["state"], figure["value"], figure["last"]) == (word, value, last)
-    assert page["force_N"] == value and page["figures"]["stress"]["state"] == word
+    assert page["figures"]["stress"]["state"] == word
     assert page["troubles"] == ([why] if on else []), "the state is green only where there is none"
-    cells = _cells(now)
+    cells = LargeFigures.of(now).cells
     assert in_ascii(cells[2][1]) == display and ("24 s old" in cells[2][0]) is (
         kind in ("old", "unknown", "stale")
     )
@@ -282,10 +282,14 @@ def test_the_strain_on_every_screen_line_and_alarm(kind: str) -> None:
         assert watched.text == (f"ALARM {why.format(channel)}" if on else "")
 
 
+def facts_of(page: Any) -> dict[str, float]:
+    return {one["label"]: one["amount"].value for one in page["facts"]}
+
+
 def test_gauges_latency_and_rate_go_with_their_burst() -> None:
     state = run_state(strain="old")
     page = page_of(state)
-    assert page["zois"] is None and page["late_s"] is None and page["strain_rate"] is None
+    assert page["zois"] is None and page["strain_rate"] is None and "delay" not in facts_of(page)
     assert Watched(state, channel="lost_share", above=0.5).text == "ALARM no value of lost share for 24 s"
     assert Watched(run_state(), channel="lost_share", above=0.5).alarm.on is False
 
@@ -302,8 +306,9 @@ def test_a_camera_that_stalls_is_no_well_state(failed: bool, why: str) -> None:
     state = run_state(strain="not yet")
     state.health.frame_t, state.health.camera_failed = NOW - 24.0, failed
     assert state.snapshot(NOW).figure("axial").why == why
-    assert "– fps" not in status_line(run_state().snapshot(NOW), 300)
-    assert ("– (the camera has failed) fps" if failed else "– fps") in status_line(state.snapshot(NOW), 300)
+    assert "frames/s –" not in status_line(run_state().snapshot(NOW), 300)
+    words = "frames/s – (the camera has failed)" if failed else "frames/s – (10, 24 s ago)"
+    assert words in status_line(state.snapshot(NOW), 300)
     assert any("frame rate" in text for text in page_of(state)["troubles"])
 
 
@@ -311,7 +316,7 @@ def test_the_disk_is_old_when_nobody_looks_any_more() -> None:
     state = run_state()
     for k in range(4):
         state.health.room(NOW - 30.0 + 5.0 * k, 600.0)
-    assert state.snapshot(NOW).figure("disk").known and page_of(state)["disk_min"] == 10.0
+    assert state.snapshot(NOW).figure("disk").known and facts_of(page_of(state))["disk"] == 600.0
     assert state.snapshot(NOW + 11.0).figure("disk").state == "old"
 
 

@@ -8,10 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
-from acquire.text.printable import share_text
-from acquire.text.quantity import GAP, IN_ASCII, PLUS_MINUS, Amount
-from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
-from live.pipeline.timed.figure import BEYOND, LACKING, FigureState, TimedFigure
+from acquire.text.quantity import GAP, IN_ASCII
+from live.ui.rerun.messages import LargeFigures
 
 WIDTH, HEIGHT = 1600, 168
 """px of the picture; the digits are nearly half of the height."""
@@ -29,59 +27,26 @@ _LABELS = (204, 195, 185)
 _CELLS = ((14, 370), (400, 506), (920, 346), (1280, 306))  # left edge and width
 _LABEL_Y, _VALUE_Y, _LINE_Y = 28, 116, 157  # base lines
 _BEYOND = (106, 110, 255)  # red on the dark ground
-_STATES = {"REC": _BEYOND, "ARMED": AMBER, "NOT RECORDING": AMBER, "REPLAY": GREY}
+_INKS = {
+    "live": WHITE, "old": GREY, "beyond": _BEYOND,
+    "REC": _BEYOND, "ARMED": AMBER, "NOT RECORDING": AMBER, "REPLAY": GREY, "PAUSED": AMBER,
+}  # fmt: skip
+"""Of a tone; other states are green."""
 
 
-def paint(snapshot: Snapshot) -> NDArray[np.uint8]:
+def paint(shown: LargeFigures) -> NDArray[np.uint8]:
     """(HEIGHT, WIDTH, 3) uint8, blue, green, red."""
-    alarmed = bool(snapshot.troubles)
+    alarmed = shown.alarmed
     picture = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     picture[:] = RED if alarmed else BAR
     labels = WHITE if alarmed else _LABELS
-    for (x, width), (label, value, colour) in zip(_CELLS, _cells(snapshot), strict=True):
+    for (x, width), (label, value, tone) in zip(_CELLS, shown.cells, strict=False):
         _write(picture, label, (x, _LABEL_Y), 24, width, labels)
-        is_thin = colour == GREY and value != "-"
-        shown = (_LABELS if is_thin else WHITE) if alarmed else colour
-        _write(picture, value, (x, _VALUE_Y), 76, width, shown, is_thin=is_thin)
-    _write(picture, _line(snapshot), (14, _LINE_Y), 29, WIDTH - 28, labels)
+        is_thin = tone in ("old", "REPLAY") and value != "-"
+        ink = (_LABELS if is_thin else WHITE) if alarmed else _INKS.get(tone, GREEN)
+        _write(picture, value, (x, _VALUE_Y), 76, width, ink, is_thin=is_thin)
+    _write(picture, shown.line, (14, _LINE_Y), 29, WIDTH - 28, labels)
     return picture
-
-
-def _cells(s: Snapshot) -> tuple[tuple[str, str, Colour], ...]:
-    return (
-        ("STATE", "PAUSED" if s.paused else s.state, _STATES.get(s.state, GREEN)),
-        _cell("STRAIN", "strain", s.figure(AXIAL)),
-        _cell("FORCE", "force", s.figure(FORCE)),
-        _cell("STRESS", "stress", s.figure(STRESS)),
-    )
-
-
-def _cell(name: str, kind: str, figure: TimedFigure) -> tuple[str, str, Colour]:
-    """Label and value; without a value what is there instead: the last one in grey, with its age in the label."""
-    shown = Amount(kind, figure.last, figure.sigma).printed()
-    if figure.known:
-        sigma = f"{PLUS_MINUS} {shown.sigma} " if shown.sigma else ""
-        return f"{name} {sigma}{shown.unit}", shown.value, WHITE
-    if figure.state in BEYOND:
-        return f"{name} {shown.unit}", figure.state.upper(), _BEYOND
-    if figure.state in LACKING and figure.last == figure.last:
-        last = Amount(kind, figure.last).printed()
-        return f"{name} {last.unit}  {figure.age:.0f} s old", last.value, GREY
-    label = f"{name} {shown.unit}"
-    return label if figure.state is FigureState.NONE else f"{label}  {figure.state}", "-", GREY
-
-
-def _line(s: Snapshot) -> str:
-    if s.alarms:
-        return "ALARM  " + "   ".join(s.alarms)
-    if s.troubles:
-        return "   ".join(s.troubles)
-    if not s.zois:
-        return "nothing measured yet"
-    lost = s.zois - s.valid
-    part = share_text(s.area_share)
-    words = f"{s.valid} of {s.zois} ZOIs" + (f", {lost} LOST" if lost else "")
-    return f"{words}; strain {part}" if part else words
 
 
 def _write(

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from acquire.events import Event, EventKind
 from analysis.field import Status
 from live.pipeline.queues import Thinned
-from live.pipeline.snapshot import Snapshot
 from live.results.maps.colours import LINES, LINES_ON_DARK, number
 from live.results.maps.field_maps import FieldMaps, Painted
 from live.results.maps.scale import AutoRange, ColourScale, range_kind
@@ -48,7 +47,7 @@ from live.ui.rerun.drawing.shapes import (
     with_heads,
 )
 from live.ui.rerun.drawing.sinks import RerunSink
-from live.ui.rerun.messages import MAPS, STRAINS, PictureMessage, Row, ViewSetup
+from live.ui.rerun.messages import MAPS, STRAINS, LargeFigures, PictureMessage, Row, ViewSetup
 
 if TYPE_CHECKING:
     from analysis.field import StrainField, ZoiGrid
@@ -87,7 +86,7 @@ class ViewScene:
         self._arrows = ArrowScale()
         self._strains: Thinned[Row] = Thinned(_MAX_STRAINS)
         self._forces: Thinned[Row] = Thinned(_MAX_FORCES)
-        self._newest: Snapshot | None = None
+        self._newest: LargeFigures | None = None
 
     def begin(self) -> None:
         """Draw everything that does not change."""
@@ -351,18 +350,18 @@ class ViewScene:
         text = f"{self._since_start(event.t):.1f} s  {source}: {event.text}"
         self._log("events", rr.TextLog(text, level=_LEVELS[event.level]))
 
-    def figures(self, snapshot: Snapshot) -> None:
+    def figures(self, shown: LargeFigures) -> None:
         """Draw the large figures where a sink is due, and the last of all at the end."""
-        self._newest = snapshot
-        self._draw_figures(snapshot, [sink for sink in self._sinks if sink.takes("figures", snapshot.t)])
+        self._newest = shown
+        self._draw_figures(shown, [sink for sink in self._sinks if sink.takes("figures", shown.t)])
 
-    def _draw_figures(self, snapshot: Snapshot, due: Sequence[RerunSink]) -> None:
+    def _draw_figures(self, shown: LargeFigures, due: Sequence[RerunSink]) -> None:
         import rerun as rr
 
         self._due = due
         if due:
-            data = encode(".jpg", paint(snapshot), FIGURES_QUALITY)
-            self._at(snapshot.t)
+            data = encode(".jpg", paint(shown), FIGURES_QUALITY)
+            self._at(shown.t)
             self._log_due("figures", rr.EncodedImage(contents=data, media_type="image/jpeg"))
 
     def status(self, markdown: str) -> None:

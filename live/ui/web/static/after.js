@@ -82,7 +82,7 @@ function showFold(name, list, make, words) {
 
 // The map at the highest force or in the last picture, of the camera that is chosen.
 function showMaps() {
-  const sides = result.second ? [result, result.second] : [result], side = sides[chosen.side] ?? result;
+  const sides = result.cameras ?? [result], side = sides[chosen.side] ?? result;
   choices($("peakside"), sides.length > 1 ? sides.map((one, k) => [k, t(one.side)]) : [], chosen.side, (k) => { chosen.side = k; });
   const whole = (side.whole ?? []).map((name) => [name, name]);
   const times = [["peak", side.atpeak], ["last", "last picture"], ...whole].filter(([name, words]) => side[name] && words);

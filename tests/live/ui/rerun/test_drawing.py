@@ -32,7 +32,7 @@ from live.ui.rerun.drawing.shapes import (
     with_heads,
 )
 from live.ui.rerun.drawing.sinks import ALL, Rates, RerunSink, write
-from live.ui.rerun.messages import PictureMessage, ViewSetup, ViewTarget, row_of
+from live.ui.rerun.messages import LargeFigures, PictureMessage, ViewSetup, ViewTarget, row_of
 from tests.live.made_up import START, figures, make_field, make_frame, make_grid, make_measurement
 
 
@@ -111,9 +111,8 @@ def draw_a_test(scene: ViewScene, seconds: float = 3.0) -> None:
         scene.points([(1e-4 * k, 10.0 * k)])
         scene.means([row_of(measurement)])
         scene.field(measurement.t, measurement.field)
-        scene.figures(
-            Snapshot(measurement.t, "REC", figures=figures(axial=1e-3, force=10.0 * k), valid=12, zois=12)
-        )
+        now = figures(axial=1e-3, force=10.0 * k)
+        scene.figures(LargeFigures.of(Snapshot(measurement.t, "REC", figures=now, valid=12, zois=12)))
 
 
 STATIC = LAST = 1

@@ -21,7 +21,7 @@ from live.ui.rerun.drawing.curve import CurveDrawing, force_axis, rounded, strai
 from live.ui.rerun.drawing.layout import BAR_HEIGHT, BAR_LABEL, BAR_TOP, blueprint
 from live.ui.rerun.drawing.scene import ViewScene
 from live.ui.rerun.drawing.sinks import _columns
-from live.ui.rerun.messages import PictureMessage, ViewSetup
+from live.ui.rerun.messages import LargeFigures, PictureMessage, ViewSetup
 from tests.live.made_up import START, make_grid
 
 pytest.importorskip("rerun")
@@ -229,7 +229,7 @@ def test_an_event_is_a_line_with_its_time_and_its_level(level: Any, shown: str) 
 
 def test_the_figures_and_the_card() -> None:
     scene, sink, _ = made()
-    scene.figures(Snapshot(START + 2.0, "REC", valid=1, zois=1, alarms=("limit",)))
+    scene.figures(LargeFigures.of(Snapshot(START + 2.0, "REC", valid=1, zois=1, alarms=("limit",))))
     assert sink.times == [2.0] and sink.image("figures")[0, -1, 2] > 150
     scene.status("**well**")
     assert sink.last("status", "text") == ["**well**"] and sink.last("status", "media_type") == [

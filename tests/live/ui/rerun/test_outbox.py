@@ -64,7 +64,7 @@ def test_small_things_go_first_and_each_once() -> None:
         "MEANS", "LOADS", "EVENTS", "STATUS", "FIGURES", "FIELD", "PICTURE",
     ]  # fmt: skip
     assert rows_of(found[1]) == [(START, 5.0), (START + 1, 6.0)] and events_of(found[2]) == [EVENT]
-    assert found[3].meta["markdown"] == "**well**" and figures_of(found[4]).figure("force").value == 7.0
+    assert found[3].meta["markdown"] == "**well**" and figures_of(found[4]).cells[2][1] == "7.0"
     assert all_of(outbox, 100.0) == [] and outbox.sent == {Kind.FIELD: 1, Kind.PICTURE: 1}
 
 

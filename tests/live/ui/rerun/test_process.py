@@ -99,7 +99,7 @@ def test_pictures_fields_and_figures_are_drawn() -> None:
     assert [name for name, _ in scene.told] == ["picture", "field", "figures"]
     assert isinstance(picture, PictureMessage) and (picture.t, picture.bits) == (START + 1.0, 12)
     assert t == m.t and np.array_equal(field.eyy, m.field.eyy, equal_nan=True)
-    assert (figures.state, figures.valid, figures.zois, figures.figure("force").value) == ("REC", 3, 4, 7.0)
+    assert (figures.line, figures.cells[2][1]) == ("3 of 4 ZOIs, 1 LOST", "7.0")
 
 
 def test_it_draws_until_the_end_and_says_so() -> None:

@@ -60,7 +60,7 @@ def test_mean_and_bending_and_what_each_camera_does() -> None:
     both = {"axial": (2e-3, -1e-4, 2e-6), "wide": (5e-3, 3e-4, 2e-5)}
     assert in_ascii(cameras_line(sides, both, 220, "waits")) == (
         "REC  1:15  1234.5 N  waits  axial 2000 +- 2 um/m, bending -100 +- 2 um/m  wide 5000 +- 20 um/m, "
-        "bending 300 +- 20 um/m  front 30/34 ZOIs  skipped 2  lost 0  back 29/34 ZOIs  skipped 2  LOST 3"
+        "bending 300 +- 20 um/m  front 30/34 ZOIs  SKIPPED 2  lost 0  back 29/34 ZOIs  SKIPPED 2  LOST 3"
     )
     short = in_ascii(cameras_line(sides, both, 110))
     assert "axial 2000" in short and "wide" not in short and "LOST 3" in short
@@ -132,7 +132,7 @@ def test_the_line_of_a_live_run_by_its_state() -> None:
     line = status_line(
         shot(axis="x", axis_assumed=True, figures={"fps": 29.6}, counts={"unrecorded": 2}), 300
     )
-    assert "axis x assumed" in line and "30 fps" in line and "LOST 2" in line and "disk" not in line
+    assert "axis x assumed" in line and "frames/s 30" in line and "LOST 2" in line and "disk" not in line
     early = status_line(shot(time_step=None, axis_assumed=True, alarms=("a", "b")), 300)
     assert early.startswith("ALARM a ALARM b  REC") and "80 frames" in early and "assumed" not in early
 

@@ -95,7 +95,7 @@ def snapshot(**more: Any) -> Snapshot:
 def test_a_wide_status_line_has_everything() -> None:
     assert in_ascii(status_line(snapshot(peak_N=1500.0), 200)) == (
         "REC  1:15  1234.5 N  30.9 MPa  peak 1500.0 N  eyy -2000.0 +- 0.6 um/m  exx 100 +- 10 um/m  exy 0 um/m"
-        "  8/10 ZOIs  30 fps  measured 120  skipped 8  lost 0  p95 42 ms  disk 120 min"
+        "  8/10 ZOIs  frames/s 30  measured 120  SKIPPED 8  lost 0  delay 42 ms  disk 120 min"
     )
 
 

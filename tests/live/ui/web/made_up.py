@@ -9,7 +9,11 @@ from typing import Any
 
 from analysis.evaluate import GAUGE_KINDS
 from live.config.loading import load_config
+from live.pipeline.snapshot import Snapshot
+from live.ui.web.broadcaster import plain
+from live.ui.web.page_consumer import fact
 from live.ui.web.page_controller import PageController
+from tests.live.made_up import figures as made_figures
 from tests.live.ui.web.browser import Page
 
 KINDS = [{"kind": n, "label": k.label, "hint": k.hint, "gesture": k.gesture} for n, k in GAUGE_KINDS.items()]
@@ -23,9 +27,7 @@ STAGE = {
 }  # fmt: skip
 POINTS = [[0.0, 0.0, 0.0, 0.0], [1.0, 100e6, 1500e-6, 1490e-6], [2.0, 267.84e6, 19.988e-2, 19.994e-2]]
 """Rows of the curve: time s, stress Pa, axial strain, a gauge."""
-COUNTS = {
-    "grabbed": 880, "recorded": 876, "measured": 870, "skipped": 0, "lost": 3, "unrecorded": 2, "without_force": 0,
-}  # fmt: skip
+COUNTS = {"recorded": 876, "skipped": 0, "lost": 3, "unrecorded": 2, "without_force": 0}
 MAP = {
     "n": 5, "of": "eyy", "range": "automatic", "width": 256, "height": 192, "low": 0.185, "high": 0.215,
     "strain": True, "unit": "", "histogram": [0] * 23 + [9], "gauges": {},
@@ -49,6 +51,13 @@ def figure(value: float | None, sigma: float | None = None, **more: Any) -> dict
     return found | more
 
 
+def facts(delay_s: float = 0.044, **counts: int) -> list[dict[str, Any]]:
+    """The small figures, as the program sends them."""
+    now = made_figures(fps=10.0, disk=960 * 60.0, burst=1.0)
+    snapshot = Snapshot(0.0, figures=now, frames=COUNTS | counts, latency_p95_s=delay_s)
+    return plain([fact(row) for row in snapshot.rows("page")])  # type: ignore[no-any-return]
+
+
 def run_state(**more: Any) -> dict[str, Any]:
     """A test that measures."""
     axial = {"name": "area", "value": 19.988e-2, "sigma": 2e-5, "assumed": ""}
@@ -59,7 +68,7 @@ def run_state(**more: Any) -> dict[str, Any]:
         },
         "axial": axial, "gauges": [{"name": "width", "value": -7.703e-2, "sigma": 2e-6, "reason": "", "part": ""}],
         "strain_rate": 3.1e-3, "elongation_mm": 6.33, "points": [1, len(POINTS)], "picture": MAP, "events": [],
-        "late_s": 0.044, "fps": 10.0, "ledger": COUNTS, "disk_min": 960.0, "sides": None, "valid": 3000, "zois": 3000,
+        "facts": facts(), "sides": None, "valid": 3000, "zois": 3000,
         "part": "",
     } | more  # fmt: skip
 

@@ -95,8 +95,9 @@ def test_the_state_of_a_run(config: Config) -> None:
     consumer.idle()
     state = received["run"]
     assert isinstance(state, dict)
-    assert state["force_N"] == -400 and state["peak_N"] == 500 and state["stress_Pa"] == pytest.approx(-1e7)
-    assert state["axial"] == {"name": "axial", "value": 0.001, "sigma": 2e-6, "assumed": ""}
+    assert state["peak_N"] == 500 and state["axial"] == {"name": "axial", "assumed": ""}
+    found = {name: (one["value"], one["sigma"]) for name, one in state["figures"].items()}
+    assert found == {"force": (-400, None), "stress": (pytest.approx(-1e7), None), "axial": (0.001, 2e-6)}
     lost = {"name": "b", "value": None, "sigma": None, "reason": "lost", "part": "", "colour": None}
     assert state["gauges"][1] == lost
     assert state["part"] == state["gauges"][0]["part"] == Message("of {share} % of the area", 83).to_json()
@@ -306,9 +307,10 @@ def test_a_recording_shows_figures_of_one_instant(config: Config) -> None:
     run.run_state.history.add(m.time_step)
     consumer.matched(m)
     state = consumer.state()
-    assert state["force_N"] == state["peak_N"] == 1234.0 and state["stress_Pa"] == pytest.approx(1234 / 40e-6)
-    assert math.isnan(state["late_s"])
-    assert consumer.curve.since(0, 0)["rows"][-1][1] == pytest.approx(state["stress_Pa"])
+    force, stress = (state["figures"][name]["value"] for name in ("force", "stress"))
+    assert force == state["peak_N"] == 1234.0 and stress == pytest.approx(1234 / 40e-6)
+    assert "delay" not in {one["label"] for one in state["facts"]}
+    assert consumer.curve.since(0, 0)["rows"][-1][1] == pytest.approx(stress)
 
 
 def test_a_gauge_has_its_stored_colour_and_the_force_the_range_of_its_cell() -> None:

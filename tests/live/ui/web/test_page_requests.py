@@ -55,7 +55,7 @@ def test_requests_name_their_camera() -> None:
     both.attach(test)
     assert back.state()["sides"] is None and front.state()["sides"] is not None
     states["back"].history.add(pictured(strain=4e-3).time_step)
-    assert back.state()["axial"]["value"] == pytest.approx(4e-3) and "axial" not in front.state()
+    assert back.state()["figures"]["axial"]["value"] == pytest.approx(4e-3) and "axial" not in front.state()
 
 
 @pytest.mark.parametrize(
