@@ -12,10 +12,18 @@ from live.config.cameras import BACK, FRONT
 from live.pipeline.measurement import AXIAL
 from live.results.figures import headline
 from live.results.maps.colours import Unit
-from live.results.report.curves import TIME, axial_label, force_unit, load_labels, strain_label, strain_unit
+from live.results.report.curves import (
+    TIME,
+    axial_label,
+    force_unit,
+    load_labels,
+    plots,
+    strain_label,
+    strain_unit,
+)
 from live.results.report.evaluation import EvaluatedCurve, intercept_of
 from live.results.report.page import Html, element, page, paragraph, section, table
-from live.results.report.report import Report, budget_table, plots
+from live.results.report.report import Report, budget_table
 from live.results.report.svg import COLOURS, Array, Plot, PlotLine
 from live.results.run_folder import RunFolder
 from live.results.sides.together import SidesOfTest, at_end
