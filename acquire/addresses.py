@@ -171,12 +171,7 @@ class Options:
         self, key: str, default: None = None, *, minimum: float = ..., maximum: float = ...
     ) -> float | None: ...
     def number(
-        self,
-        key: str,
-        default: float | None = None,
-        *,
-        minimum: float = -math.inf,
-        maximum: float = math.inf,
+        self, key: str, default: float | None = None, *, minimum: float = -math.inf, maximum: float = math.inf
     ) -> float | None:
         """A finite number within bounds, or ``default`` where it is not given."""
         return self.read(key, default, lambda word: number_of(word, minimum, maximum))
@@ -188,12 +183,7 @@ class Options:
         self, key: str, default: None = None, *, minimum: int = ..., maximum: int = ...
     ) -> int | None: ...
     def integer(
-        self,
-        key: str,
-        default: int | None = None,
-        *,
-        minimum: float = -math.inf,
-        maximum: float = math.inf,
+        self, key: str, default: int | None = None, *, minimum: float = -math.inf, maximum: float = math.inf
     ) -> int | None:
         """A whole number within bounds, or ``default`` where it is not given."""
         return self.read(key, default, lambda word: integer_of(word, minimum, maximum))

@@ -1,4 +1,4 @@
-"""Errors a person can act on.
+"""Errors a person can act on, and the exit codes.
 
 Each message names the device or file, says what happened and what to do next.
 Whatever is not one of these is a defect of ours and reaches main with its
@@ -7,9 +7,24 @@ traceback in the log.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from acquire.text import Message
+
+DEFECT, USAGE, DEVICE, DATA, LOSS, NOT_READY, EXIT_INTERRUPTED = 1, 2, 3, 4, 5, 6, 130
+
+EXIT_CODES = """exit codes:
+  0 success   1 a defect of phasedic   2 usage or configuration   3 device   4 file or data
+  5 finished with loss, or nothing measured   6 not ready (check, self-test)   130 interrupted, closed cleanly
+"""
+
+EXIT_WORDS = {
+    DEFECT: "a defect of phasedic, see the log",
+    DEVICE: "the camera was lost before the end",
+    LOSS: "finished with loss or nothing measured; summary, frame counts and events show what is missing",
+    EXIT_INTERRUPTED: "interrupted; everything was closed cleanly",
+}
 
 
 class Spoken(Exception):
@@ -29,13 +44,13 @@ class Spoken(Exception):
 class PhasedicError(Spoken):
     """Base of all errors a person can act on; ``exit_code`` is what the process ends with."""
 
-    exit_code = 1
+    exit_code = DEFECT
 
 
 class ConfigError(PhasedicError):
     """Usage or configuration: an unknown key, an impossible value, a malformed address."""
 
-    exit_code = 2
+    exit_code = USAGE
 
 
 class TooLittleMemory(ConfigError):
@@ -45,22 +60,35 @@ class TooLittleMemory(ConfigError):
 class DeviceError(PhasedicError):
     """A camera or load cell that cannot be opened, or is gone for good."""
 
-    exit_code = 3
+    exit_code = DEVICE
 
 
 class DataError(PhasedicError):
     """A file or its content: missing, truncated, foreign, or not of the kind it claims to be."""
 
-    exit_code = 4
+    exit_code = DATA
 
 
 class MachineUnfit(PhasedicError):
     """This machine computes wrong numbers: not ready, whatever is measured with whatever device."""
 
-    exit_code = 6
+    exit_code = NOT_READY
 
 
 class Interrupted(PhasedicError):
     """A person or the system ended it before there was anything to close."""
 
-    exit_code = 130
+    exit_code = EXIT_INTERRUPTED
+
+
+def exit_code_of(error: BaseException) -> int:
+    """That of an error: its own, else a defect."""
+    return error.exit_code if isinstance(error, PhasedicError) else DEFECT
+
+
+def exit_code_of_all(codes: Iterable[int]) -> int:
+    """That of a test, from those of its cameras: finished with loss where one failed and another did not."""
+    found = {*codes}
+    if len(found) == 1:
+        return found.pop()
+    return next((one for one in (DEFECT, EXIT_INTERRUPTED) if one in found), LOSS)

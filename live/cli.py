@@ -11,13 +11,12 @@ import sys
 from collections.abc import Sequence
 from typing import TextIO
 
-from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.errors import DEFECT, EXIT_INTERRUPTED, ConfigError, DataError, PhasedicError
 from acquire.text import Message
 from acquire.text.message import about
 from acquire.text.printable import brief, printable
 from live.commands.arguments import Command, parse
 from live.commands.environment import check_environment, limit_resources
-from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.signals import ended_by_sigterm
 from live.commands.streams import nonblocking_streams
 from live.words.language import said_here
@@ -109,7 +108,7 @@ def _run(command: Command, arguments: argparse.Namespace) -> int:
         return _refused(_system_error(error))
     except Exception:
         logging.getLogger("live").exception("a defect of phasedic; please report it with this traceback")
-        return 1
+        return DEFECT
 
 
 def _system_error(error: OSError) -> PhasedicError:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
@@ -13,11 +16,16 @@ from _pytest.runner import runtestprotocol
 # the time of the tests, and more of a busy machine. Set before numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# No example has a time limit of its own, which a busy machine would exceed; pytest's is that of the whole test.
-hypothesis.settings.register_profile(
-    "any machine", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
-)
-hypothesis.settings.load_profile("any machine")
+# No example has a time limit of its own, which a busy machine would exceed; pytest's is that of the whole test. One
+# state of the code has one answer; ``--hypothesis-profile explore`` draws new examples.
+for profile, fixed in (("same examples", True), ("explore", False)):
+    hypothesis.settings.register_profile(
+        profile,
+        deadline=None,
+        derandomize=fixed,
+        suppress_health_check=[hypothesis.HealthCheck.too_slow],
+    )
+hypothesis.settings.load_profile("same examples")
 
 MEASURING = {"accuracy", "adversary", "analysis", "bench", "contracts", "live"}
 
@@ -80,6 +88,24 @@ def no_cameras_of_the_network(monkeypatch: pytest.MonkeyPatch) -> None:
     """Tests ask no network for cameras, but for their own (``make genicam-test``)."""
     if not os.environ.get("PHASEDIC_IN_NAMESPACE"):
         monkeypatch.setattr("acquire.genicam.listing.list_cameras", list)
+
+
+@pytest.fixture(autouse=True)
+def every_frame_is_counted(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Whatever a test does to a live run, its counts add up at the end."""
+    module, wrong = sys.modules.get("live.run.camera_run"), list[str]()
+    if module is not None:
+        outcome = module.CameraRun.outcome
+
+        def checked(run: Any) -> Any:
+            found = outcome(run)
+            counts = found.run_state.frame_counts
+            wrong.extend([] if counts.adds_up else [counts.line()])
+            return found
+
+        monkeypatch.setattr(module.CameraRun, "outcome", checked)
+    yield
+    assert not wrong
 
 
 @pytest.fixture(scope="session")

@@ -66,10 +66,7 @@ def masks(names: Sequence[str]) -> set[str]:
 
 
 def in_order(
-    names: Sequence[str],
-    times: Callable[[], Sequence[float]],
-    by: str = AUTO,
-    first: str | None = None,
+    names: Sequence[str], times: Callable[[], Sequence[float]], by: str = AUTO, first: str | None = None
 ) -> list[int]:
     """Places of ``names`` in the order of the test; a picture that is called reference is the first.
 

@@ -11,7 +11,7 @@ import math
 import threading
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -254,78 +254,57 @@ def _last_lines(samples: Sequence[LoadSample]) -> tuple[bytes, ...]:
     return tuple(newest)[:LINES_SHOWN][::-1]
 
 
-def _remarks(found: LoadReport, samples: Sequence[LoadSample], digit_N: float) -> list[str]:
+def _remarks(found: LoadReport, samples: Sequence[LoadSample], digit_N: float) -> Iterator[Message]:
     if not samples:
-        return [
-            Message("nothing came: check cable, port, baud, and whether the device must be asked (mode=poll)")
-        ]
+        yield Message(
+            "nothing came: check cable, port, baud, and whether the device must be asked (mode=poll)"
+        )
+        return
     if not found.good:
-        return [
-            Message(
-                "lines came, but no value: check protocol, baud, parity and column against the lines above"
-            )
-        ]
-    remarks: list[str] = []
+        yield Message(
+            "lines came, but no value: check protocol, baud, parity and column against the lines above"
+        )
+        return
     bad = sum(LoadFlag.ERROR in sample.flags for sample in samples)
+    old = sum(LoadFlag.STALE in sample.flags and not math.isnan(sample.force) for sample in samples)
     beyond = sum(bool(sample.flags & (LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD)) for sample in samples)
     if bad:
-        remarks.append(
-            Message(
-                "{bad} of {samples} lines gave no value: noise on the line, or another grammar",
-                bad,
-                found.samples,
-            )
+        yield Message(
+            "{bad} of {samples} lines gave no value: noise on the line, or another grammar",
+            bad,
+            found.samples,
         )
-    old = sum(LoadFlag.STALE in sample.flags and not math.isnan(sample.force) for sample in samples)
     if 2 * old > found.good:
-        remarks.append(
-            Message(
-                "{old} of {good} values are of unknown age (STALE): the device should send each line at once, or its "
-                "own time with it (millis=)",
-                old,
-                found.good,
-            )
+        yield Message(
+            "{old} of {good} values are of unknown age (STALE): the device should send each line at once, or its "
+            "own time with it (millis=)",
+            old,
+            found.good,
         )
     if beyond:
-        remarks.append(
-            Message("{beyond} samples in overload or saturated: unload the cell, or check its wiring", beyond)
+        yield Message(
+            "{beyond} samples in overload or saturated: unload the cell, or check its wiring", beyond
         )
     if found.rate < SLOW_HZ or math.isnan(found.rate):
-        remarks.append(
-            Message(
-                "only {rate:.3g} samples a second: the force at a burst is interpolated over long gaps",
-                found.rate,
-            )
+        yield Message(
+            "only {rate:.3g} samples a second: the force at a burst is interpolated over long gaps",
+            found.rate,
         )
-    remarks += _silences(found)
-    if found.moved_N > max(10 * found.noise_N, 5 * digit_N):
-        lowest, highest = f"{found.lowest_N:.6g}", f"{found.highest_N:.6g}"
-        remarks.append(
-            Message(
-                "the force ran between {lowest} and {highest} N: leave the load still, or look for a drift",
-                lowest,
-                highest,
-            )
-        )
-    if found.unique == 1 and found.good >= STUCK:
-        remarks.append(Message("every value is the same: a frozen display, or far too coarse for this load"))
-    return remarks
-
-
-def _silences(found: LoadReport) -> list[str]:
     usual = 0.25 if math.isnan(found.rate) else max(5 / found.rate, 0.25)
     if found.silent_s > usual:
-        return [
-            Message(
-                "silence for the last {silent_s:.2f} s: the device stopped sending; power, cable?",
-                found.silent_s,
-            )
-        ]
-    if found.longest_s > usual:
-        return [
-            Message("a gap of {longest_s:.2f} s: across such gaps the force is not known", found.longest_s)
-        ]
-    return []
+        yield Message(
+            "silence for the last {silent_s:.2f} s: the device stopped sending; power, cable?", found.silent_s
+        )
+    elif found.longest_s > usual:
+        yield Message("a gap of {longest_s:.2f} s: across such gaps the force is not known", found.longest_s)
+    if found.moved_N > max(10 * found.noise_N, 5 * digit_N):
+        yield Message(
+            "the force ran between {lowest} and {highest} N: leave the load still, or look for a drift",
+            f"{found.lowest_N:.6g}",
+            f"{found.highest_N:.6g}",
+        )
+    if found.unique == 1 and found.good >= STUCK:
+        yield Message("every value is the same: a frozen display, or far too coarse for this load")
 
 
 def report_lines(found: LoadReport) -> list[str]:

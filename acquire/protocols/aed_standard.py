@@ -77,12 +77,6 @@ PROTOCOL = Protocol(
     baud=2400,
     bytesize=7,
     parity="E",
-    commands={
-        "poll": b"Q\r\n",
-        "single": b"Q\r\n",
-        "start": b"SIR\r\n",
-        "tare": b"T\r\n",
-        "zero": b"Z\r\n",
-    },
+    commands={"poll": b"Q\r\n", "single": b"Q\r\n", "start": b"SIR\r\n", "tare": b"T\r\n", "zero": b"Z\r\n"},
     undetected=Message("transmission errors are not detected: a changed digit reads as another value"),
 )

@@ -24,6 +24,7 @@ from acquire.frame import CameraInfo, Clock
 from acquire.hdf5 import NO_UNIT, Declared, new_group, new_json, set_attributes, to_json
 from acquire.load_sample import LoadCellInfo, LoadFlag
 from acquire.record_mode import RecordMode
+from acquire.text.message import kept
 
 MAX_BURST_FRAMES = 65536
 
@@ -290,7 +291,7 @@ def _create_load(entry: h5py.Group, checksum: bool) -> None:
 
 def event_rows(event: Event, start: float) -> NDArray[np.bytes_]:
     """An event as rows of the events dataset: (n,) of EVENT_BYTES each."""
-    texts = {"kind": event.kind.value, "level": event.level, "source": event.source, "text": event.text}
+    texts = {"kind": event.kind.value, "level": event.level, "source": event.source, **kept(event.text)}
     stamped = {"time_s": event.t - start, "monotonic_s": event.t, **texts, "data": event.data}
     text = to_json(stamped).encode("ascii")
     rows = [text[:EVENT_BYTES]]

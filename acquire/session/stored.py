@@ -27,7 +27,7 @@ from acquire.load_sample import LoadCellInfo
 from acquire.session import layout
 from acquire.session.oddities import Oddities
 from acquire.text import Message
-from acquire.text.message import about
+from acquire.text.message import about, taken
 
 ROOT = {
     "format_version": Declared("int", (), 1),
@@ -233,15 +233,7 @@ def usable(
     outside = {name: what.outside(table[name]) for name, what in declared.items()}
     beyond = np.logical_or.reduce([*outside.values()], axis=0)
     if whole and beyond.any():
-        raise DataError(
-            _beyond(
-                about(group.file.filename, group.name),
-                table,
-                outside,
-                declared,
-                first,
-            )
-        )
+        raise DataError(_beyond(about(group.file.filename, group.name), table, outside, declared, first))
     return np.asarray(~(beyond | np.isnan(table["monotonic_s"])), np.bool_)
 
 
@@ -346,7 +338,7 @@ def _event_from(text: bytes, where: str) -> Event | None:
     if kind in _NAMES_A_BURST:
         check_object(values["data"], BURST_FIELDS, where)
     return Event(
-        values["monotonic_s"], kind, values["source"], values["text"], values["level"], values["data"]
+        values["monotonic_s"], kind, values["source"], taken(values), values["level"], values["data"]
     )
 
 

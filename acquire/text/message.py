@@ -14,8 +14,11 @@ from typing import Any, Self
 
 from acquire.text.quantity import Amount
 
-FIELD = re.compile(r"\{\{|\}\}|\{(\w+)(?::([^{}]*))?\}")
-"""A named field of a template, with its format, or a doubled brace, which is one of the text."""
+FIELD = re.compile(r"\{\{|\}\}|\{(\w+)(?::((?:(?!\d{3})[^{}])*))?\}")
+"""A named field of a template, with its format (of a file's, no width of a gigabyte), or a doubled brace, which is one
+of the text."""
+MOST = 20_000
+"""Letters of a message from a file."""
 SAY, WITH = "say", "with"  # keys of a message as JSON
 QUANTITY = Amount("strain", 0.0).to_json().keys()
 
@@ -118,11 +121,31 @@ def _plain(value: Any) -> Any:
 def from_json(value: Any) -> Any:
     """The message or quantity of such an object, else the value as it is; fit for ``object_hook`` of ``json.loads``."""
     if isinstance(value, dict) and value.keys() == {SAY, WITH}:
-        return Message(value[SAY], **{key: from_json(one) for key, one in value[WITH].items()})
+        values = {key: from_json(one) for key, one in value[WITH].items()}
+        if sum(len(str(values[field[1]])) for field in FIELD.finditer(value[SAY]) if field[1]) > MOST:
+            raise ValueError("a text that grows without end")
+        return Message(value[SAY], **values)
     if isinstance(value, dict) and "kind" in value and value.keys() == QUANTITY:
         known: dict[str, Any] = {key: math.nan if one is None else one for key, one in value.items()}
-        return Amount(**known)
+        if known["digits"] in (1, 2):
+            return Amount(**known)
     return value
+
+
+def kept(text: str) -> dict[str, Any]:
+    """A text for a file: its English words, and the message that it is, where that has values."""
+    return {"text": str(text)} | (
+        {"message": text.to_json()} if isinstance(text, Message) and text.values else {}
+    )
+
+
+def taken(stored: Mapping[str, Any]) -> str:
+    """The text of ``kept``: the message where it has the same words, else the words."""
+    try:
+        text = from_json(stored["message"])
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError):
+        text = None
+    return text if isinstance(text, Message) and text == stored["text"] else str(stored["text"])
 
 
 def joined(between: str, parts: Iterable[str | Amount]) -> Message:

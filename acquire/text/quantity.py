@@ -19,6 +19,8 @@ MOST_DECIMALS = 6
 IN_ASCII = str.maketrans({"µ": "u", PLUS_MINUS: "+-", UNKNOWN: "-", MINUS: "-", GAP: ""})
 """For a terminal that shows no others."""
 _COMMA = ("de", "fr")
+_WHOLE = 1e15
+"""From here on not every whole number is a float: four digits and a power of ten."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,8 +136,13 @@ def number(value: float, decimals: int = 0, language: str = "en") -> str:
     """A number to so many decimals, negative ones of tens; ``UNKNOWN`` where it is not finite."""
     if not math.isfinite(value):
         return UNKNOWN
-    size = Decimal(abs(float(value))).quantize(Decimal(1).scaleb(-decimals), ROUND_HALF_UP)
-    text = f"{size:,f}".replace(",", GAP).replace(".", decimal_mark(language))
+    size = abs(float(value))
+    if size < _WHOLE:
+        exact = Decimal(size).quantize(Decimal(1).scaleb(-decimals), ROUND_HALF_UP)
+        size, text = float(exact), f"{exact:,f}".replace(",", GAP)
+    else:
+        text = f"{size:.3e}"
+    text = text.replace(".", decimal_mark(language))
     return MINUS + text if value < 0 and size else text
 
 

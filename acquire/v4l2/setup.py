@@ -9,13 +9,7 @@ from acquire.errors import ConfigError, DeviceError
 from acquire.frame import CameraSetting
 from acquire.text import Message
 from acquire.v4l2 import api
-from acquire.v4l2.controls import (
-    Control,
-    apply_controls,
-    changeable,
-    exposure_s,
-    still_automatic,
-)
+from acquire.v4l2.controls import Control, apply_controls, changeable, exposure_s, still_automatic
 from acquire.v4l2.device import Mode, V4L2Device
 from acquire.v4l2.formats import FORMATS, PixelFormat, preferred, warning_of
 from acquire.v4l2.settings import V4L2Settings

@@ -188,10 +188,7 @@ def chord(loading: Loading, line: FittedLine, beyond: float = 0.0) -> Figure:
     """
     (e0, e1), (s0, s1) = (
         _ends(values, line, sigma)
-        for values, sigma in (
-            (loading.strain, loading.noise_strain),
-            (loading.stress, loading.noise_stress),
-        )
+        for values, sigma in ((loading.strain, loading.noise_strain), (loading.stress, loading.noise_stress))
     )
     rise, run = s1.value - s0.value, e1.value - e0.value
     if not (rise > 0 and run > 0):

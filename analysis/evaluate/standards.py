@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from acquire.text import Message
+
 PER_MINUTE = 1 / 60
 
 
@@ -75,7 +77,9 @@ class Standard:
 
 
 # ISO 6892-1:2019, 10.3.2: method A, tolerance 20 %.
-_RANGES = tuple(_about(f"range {k}", rate) for k, rate in enumerate((0.00007, 0.00025, 0.002, 0.0067), 1))
+_RANGES = tuple(
+    _about(Message("range {k}", k), rate) for k, rate in enumerate((0.00007, 0.00025, 0.002, 0.0067), 1)
+)
 
 STANDARDS = {
     standard.name: standard

@@ -13,13 +13,7 @@ from numpy.typing import NDArray
 from analysis.field import Status, profile
 from analysis.fit.kernel_args import NormalArgs, ReferenceImages, WindowRows
 from analysis.fit.noise_bias import noise_bias
-from analysis.fit.validity import (
-    CLIPPED_SHARE,
-    SHOWN_SHARE,
-    has_pattern,
-    information,
-    least_information,
-)
+from analysis.fit.validity import CLIPPED_SHARE, SHOWN_SHARE, has_pattern, information, least_information
 from analysis.kernel.images import (
     NoiseModel,
     continue_rim,

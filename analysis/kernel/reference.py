@@ -138,11 +138,7 @@ class ReferencePicture:
         return _laid_out(whole, grid, settings, model, prepared, cleaned is not None)
 
     def renewed(
-        self,
-        image: Image,
-        field: StrainField,
-        noise: Noise | None,
-        clipped: NDArray[np.bool_] | None,
+        self, image: Image, field: StrainField, noise: Noise | None, clipped: NDArray[np.bool_] | None
     ) -> ReferencePicture:
         """The reference that goes on from a later picture; parameters as for ``PhaseKernel.renewed``."""
         settings, size = self.settings, self.grid.size

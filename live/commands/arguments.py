@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from acquire.errors import PhasedicError
+from acquire.errors import EXIT_CODES, PhasedicError
 from acquire.text import Message
-from live.commands.exit_codes import EXIT_CODES
 from live.commands.words import understood
 from live.words.language import said_here
 
@@ -84,10 +83,7 @@ COMMANDS = {
         "live.commands.export", "export a finished run as csv, npz, mat, vtk, tiff, png, mp4, gif, r3xa"
     ),
     "report": Entry("live.commands.report", "report one or several finished runs as a page: HTML, PDF"),
-    "characterise": Entry(
-        "live.commands.characterise",
-        "measure the accuracy that your own pattern allows",
-    ),
+    "characterise": Entry("live.commands.characterise", "measure the accuracy that your own pattern allows"),
     "inspect": Entry("live.commands.inspect", "show one ZOI of a session: its spectrum and phases"),
     "init": Entry(
         "live.commands.init", "find devices and specimen and write a rig.toml: region, ZOIs, gauges"

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from acquire.text import Message
 from live.commands.signals import signals
 from live.config.loading import Config
 from live.pipeline.screen import Screen
@@ -58,7 +59,7 @@ def page_opened(controller: PageController, screen: Screen) -> Iterator[None]:
                 f'<meta http-equiv="refresh" content="0; url={controller.address}">', encoding="ascii"
             )
             threading.Thread(target=_open, args=(way.as_uri(), screen), name="browser", daemon=True).start()
-        screen.print(f"the page: {controller.address}")
+        screen.print(Message("the page: {address}", controller.address))
         yield
 
 

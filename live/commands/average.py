@@ -21,19 +21,15 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic average``: average frames to a dark frame (lens covered) or a flat frame (evenly lit)."""
     from acquire.burst import average_bursts, compile_loops, save_mean
     from acquire.errors import DataError
-    from live.setup.devices import at_rest, open_rig
     from live.setup.dry_run import picture_kinds
+    from live.setup.frames import camera_of, frames_of
 
     screen = TerminalScreen()
     given = getattr(arguments, "camera.crop")
     crop = tuple(given) if given else None
-    rig = open_rig(at_rest(arguments.camera), "none:", lambda event: screen.print(event.text), crop=crop)
-    try:
-        compile_loops(picture_kinds(rig.camera.info)[:1])
-        with rig.camera:
-            burst = next(average_bursts(rig.camera, arguments.frames), None)
-    finally:
-        rig.close()
+    with camera_of(arguments.camera, lambda event: screen.print(event.text), crop=crop) as camera:
+        compile_loops(picture_kinds(camera.info)[:1])
+        burst = next(average_bursts(frames_of(camera), arguments.frames), None)
     if burst is None:
         raise DataError(
             "{camera}: gave fewer than {n} frames without a gap", arguments.camera, arguments.frames

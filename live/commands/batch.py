@@ -8,9 +8,8 @@ import threading
 from dataclasses import replace
 from pathlib import Path
 
-from acquire.errors import ConfigError
+from acquire.errors import EXIT_WORDS, LOSS, ConfigError
 from acquire.system import cores
-from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import (
     FORCES,
     OF_PICTURES,
@@ -90,7 +89,7 @@ def command(arguments: argparse.Namespace) -> int:
         done = run_campaign(request, screen, stopping)
     for path in done.files:
         screen.print(f"  {path}")
-    if done.exit_code == 5:
+    if done.exit_code == LOSS:
         screen.print("exit code 5: tests failed or have losses; see the column error")
     elif done.exit_code in EXIT_WORDS:
         screen.print("exit code 130: interrupted; finished tests are kept, the same call does the rest")

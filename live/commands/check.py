@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.errors import ConfigError
+from acquire.errors import NOT_READY, ConfigError
 from acquire.files.picture import write_picture
 from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
+from acquire.text import Message
 from live.commands.check_watch import watch
-from live.commands.exit_codes import NOT_READY
 from live.commands.options import (
     MEASURE,
     PICTURES,
@@ -36,8 +36,8 @@ from live.setup.check.disk import disk_lines, write_rate
 from live.setup.check.sample import take
 from live.setup.check.verdict import DEFAULT_TARGET, check_lines
 from live.setup.devices import check_load_port, open_load
+from live.setup.frames import report_warnings
 from live.setup.placement import with_auto_gauges
-from live.setup.region import report_warnings
 from live.setup.specimen_drawing import Overlay, snapshot
 from live.ui.terminal.screen import TerminalScreen
 
@@ -127,7 +127,7 @@ def _shown(
     """
     if path is not None:
         write_picture(path, _drawn(figures, config, target))
-        screen.print(f"written: {path}")
+        screen.print(Message("written: {path}", path))
     lines = [*check_lines(figures, target, config.measure.reference_shift_px), *disk_lines(rate, config)]
     budget = budget_lines(figures, config)
     for line in [
@@ -143,11 +143,13 @@ def _shown(
 
 def _verdict(cameras: Sequence[CheckFigures], ready: bool) -> str:
     if not ready:
-        return "NO-GO: not ready, see the lines with LOOK above"
+        return Message("NO-GO: not ready, see the lines with LOOK above")
     if few := [figures.stack for figures in cameras if figures.stack.few]:
-        open_points = "noise in time, flicker, drift and vibration are not measured"
-        return f"GO, as far as {few[0].count_text} can show: {open_points}"
-    return "GO: ready"
+        return Message(
+            "GO, as far as {pictures} can show: noise in time, flicker, drift and vibration are not measured",
+            few[0].count_text,
+        )
+    return Message("GO: ready")
 
 
 def _drawn(figures: CheckFigures, config: Config, target: float | None) -> NDArray[np.uint8]:

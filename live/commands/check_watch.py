@@ -19,8 +19,7 @@ from live.setup.check.check_list import CheckFigures
 from live.setup.check.disk import disk_lines, write_rate
 from live.setup.check.quick_check import QUICK_FRAMES, QuickCheck, QuickChecker, RollingFrames
 from live.setup.check.verdict import check_lines
-from live.setup.devices import at_rest, open_rig
-from live.setup.region import report_warnings
+from live.setup.frames import camera_of, report_warnings
 from live.ui.rerun.messages import ViewSetup
 from live.ui.rerun.view import View, spawn_viewer
 
@@ -43,39 +42,32 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
     """
     frames = 2 * (config.measure.reference_burst or DEFAULT_REFERENCE_BURST)
     checker, display, notes = QuickChecker(config), RenewedLines(screen), list[str]()
-    rig = open_rig(
-        at_rest(config.camera.address), "none:", report_warnings(notes.append), crop=config.camera.crop
-    )
-    try:
-        with (
-            RollingFrames(rig.camera, frames, config.camera.address) as rolling,
-            _viewed(config, notes) as view,
-        ):
-            due = time.monotonic()
-            while not (stopped() or rolling.over):
-                stack = rolling.newest(QUICK_FRAMES)
-                if stack is not None:
-                    quick = checker.check(stack)
-                    lines = [
-                        *check_lines(quick.figures, target, config.measure.reference_shift_px),
-                        *disk_lines(write_rate(stack, config), config),
-                    ]
-                    shown = [
-                        *notes[-MAX_NOTES:],
-                        peak_line(quick),
-                        *blur_line(quick),
-                        *(line.text() for line in lines),
-                    ]
-                    display.lines(shown, short_line(quick, lines))
-                    view(rolling, quick, lines)
-                due = max(
-                    due + PERIOD_S, time.monotonic() - PERIOD_S
-                )  # a check that took longer is made up for
-                while not (stopped() or rolling.over) and time.monotonic() < due:
-                    time.sleep(0.02)
-            last = rolling.last(frames)
-    finally:
-        rig.close()
+    with (
+        camera_of(config.camera.address, report_warnings(notes.append), crop=config.camera.crop) as camera,
+        RollingFrames(camera, frames, config.camera.address) as rolling,
+        _viewed(config, notes) as view,
+    ):
+        due = time.monotonic()
+        while not (stopped() or rolling.over):
+            stack = rolling.newest(QUICK_FRAMES)
+            if stack is not None:
+                quick = checker.check(stack)
+                lines = [
+                    *check_lines(quick.figures, target, config.measure.reference_shift_px),
+                    *disk_lines(write_rate(stack, config), config),
+                ]
+                shown = [
+                    *notes[-MAX_NOTES:],
+                    peak_line(quick),
+                    *blur_line(quick),
+                    *(line.text() for line in lines),
+                ]
+                display.lines(shown, short_line(quick, lines))
+                view(rolling, quick, lines)
+            due = max(due + PERIOD_S, time.monotonic() - PERIOD_S)  # a check that took longer is made up for
+            while not (stopped() or rolling.over) and time.monotonic() < due:
+                time.sleep(0.02)
+        last = rolling.last(frames)
     display.end()
     return checker.full(last)
 

@@ -9,6 +9,7 @@ from functools import partial
 from acquire.addresses import Options, parse_address
 from acquire.events import EventKind, Level
 from acquire.serial_line.ports import LineSettings
+from acquire.text import Message
 from live.config.figures import DEFAULT_CHANNELS, OF_LOAD, joint_channels
 from live.config.gauges import gauge_colours, outlines
 from live.config.listen_address import ListenAddress, read_token
@@ -17,6 +18,7 @@ from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Compose, Consumer, RunInfo
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
+from live.pipeline.timed.response import shown_names
 from live.results.sides.channels import JointChannels
 from live.results.summary import StatusCard
 from live.results.writer import write_results
@@ -49,7 +51,10 @@ def signals_of(
                 opened.callback(out.end)
                 outputs.append(out)
                 out.tell = partial(_emit, run_state, out.name)
-                screen.print(f"{out.name}: strains and forces {out.to_whom}; it takes no commands")
+                told = Message(
+                    "{name}: strains and forces {whom}; it takes no commands", out.name, out.to_whom
+                )
+                screen.print(told)
         opened.pop_all()
     means = ActionMeans(screen.bell, about.end, outputs)
     alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]
@@ -165,6 +170,7 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
         colours=gauge_colours(about.config.gauges),
         light=v.light,
         picture_hz=1.0 if v.light else 5.0,
+        whole=shown_names(about.config.output.response),
         scale="symmetric" if v.scale == "symmetric" else "automatic",
     )
     rrd = about.folder / "view.rrd" if v.rrd else None
@@ -184,7 +190,7 @@ def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], 
     if spawn and view.port is not None and spawn_viewer(view.port, trouble) is not None:
         screen.print("the viewer opens in its own window")
         return
-    why = "no display" if spawn else "view.spawn is off"
-    screen.print(f"no viewer is opened ({why}); the test runs without it. To open one:")
+    why = Message("no display") if spawn else Message("view.spawn is off")
+    screen.print(Message("no viewer is opened ({why}); the test runs without it. To open one:", why))
     for line in view.instructions.splitlines():
         screen.print(f"  {line}")

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.addresses import parse_address, with_setting
+from acquire.errors import LOSS
 from acquire.frame import Frame
 from analysis import PICTURE_KINDS
 from analysis.evaluate import AreaStrain
 from analysis.field import Status, StrainField, Sums
-from live.commands.exit_codes import LOSS
 from live.commands.options import add_measure, add_options, configured
 from live.commands.run import finish, run_attended
 from live.config.loading import Config

@@ -12,7 +12,7 @@ import re
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -29,7 +29,8 @@ from acquire.serial_line import identify
 from acquire.serial_line.ports import list_serial_ports
 from acquire.text.printable import brief, printable
 from live import VERSION
-from live.setup.devices import open_load, open_rig
+from live.setup.devices import open_load
+from live.setup.frames import camera_of
 
 CROP, MAX_CROPS = 256, 64  # px of the middle of the picture, and how many, that noise is taken from
 MAX_EVENTS = 20
@@ -88,7 +89,7 @@ def _guarded(title: str, lines: Iterator[str]) -> Iterator[str]:
 
 def _camera_lines(address: str, seconds: float) -> Iterator[str]:
     events: list[Event] = []
-    with closing(open_rig(address, "none:", events.append)) as rig, rig.camera as camera:
+    with camera_of(address, events.append) as camera, camera:
         info = camera.info
         yield f"{without_serials(info.name)}, {info.width}x{info.height}, {info.pixel_format} {info.bits} bits"
         yield f"clock {info.clock}, fps {info.fps}, exposure {info.exposure_s} s, controls {dict(info.controls)}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import difflib
 import pydoc
+import re
 import sys
 from pathlib import Path
 
@@ -12,15 +13,18 @@ from acquire.errors import ConfigError, DataError
 from acquire.text import Message
 
 TOP = Path(__file__).parents[2]
+_HEADING = re.compile(
+    r"^(?P<level>##+) (?P<title>.+)$", re.MULTILINE
+)  # one # begins a comment of a shell, too
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic docs``."""
-    parser.add_argument("name", nargs="?", help="as a message names it: optics, or docs/optics.md")
+    parser.add_argument("name", nargs="?", help="as a message names it: optics, or docs/optics.md#the-lens")
 
 
 def command(arguments: argparse.Namespace) -> int:
-    """``phasedic docs [NAME]``: one page, or the list of them."""
+    """``phasedic docs [NAME]``: one page or one section of it, or the list of pages."""
     folder = shipped("docs")
     pages = {path.relative_to(folder).with_suffix("").as_posix(): path for path in folder.rglob("*.md")}
     if arguments.name is None:
@@ -28,12 +32,13 @@ def command(arguments: argparse.Namespace) -> int:
             print(f"{name:26} {_heading(path)}")
         print(f"phasedic docs NAME shows one; all are in {folder}")
         return 0
-    name = arguments.name.partition("#")[0].removeprefix("docs/").removesuffix(".md")
+    page, _, anchor = arguments.name.partition("#")
+    name = page.removeprefix("docs/").removesuffix(".md")
     if name not in pages:
         near = difflib.get_close_matches(name, pages, 1)
         meant = Message(" (did you mean {near}?)", near[0]) if near else ""
         raise ConfigError("there is no page {name}{meant}; phasedic docs lists all", repr(name), meant)
-    text = pages[name].read_text(encoding="utf-8")
+    text = _section(pages[name].read_text(encoding="utf-8"), anchor)
     if sys.stdout.isatty() and sys.stdin.isatty():
         pydoc.pager(text)
     else:
@@ -57,3 +62,15 @@ def shipped(name: str) -> Path:
 
 def _heading(path: Path) -> str:
     return path.read_text(encoding="utf-8").partition("\n")[0].lstrip("# ")
+
+
+def _section(text: str, anchor: str) -> str:
+    """The section of a page under the heading that a link names; the whole page where there is none."""
+    start = level = 0
+    for one in _HEADING.finditer(text):
+        slug = re.sub(r"\s+", "-", re.sub(r"[^\w\s-]", "", one["title"].lower()).strip())
+        if level and len(one["level"]) <= level:
+            return text[start : one.start()].rstrip()
+        if not level and slug == anchor:
+            start, level = one.start(), len(one["level"])
+    return text[start:].rstrip() if level else text

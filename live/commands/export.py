@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 from live.commands.more_gauges import add_gauges
 from live.commands.options import add_gauge_option
 from live.results.export.formats import FORMATS, ExportRequest, export
@@ -85,7 +86,7 @@ def command(arguments: argparse.Namespace) -> int:
             add_gauges(run, Path(arguments.more_gauges))
         screen.print(str(export(run, _request(arguments, run), screen)))
         for note in run.notes:
-            screen.print(f"note: {note}")
+            screen.print(Message("note: {what}", note))
     return 0
 
 
@@ -109,10 +110,5 @@ def _request(arguments: argparse.Namespace, run: RunFolder) -> ExportRequest:
         arguments.start_s,
         arguments.end_s,
         display_of(arguments, run.mm_per_px),
-        ExportOptions(
-            arguments.layout or "long",
-            arguments.fps,
-            arguments.limit,
-            not arguments.no_picture,
-        ),
+        ExportOptions(arguments.layout or "long", arguments.fps, arguments.limit, not arguments.no_picture),
     )

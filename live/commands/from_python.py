@@ -85,16 +85,7 @@ def replay(
         raise TypeError("a replay has its own configuration; give a mapping, or the path of a TOML file")
     file, given = (None, dict(config)) if isinstance(config, Mapping) else (Path(config), {})
     screen = screen or TerminalScreen()
-    request = ReplayRequest(
-        source=str(source),
-        as_measured=False,
-        start_s=None,
-        end_s=None,
-        reference=None,
-        config_file=file,
-        overrides=given,
-        forces=None if forces is None else Path(forces),
-    )
+    request = ReplayRequest(str(source), file, given, forces=None if forces is None else Path(forces))
     return replays.replay(request, screen, threading.Event(), standard_consumers(screen, consumers))
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
-from acquire.errors import PhasedicError
+from acquire.errors import NOT_READY, PhasedicError
 from acquire.serial_line import identify
 from acquire.serial_line.ports import LineSettings
 from acquire.text.printable import brief
-from live.commands.exit_codes import NOT_READY
 
 PrintLine = Callable[[str], None]
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquire.addresses import parse_address
-from acquire.errors import DeviceError
+from acquire.errors import LOSS, DeviceError
 from acquire.files.picture import write_picture
+from acquire.text import Message
 from acquire.text.message import about, joined
 from acquire.text.printable import printable
-from live.commands.exit_codes import LOSS
 from live.commands.options import (
     PICTURES,
     add_help_all,
@@ -119,7 +119,7 @@ def find_devices(given: dict[str, object], screen: Screen) -> FoundDevices:
     camera, descriptions, others = str(given.get("camera.address") or ""), "", tuple[str, ...]()
     if not camera:
         camera, descriptions, others = _camera()
-        screen.print(f"camera: {camera}  {descriptions}")
+        screen.print(Message("camera: {camera}  {words}", camera, descriptions))
     load, load_words = str(given.get("load.address") or ""), ""
     if not load:
         load, load_words = _load(camera, screen)
@@ -167,7 +167,7 @@ def _listen(screen: Screen) -> Iterator[tuple[str, str]]:
         if not port.accessible:
             screen.print(port.text().strip())
             continue
-        screen.print(f"listening on {port.device} (--load ADDRESS or --load none: skips this)")
+        screen.print(Message("listening on {port} (--load ADDRESS or --load none: skips this)", port.device))
         for _, _, finding in identify.listen(port.device):
             if finding is not None:
                 yield finding.address, finding.remark or finding.protocol
@@ -185,16 +185,18 @@ def _draw(p: Proposal, png: Path) -> None:
 def _print(p: Proposal, rig: Path, png: Path, screen: Screen) -> None:
     grid = p.region.grid(p.config, *p.first_look.size)
     screen.print(p.region.words)
-    screen.print(
-        f"{grid.n_active} ZOIs of {grid.size} px, {grid.step} px apart; load along {p.config.specimen.axis}"
-    )
-    screen.print(f"gauges: {', '.join(p.config.gauges) or 'none'}")
+    zois = Message("{n} ZOIs of {size} px, {step} px apart", grid.n_active, grid.size, grid.step)
+    screen.print(zois + Message("; load along {axis}", p.config.specimen.axis))
+    screen.print(Message("gauges: {names}", ", ".join(p.config.gauges) or Message("none")))
     for box in p.plates.plates:
-        screen.print(
-            f"looks like a plate: {box.text}; in {rig} behind a #: it must hang from one grip, unloaded"
+        text = Message(
+            "looks like a plate: {box}; in {rig} behind a #: it must hang from one grip, unloaded",
+            box.text,
+            rig,
         )
+        screen.print(text)
     for box in p.plates.unclear:
-        screen.print(f"a pattern beside the specimen that is not clearly a plate: {box.text}")
-    screen.print(f"written: {rig}, and {png} as a picture of it")
+        screen.print(Message("a pattern beside the specimen that is not clearly a plate: {box}", box.text))
+    screen.print(Message("written: {rig}, and {png} as a picture of it", rig, png))
     name = shlex.quote(str(rig))
-    screen.print(f"next: phasedic check --config {name}, then phasedic run --config {name}")
+    screen.print(Message("next: phasedic check --config {name}, then phasedic run --config {name}", name))

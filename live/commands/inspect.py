@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquire.errors import ConfigError, DataError
+from live.config.values import numbers_of
 from live.ui.terminal.screen import print_line
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def command(arguments: argparse.Namespace) -> int:
 
 def _row_and_column(text: str) -> tuple[int, int]:
     try:
-        row, column = (int(part) for part in text.split(","))
+        row, column = numbers_of(text, int, 2)
     except ValueError:
         raise ConfigError("--zoi {given}: give row,column of the ZOI, for example 3,5", text) from None
     return row, column

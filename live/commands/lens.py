@@ -21,7 +21,6 @@ from live.ui.terminal.screen import TerminalScreen
 if TYPE_CHECKING:
     import numpy as np
 
-    from analysis.field import StrainField
 
 MAX_SHIFTS = 60
 """Shifted pictures that are fitted; of more, as many evenly chosen ones."""
@@ -87,40 +86,23 @@ def _pictures(arguments: argparse.Namespace) -> Iterator[np.ndarray]:
     ConfigError
         It is a live camera, which does not end.
     """
-    from live.setup.devices import open_rig
+    from live.setup.frames import camera_of, whole_frames
 
-    rig = open_rig(with_scheme(arguments.source), "none:")
-    try:
-        if rig.camera.info.live:
+    with camera_of(with_scheme(arguments.source)) as camera:
+        if camera.info.live:
             raise ConfigError(
                 "{source}: give recorded pictures of the board, as 'board/*.png'", arguments.source
             )
-        with rig.camera as camera:
-            yield from (frame.image for frame in camera if not frame.damaged)
-    finally:
-        rig.close()
+        yield from (frame.image for frame in whole_frames(camera))
 
 
 def _of_specimen(arguments: argparse.Namespace, screen: Screen) -> LensCalibration:
-    from acquire.events import ignore_event
-    from live.replay.opening import open_source, prepare_replay
+    from live.replay.opening import fields_of, open_source
     from live.replay.source import ReplayRequest
 
-    request = ReplayRequest(
-        source=arguments.source,
-        as_measured=False,
-        start_s=None,
-        end_s=None,
-        reference=None,
-        config_file=Path(arguments.config) if arguments.config else None,
-        overrides=_alone(arguments),
-    )
-    with open_source(request) as (source, config):
-        ready = prepare_replay(source, config, arguments.source, screen)
-        fields: list[StrainField] = []
-        for m in ready.measurements(source.bursts, source.loads, ignore_event):
-            fields.append(m.field)
-            screen.progress(m.time_step, m.number + 1, source.expected, 0.0)
+    file = Path(arguments.config) if arguments.config else None
+    with open_source(ReplayRequest(arguments.source, file, _alone(arguments))) as (source, config):
+        fields = [field for _, field in fields_of(source, config, arguments.source, screen)]
     chosen = fields[:: -(-len(fields) // MAX_SHIFTS) or 1]
     return from_shifts(chosen, source.camera.width, source.camera.height, square=arguments.square_on)
 

@@ -8,11 +8,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from acquire.addresses import parse_address, with_setting
-from acquire.errors import ConfigError, DataError
+from acquire.errors import NOT_READY, ConfigError, DataError
 from acquire.load_cell import calibration, check, stillness
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.text import Message
-from live.commands.exit_codes import NOT_READY
 from live.setup.devices import open_load
 
 PrintLine = Callable[[str], None]

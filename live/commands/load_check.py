@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
+from acquire.errors import NOT_READY
 from acquire.load_cell import check
-from live.commands.exit_codes import NOT_READY
 from live.setup.devices import open_load
 
 PrintLine = Callable[[str], None]

@@ -27,10 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="u, v, exx, eyy, exy, sigma_eyy, residual, status, a map of replay --response ... (default eyy)",
     )
     parser.add_argument(
-        "--row",
-        type=int,
-        default=-1,
-        help="number of the instant, from 0 (default: the last)",
+        "--row", type=int, default=-1, help="number of the instant, from 0 (default: the last)"
     )
     parser.add_argument("--over", metavar="FILE", help="picture under the map")
     parser.add_argument("--limit", type=float, help="colour range -LIMIT to LIMIT (default: automatic)")

@@ -17,12 +17,15 @@ from acquire.errors import ConfigError
 from acquire.text import Message
 from live.commands.arguments import HELP_ALL, bad_value, not_empty
 from live.config.loading import Config, lens_in, load_config, options
+from live.config.values import numbers_of
 
 MEASURE = (
     "roi", "mask", "zoi", "step", "gauges", "scale", "burst", "reference-burst", "window", "estimator", "strain",
     "order", "bending", "noise",
 )  # fmt: skip
-OUTPUT = ("out", "no-view", "no-rrd", "light", "axis", "standard", "test", "zero", "lag", "report")
+OUTPUT = (
+    "out", "no-view", "no-rrd", "light", "axis", "standard", "test", "zero", "lag", "response", "report",
+)  # fmt: skip
 FORCES = ("load-unit", "load-column", "load-decimal", "load-sign")
 PICTURES = (".png", ".tif")
 PICTURE_ORDERS = ("name", "time")
@@ -199,7 +202,7 @@ def configured(arguments: argparse.Namespace, defaults: dict[str, Any] | None = 
 
 def _section(text: str) -> dict[str, float]:
     try:
-        width, thickness = (float(part) for part in text.split(","))
+        width, thickness = numbers_of(text, float, 2)
     except ValueError:
         raise ConfigError("--section {given}: give width,thickness in mm, for example 10,2", text) from None
     return {"specimen.width_mm": width, "specimen.thickness_mm": thickness}

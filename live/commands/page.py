@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from acquire.errors import DeviceError, PhasedicError
+from acquire.errors import EXIT_INTERRUPTED, DeviceError, PhasedicError
+from acquire.text import Message
 from acquire.text.printable import brief
 from live.commands.attended import page_opened
-from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.init import find_devices
 from live.commands.options import OUTPUT, add_measure, add_options, overrides
 from live.commands.report import write_report
@@ -61,7 +61,7 @@ def choose_devices(draft: ConfigDraft, given: dict[str, Any], screen: Screen) ->
     try:
         found = find_devices(given, screen)
     except DeviceError as error:
-        screen.print(f"{brief(error)}; or choose one on the page")
+        screen.print(Message("{why}; or choose one on the page", brief(error)))
         return
     draft.change_all({"camera.address": found.camera, "load.address": found.load})
 
@@ -77,7 +77,7 @@ def serve(
             folder, code = run_with_page(controller, configs, screen)
         except PhasedicError as error:
             message = brief(error)
-            screen.print(f"the test did not begin: {message}")
+            screen.print(Message("the test did not begin: {why}", message))
             continue
         message = ""
         if code == EXIT_INTERRUPTED:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError
+from acquire.text import Message
 from analysis.optics import Readout
 from live.commands.options import add_config_file, add_options, add_verbose, overrides
 from live.config.rig_file import write_rig
@@ -38,43 +39,27 @@ def command(arguments: argparse.Namespace) -> int:
     )
     if arguments.config:
         write_rig(Path(arguments.config), changes)
-        screen.print(f"written to {arguments.config}; the former file is {arguments.config}.bak")
+        screen.print(Message("written to {path}; the former file is {path}.bak", arguments.config))
     return 0
 
 
 def _of_lamp(arguments: argparse.Namespace) -> Readout:
-    from live.setup.devices import at_rest, open_rig
+    from live.setup.frames import camera_of, whole_frames
 
-    rig = open_rig(at_rest(with_scheme(arguments.source)), "none:")
-    try:
-        with rig.camera as camera:
-            return from_lamp(camera, arguments.lamp)
-    finally:
-        rig.close()
+    with camera_of(with_scheme(arguments.source)) as camera:
+        return from_lamp(whole_frames(camera), arguments.lamp)
 
 
 def _of_motion(arguments: argparse.Namespace, screen: TerminalScreen) -> Readout:
-    from acquire.events import ignore_event
-    from live.replay.opening import open_source, prepare_replay
+    from live.replay.opening import fields_of, open_source
     from live.replay.source import ReplayRequest
 
     single = {"measure.burst": 1, "measure.strain": "small", "measure.renew_at": 1.0}
     none = {"lens": {}, "plate": {}, "gauges": {}, "alarm": [], "camera.readout_ms": 0.0}
-    request = ReplayRequest(
-        source=arguments.source,
-        as_measured=False,
-        start_s=None,
-        end_s=None,
-        reference=None,
-        config_file=Path(arguments.config) if arguments.config and Path(arguments.config).exists() else None,
-        overrides={**overrides(arguments), **single, **none},
-    )
+    file = Path(arguments.config) if arguments.config and Path(arguments.config).exists() else None
+    request = ReplayRequest(arguments.source, file, {**overrides(arguments), **single, **none})
     with open_source(request) as (source, config):
         if source.camera.clock == "nominal" and not source.camera.fps:
             raise ConfigError("{source}: the pictures have no times; record a session", arguments.source)
-        ready = prepare_replay(source, config, arguments.source, screen)
-        found = []
-        for m in ready.measurements(source.bursts, source.loads, ignore_event):
-            found.append((m.t, m.field))
-            screen.progress(m.time_step, m.number + 1, source.expected, 0.0)
+        found = list(fields_of(source, config, arguments.source, screen))
     return from_motion([t for t, _ in found], [field for _, field in found], source.camera.height)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
+from acquire.errors import LOSS
 from live.ui.terminal.screen import print_line
 
 PrintLine = Callable[[str], None]
@@ -24,4 +25,4 @@ def command(arguments: argparse.Namespace, print_line: PrintLine = print_line) -
     print_line(done.line())
     for sentence in done.unreadable[:10]:
         print_line(f"  {sentence}")
-    return 5 if done.unreadable else 0
+    return LOSS if done.unreadable else 0

@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from live.commands.arguments import not_empty
-from live.commands.exit_codes import EXIT_WORDS
+from acquire.errors import exit_code_of_all
+from live.commands.finishing import finish_test
 from live.commands.options import (
     FORCES,
     OF_PICTURES,
@@ -22,17 +22,12 @@ from live.commands.options import (
     in_picture_order,
     overrides,
 )
-from live.commands.sides import TABLE, put_together
 from live.commands.signals import signals
-from live.config.cameras import BACK, FRONT, SIDES
-from live.pipeline.screen import Screen
 from live.results.folder import check_folder, make_folder
 from live.ui.terminal.cameras_screen import CamerasScreen
 from live.ui.terminal.screen import TerminalScreen
-from live.ui.terminal.summary import print_summary
 
 if TYPE_CHECKING:
-    from live.replay.replay import Replayed
     from live.replay.source import ReplayRequest
 
 
@@ -49,19 +44,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     words = "forces: the export of a testing machine, or a CSV with a header such as file,force_kN or time_s,force_N"
     parser.add_argument("--load", dest="forces", metavar="FILE.csv", help=words)
     add_options(parser, "file of forces", *FORCES)
-    words = "maps of what each place does over all instants: strain over stress, over that of the region (mean) or of a"
-    words += " gauge, or over time, and where it leaves its line"
-    parser.add_argument("--response", metavar="stress|mean|GAUGE|time", type=not_empty, help=words)
     add_measure(parser, measure=OF_PICTURES)
 
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic replay``."""
     from live.commands.consumers import standard_consumers
-    from live.commands.report import write_report
     from live.replay.replay import replay
     from live.replay.source import ReplayRequest
-    from live.results.sides.folder import recorded_cameras_in
 
     request = ReplayRequest(
         source=in_picture_order(arguments.source, arguments.picture_order),
@@ -72,67 +62,39 @@ def command(arguments: argparse.Namespace) -> int:
         config_file=Path(arguments.config) if arguments.config else None,
         overrides=_overrides(arguments),
         forces=Path(arguments.forces) if arguments.forces else None,
-        response=arguments.response or "",
     )
     screen, stopping = TerminalScreen(), threading.Event()
-    if names := recorded_cameras_in(Path(arguments.source)):
-        return _replay_cameras(request, names, screen, stopping)
+    every, requests = CamerasScreen(screen), _of_each(request)
+    done = {}
     with signals(stopping.set, screen.print):
-        done = replay(request, screen, stopping, standard_consumers(screen))
-    report = done.config.output.report
-    _print(done, screen, verbose=arguments.verbose, with_report=report)
-    if report:
-        write_report(done.folder, screen)
-    return _ended(done.exit_code, screen)
-
-
-def _print(done: Replayed, screen: Screen, *, verbose: bool = False, with_report: bool = False) -> None:
-    print_summary(
-        screen,
-        done.run_state,
-        done.test,
-        done.folder,
-        done.lines,
-        verbose=verbose,
-        with_report=with_report,
+        for name, own in requests.items():
+            done[name] = replay(own, every.of(name), stopping, standard_consumers(every.of(name)))
+    folder = next(iter(done.values())).folder
+    code = exit_code_of_all(one.exit_code for one in done.values())
+    lines = {name: one.lines for name, one in done.items()}
+    return finish_test(
+        done, lines, folder.parent if len(done) > 1 else folder, code, screen, verbose=arguments.verbose
     )
 
 
-def _ended(code: int, screen: Screen) -> int:
-    if code in EXIT_WORDS:
-        screen.print(f"exit code {code}: {EXIT_WORDS[code]}")
-    return code
-
-
-def _replay_cameras(
-    request: ReplayRequest, names: tuple[str, ...], screen: Screen, stopping: threading.Event
-) -> int:
-    """Replay the cameras of a test, one after the other; front and back are put together."""
-    from live.commands.consumers import standard_consumers
-    from live.commands.report import write_report
-    from live.replay.replay import replay
+def _of_each(request: ReplayRequest) -> dict[str, ReplayRequest]:
+    """One for each camera by its name, with folders in one that is made; "" where the recording is of one alone."""
     from live.results.run_folder import SESSION
+    from live.results.sides.folder import recorded_cameras_in
 
-    given, codes = dict(request.overrides), []
-    report = given.pop("output.report", False)
-    check_folder(given.get("output.dir"))
-    folder = make_folder(given.get("output.dir"), datetime.datetime.now(datetime.UTC))
-    with signals(stopping.set, screen.print):
-        for name in names:
-            own_screen = CamerasScreen(screen).of(name)
-            own = replace(
-                request,
-                source=str(Path(request.source) / name / SESSION),
-                overrides={**given, "output.dir": str(folder / name)},
-            )
-            done = replay(own, own_screen, stopping, standard_consumers(own_screen))
-            _print(done, own_screen)
-            codes.append(done.exit_code)
-    if names == SIDES:
-        put_together(folder / FRONT, folder / BACK, folder / TABLE, screen)
-    if report:
-        write_report(folder, screen)
-    return _ended(max(codes), screen)
+    names, wanted = recorded_cameras_in(Path(request.source)), request.overrides.get("output.dir")
+    if not names:
+        return {"": request}
+    check_folder(wanted)
+    folder = make_folder(wanted, datetime.datetime.now(datetime.UTC))
+    return {
+        name: replace(
+            request,
+            source=str(Path(request.source) / name / SESSION),
+            overrides={**request.overrides, "output.dir": str(folder / name)},
+        )
+        for name in names
+    }
 
 
 def _overrides(arguments: argparse.Namespace) -> dict[str, Any]:

@@ -5,19 +5,18 @@ from __future__ import annotations
 import argparse
 import os
 from contextlib import ExitStack
-from itertools import chain, count
 from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
+from acquire.text import Message
 from acquire.text.message import about
 from live.commands.more_gauges import add_gauges
 from live.commands.options import add_gauge_option
-from live.config.cameras import BACK, FRONT, SIDES
+from live.config.new_files import check_free, free_name, new_file
 from live.pipeline.screen import Screen
-from live.results.export.atomic_file import check_free, new_file
 from live.results.finished.figures_file import FILE, FiguresFile
 from live.results.quantities import Display
-from live.results.report.cameras import report_of_fields, report_of_sides
+from live.results.report.cameras import report_of_cameras
 from live.results.report.comparison import compare, tests_of, write_table
 from live.results.report.report import Report, ReportRequest, make_report
 from live.results.report.saving import NO_BROWSER, find_browser, save_figures, save_page, save_pdf
@@ -75,7 +74,7 @@ def command(arguments: argparse.Namespace) -> int:
         else:
             report = _reported(found[0], _request(arguments, found[0]), screen)
         for note in (note for run in found for note in run.notes):
-            screen.print(f"note: {note}")
+            screen.print(Message("note: {what}", note))
     _save(report, out, arguments, screen)
     return 0
 
@@ -102,24 +101,21 @@ def _report_of_cameras(folder: Path, out: Path, screen: Screen) -> Report:
     with ExitStack() as opened:
         runs = {name: opened.enter_context(open_run(folder / name)) for name in pages}
         names = {name: os.path.relpath(page, out.parent) for name, page in pages.items() if page.exists()}
-        if tuple(runs) == SIDES:
-            return report_of_sides(runs[FRONT], runs[BACK], names)
-        return report_of_fields(runs, names)
+        return report_of_cameras(runs, names)
 
 
 def write_report(folder: Path, screen: Screen) -> str:
     """``report.html`` in the folder of a run; an error is printed, returned, and does not affect the run."""
     try:
+        page = folder / "report.html"
         if cameras_in(folder):
-            save_page(_report_of_cameras(folder, folder / "report.html", screen), folder / "report.html")
-            screen.print(f"  {folder / 'report.html'}")
-            return ""
-        with open_run(folder) as run:
-            report = _reported(run, ReportRequest(mm_per_px=run.mm_per_px), screen)
-            save_page(report, folder / "report.html")
-        screen.print(f"  {folder / 'report.html'}")
+            save_page(_report_of_cameras(folder, page, screen), page)
+        else:
+            with open_run(folder) as run:
+                save_page(_reported(run, ReportRequest(mm_per_px=run.mm_per_px), screen), page)
+        screen.print(f"  {page}")
     except PhasedicError as error:
-        screen.print(f"warning: no report was made: {error}")
+        screen.print(Message("warning: no report was made: {why}", error))
         return error.text
     return ""
 
@@ -132,7 +128,7 @@ def _reported(run: RunFolder, wanted: ReportRequest, screen: Screen) -> Report:
             report.test.cycles.write(run.path)
             FiguresFile.of(report.test, run.frame_counts or {}, 0).write(run.path)
         except PhasedicError as error:
-            screen.print(f"note: {error}")
+            screen.print(Message("note: {what}", error))
     return report
 
 
@@ -150,9 +146,12 @@ def _targets(out: Path, arguments: argparse.Namespace) -> list[Path]:
 
 def _first_free(page: Path, arguments: argparse.Namespace) -> Path:
     """The page, or the same with a number, so that neither it nor what is saved beside it is there."""
-    names = (page.with_stem(f"{page.stem}-{k}") for k in count(2))
     beside = argparse.Namespace(**{**vars(arguments), "figures": None})
-    return next(out for out in chain([page], names) if not any(f.exists() for f in _targets(out, beside)))
+
+    def is_taken(stem: str) -> bool:
+        return any(file.exists() for file in _targets(page.with_stem(stem), beside))
+
+    return page.with_stem(free_name(page.stem, is_taken))
 
 
 def _save(report: Report, out: Path, arguments: argparse.Namespace, screen: Screen) -> None:

@@ -11,13 +11,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from acquire.errors import PhasedicError
+from acquire.errors import EXIT_WORDS
+from acquire.text import Message
 from live.commands.attended import attended, page_opened
 from live.commands.consumers import standard_consumers
-from live.commands.exit_codes import EXIT_WORDS, LOSS
+from live.commands.finishing import finish_test
 from live.commands.options import add_measure, add_options, configured, overrides
-from live.commands.sides import TABLE, put_together
-from live.config.cameras import BACK, FRONT, camera_configs
+from live.config.cameras import FRONT, camera_configs
 from live.config.loading import Config
 from live.pipeline.consumer import Consumer
 from live.pipeline.screen import Screen
@@ -32,7 +32,7 @@ from live.setup.region import located
 from live.ui.rerun.view import rerun_command, spawn_viewer
 from live.ui.terminal.cameras_screen import CamerasScreen
 from live.ui.terminal.screen import TerminalScreen
-from live.ui.terminal.summary import print_summary, trouble_lines
+from live.ui.terminal.summary import trouble_lines
 
 if TYPE_CHECKING:
     from live.ui.web.page_controller import PageController
@@ -146,34 +146,16 @@ def run_attended(
 
 def finish(outcome: OutcomeOfTest, screen: Screen, *, verbose: bool = False) -> int:
     """Print the summaries, put sides together, and report where that is asked for; the exit code."""
-    every, code = CamerasScreen(screen), outcome.exit_code
-    several, report = len(outcome.cameras) > 1, next(iter(outcome.cameras.values())).config.output.report
-    for name, one in outcome.cameras.items():
-        print_outcome(one, every.of(name), verbose=verbose, with_report=report and not several)
-    if several:
-        screen.print()
-    if FRONT in outcome.cameras:
-        try:
-            put_together(outcome.folder / FRONT, outcome.folder / BACK, outcome.folder / TABLE, screen)
-        except PhasedicError as error:
-            screen.print(f"warning: front and back were not put together: {error}")
-            code = code or LOSS
-    if report:
-        from live.commands.report import write_report
-
-        write_report(outcome.folder, screen)
-    if code in EXIT_WORDS:
-        screen.print(f"exit code {code}: {EXIT_WORDS[code]}")
-    return code
+    lines = {name: _lines(one, verbose=verbose) for name, one in outcome.cameras.items()}
+    return finish_test(outcome.cameras, lines, outcome.folder, outcome.exit_code, screen, verbose=verbose)
 
 
-def print_outcome(
-    outcome: Outcome, screen: Screen, *, verbose: bool = False, with_report: bool = False
-) -> None:
-    """Print the summary of one camera, the frame counts, the losses and where the files are."""
-    run_state, folder = outcome.run_state, outcome.folder
-    lines = [*trouble_lines(run_state, outcome.outputs.reports, verbose=verbose)]
-    rrd = folder / "view.rrd"
+def _lines(outcome: Outcome, *, verbose: bool) -> list[str]:
+    """The frame counts, the losses, and how the recorded view is opened."""
+    lines, rrd = (
+        [*trouble_lines(outcome.run_state, outcome.outputs.reports, verbose=verbose)],
+        outcome.folder / "view.rrd",
+    )
     if verbose and rrd.exists():
-        lines.append(f"open the recorded view with: {rerun_command()} {rrd}")
-    print_summary(screen, run_state, outcome.test, folder, lines, verbose=verbose, with_report=with_report)
+        lines.append(Message("open the recorded view with: {command}", f"{rerun_command()} {rrd}"))
+    return lines

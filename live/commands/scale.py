@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 from live.commands.options import add_options, add_verbose, configured
 from live.config.loading import Config
 from live.config.rig_file import write_rig
-from live.config.values import AUTO
+from live.config.values import AUTO, Number, numbers_of
 from live.pipeline.screen import Screen
 from live.setup.region import first_look, region_of
 from live.setup.scale import OUT_OF_PLANE_MM, Board, Scale, false_strain, from_board, from_points, from_width
 from live.ui.terminal.screen import TerminalScreen
 
-Number = TypeVar("Number", int, float)
 WIDTH_OF_RIG = -1.0  # --width without a number
 
 
@@ -45,10 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="standard uncertainty of the length, the width or the board (default 0)",
     )
     parser.add_argument(
-        "--stand-off",
-        type=float,
-        metavar="MM",
-        help="distance from the camera to the specimen",
+        "--stand-off", type=float, metavar="MM", help="distance from the camera to the specimen"
     )
     add_verbose(parser)
 
@@ -76,11 +72,11 @@ def command(arguments: argparse.Namespace) -> int:
         f"scale: {scale.mm_per_px:.6g} ± {scale.sigma:.2g} mm/px ({scale.relative:.2%}), {scale.method}"
     )
     for remark in scale.remarks:
-        screen.print(f"LOOK  {remark}")
+        screen.print(Message("LOOK  {what}", remark))
     _print_false_strain(stand_off, screen)
     if arguments.config:
         write_rig(Path(arguments.config), scale.changes(arguments.stand_off))
-        screen.print(f"written to {arguments.config}; the former file is {arguments.config}.bak")
+        screen.print(Message("written to {path}; the former file is {path}.bak", arguments.config))
     return 0
 
 
@@ -144,16 +140,13 @@ def _needed(arguments: argparse.Namespace, name: str) -> float:
     return value
 
 
-def _numbers(
-    text: str, mark: str, count: int, kind: Callable[[str], Number], option: str, example: str
-) -> list[Number]:
+def _numbers(text: str, mark: str, count: int, kind: type[Number], option: str, example: str) -> list[Number]:
     try:
-        values = [kind(part) for part in text.lower().split(mark)]
+        return numbers_of(text, kind, count, mark)
     except ValueError:
-        values = []
-    if len(values) != count or not all(math.isfinite(value) for value in values):
-        raise ConfigError("{option} {given}: give {n} numbers, as {example}", option, text, count, example)
-    return values
+        raise ConfigError(
+            "{option} {given}: give {n} numbers, as {example}", option, text, count, example
+        ) from None
 
 
 def _print_false_strain(stand_off: float | None, screen: Screen) -> None:

@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from live.config.cameras import BACK, FRONT
 from live.pipeline.screen import Screen
 from live.ui.terminal.screen import TerminalScreen
@@ -48,7 +46,7 @@ def put_together(front: Path, back: Path, out: Path, screen: Screen) -> None:
     ConfigError, DataError
         The file exists, a run cannot be read, or they are not of one test.
     """
-    from live.results.export.atomic_file import new_file
+    from live.config.new_files import new_file
     from live.results.run_folder import open_run
     from live.results.sides.together import SidesOfTest, write_sides
 
@@ -63,12 +61,10 @@ def put_together(front: Path, back: Path, out: Path, screen: Screen) -> None:
 
 def _strains(sides: SidesOfTest) -> Iterator[str]:
     """The last instant that both sides have."""
+    from live.results.sides.together import at_end
     from live.ui.terminal.status_line import strain_text
 
     yield "at the end:            mean of both        front minus mean"
-    for name, one in sides.courses.items():
-        known = np.flatnonzero(np.isfinite(one.mean))
-        if len(known):
-            k = known[-1]
-            mean, bending = (strain_text(values[k], one.sigma[k]) for values in (one.mean, one.bending))
-            yield f"  {name:<16} {mean:>18}  {bending:>18}"
+    for name, one in at_end(sides.courses).items():
+        mean, bending = (strain_text(value, one.sigma) for value in (one.mean, one.bending))
+        yield f"  {name:<16} {mean:>18}  {bending:>18}"

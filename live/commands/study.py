@@ -23,8 +23,8 @@ from live.commands.options import (
     in_picture_order,
     overrides,
 )
-from live.config.values import AUTO
-from live.results.export.atomic_file import check_free, new_folder
+from live.config.new_files import check_free, new_folder
+from live.config.values import AUTO, numbers_of
 from live.results.report.saving import save_figures
 from live.results.report.svg import Plot, PlotLine
 from live.setup.compiling import compile_ahead
@@ -85,7 +85,7 @@ def command(arguments: argparse.Namespace) -> int:
     settings, found = _settings(arguments), []
     config_file = Path(arguments.config) if arguments.config else None
     source = in_picture_order(arguments.source, arguments.picture_order)
-    request = ReplayRequest(source, False, None, None, arguments.reference, config_file, overrides(arguments))
+    request = ReplayRequest(source, config_file, overrides(arguments), reference=arguments.reference)
     with open_source(request) as (material, config):
         screen.print(material.words)
         if AUTO in (config.measure.roi, config.measure.gauges):
@@ -191,7 +191,7 @@ def _curve(name: str, part: Sequence[StudyResult], value: str, colour: int) -> P
 
 def _numbers(word: str) -> list[int]:
     try:
-        found = [int(part) for part in word.split(",")]
+        found = numbers_of(word, int)
     except ValueError:
         raise bad_value("{given}: give whole numbers, as 24,32,48", repr(word)) from None
     if min(found) < 1:
@@ -214,7 +214,7 @@ def _still(word: str) -> tuple[float, float]:
 
 def _seconds(word: str) -> tuple[float, float]:
     try:
-        low, high = (float(part) for part in word.split(","))
+        low, high = numbers_of(word, float, 2)
     except ValueError:
         raise bad_value("{given}: give two numbers, as 0,1.5", repr(word)) from None
     if not low < high:

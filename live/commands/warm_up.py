@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from acquire.text import Message
 from analysis import PICTURE_KINDS, KernelSettings, check_machine
 from live.pipeline.reference import on_fit_machine
 from live.setup.compiling import compile_ahead
@@ -21,7 +22,8 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic warm-up``; raises MachineUnfit if a known pattern is measured wrong."""
     screen = TerminalScreen()
     took = compile_ahead(PICTURE_KINDS, phase=True, show=screen.status)
-    screen.print(f"everything is compiled ({took:.0f} s)" if took else "everything was compiled already")
+    compiled = Message("everything is compiled ({took:.0f} s)", took)
+    screen.print(compiled if took else Message("everything was compiled already"))
     with on_fit_machine():
         for settings in (KernelSettings(), KernelSettings(order=2), KernelSettings(estimator="phase")):
             check_machine(settings, SELF_TEST_ZOI)

@@ -165,7 +165,7 @@ FIGURES = (
     _F("lens_eyy", "the same of eyy", "row", only="lens"),
     _F("sigma_lens_exx", "", "row", only="lens"),
     _F("sigma_lens_eyy", "", "row", only="lens"),
-    *(_F(f"raw_{name}", f"{name} of the region before the correction by plates", "row", only="plates")
+    *(_F(f"raw_{name}", Message("{name} of the region before the correction by plates", name), "row", only="plates")
       for name in _STRAINS),
     *(_F(name, words, "row", only="plates") for name, words in {
         "corrected": "1 where the plates were measured, 0 where their last motion was removed",

@@ -45,7 +45,7 @@ MAX_BYTES = 10**6  # of a configuration file
 _REMOVED_KEYS = {
     ("measure", "shorten_bursts"): Message(
         "a burst keeps its length; leave it out, and take a smaller measure.burst where the picture moves"
-    ),
+    )
 }
 """Keys of earlier versions, with advice: left out of a stored configuration, refused in a new one."""
 
@@ -224,11 +224,7 @@ def _px_per_mm(tree: Mapping[str, Any], where: str) -> float | None:
 
 
 def _section(
-    kind: type[Section],
-    name: str,
-    content: Mapping[str, Any],
-    where: str,
-    px_per_mm: float | None = None,
+    kind: type[Section], name: str, content: Mapping[str, Any], where: str, px_per_mm: float | None = None
 ) -> Section:
     checks = {f.name: f.metadata["check"] for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
     return kind(**_accepted(checks, name, content, where, px_per_mm))

@@ -11,11 +11,11 @@ import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from uuid import uuid4
 
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
 from live.config.loading import MAX_BYTES, Config, load_config
+from live.config.new_files import replaced_file
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument
@@ -127,21 +127,16 @@ def _toml_value(value: Any) -> Any:
 
 def _write_checked(path: Path, text: str) -> Config:
     """Check ``text``, write it into a temporary file, then replace ``path`` by that."""
-    part = path.with_name(f".{path.name}.{uuid4().hex[:8]}.part")
     try:
-        with part.open("x", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        config = load_config(path, {}, text)
-        if path.exists():
-            shutil.copymode(path, part)
-            shutil.copy2(path, path.with_name(f"{path.name}.bak"))
-        part.replace(path)
-    except OSError as error:
-        raise ConfigError(
-            "{path}: cannot be written ({strerror}); choose another place", path, error.strerror
-        ) from None
-    finally:
-        part.unlink(missing_ok=True)
+        with replaced_file(path) as part:
+            with part.open("x", encoding="utf-8") as file:
+                file.write(text)
+                file.flush()
+                os.fsync(file.fileno())
+            config = load_config(path, {}, text)
+            if path.exists():
+                shutil.copymode(path, part)
+                shutil.copy2(path, path.with_name(f"{path.name}.bak"))
+    except DataError as error:
+        raise ConfigError(error.text) from None
     return config

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from live.config.listen_address import SOCKET
 from live.config.values import (
@@ -34,6 +34,10 @@ from live.config.values import (
     length,
     number,
 )
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 DEFAULT_BURST, DEFAULT_REFERENCE_BURST = 4, 32
 """Frames of a live camera; of files, 1."""
@@ -228,7 +232,7 @@ class StrainOutConfig:
     format: str = key(choice("json", "csv"), "json",
         "format of a line; csv begins with the names of the channels", Option("strain-format", expert=True))
     channels: tuple[str, ...] | None = key(NAMES, None,
-        "channels of a line (docs/guide.md; default: time, frame, axial strain and its sigma and rate, force,"
+        "channels of a line (docs/control.md; default: time, frame, axial strain and its sigma and rate, force,"
         " stress, lost share, latency and all gauges)",
         Option("strain-channels", "NAME,NAME", expert=True))
 
@@ -237,7 +241,7 @@ class StrainOutConfig:
 class AlarmConfig:
     """[[alarm]]: any number of them; exactly one of above and below."""
 
-    channel: str = key(TEXT, "", "channel that is watched (docs/guide.md)")
+    channel: str = key(TEXT, "", "channel that is watched (docs/control.md)")
     above: float | None = key(number(), None, "the alarm is on above this value")
     below: float | None = key(number(), None, "the alarm is on below this value")
     hysteresis: float = key(number(0), 0.0, "distance back from the limit at which the alarm ends")
@@ -321,6 +325,10 @@ class SpecimenConfig:
             return self.width_mm * self.thickness_mm * 1e-6
         return None if self.diameter_mm is None else math.pi / 4 * self.diameter_mm**2 * 1e-6
 
+    def load(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The stress (N,), Pa, of ``force``, N; the force itself where the section is not known."""
+        return force / (self.area_m2 or 1.0)
+
 
 @dataclass(frozen=True, slots=True)
 class OutputConfig:
@@ -330,4 +338,8 @@ class OutputConfig:
         "folder for the files (default: a new one in runs/, named by the UTC time)",
         Option("out", "DIR"))
     seconds: float | None = key(number(0.01, 1e7), None, "end after this time, s", Option("seconds", "S"))
+    response: str | None = key(TEXT, None,
+        "maps of what each place does over all instants: strain over stress, over that of the region (mean) or of a"
+        " gauge, or over time, and where it leaves its line",
+        Option("response", "stress|mean|GAUGE|time"))
     report: bool = key(FLAG, False, "write report.html at the end of the test", Option("report", on=True))

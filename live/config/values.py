@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from acquire.addresses import as_typed
 from acquire.bounds import NotAllowed, as_integer, as_number
@@ -17,6 +17,8 @@ from acquire.errors import ConfigError
 from acquire.record_mode import RECORD_MODES, RecordMode
 from acquire.text import Message
 from live.config.listen_address import SOCKET, ListenAddress
+
+Number = TypeVar("Number", int, float)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +115,7 @@ def in_px(value: Any, check: Check, px_per_mm: float | None) -> Any:
         return value
     if px_per_mm is None:
         raise NotAllowed("px; for mm the scale must be known: phasedic scale, or mm_per_px in [scale]")
-    lengths = [float(number) * px_per_mm for number in found[1].split(",")]
+    lengths = [number * px_per_mm for number in numbers_of(found[1], float)]
     if not all(abs(px) < 1e9 for px in lengths):
         raise NotAllowed("a length within the picture")
     values = [round(px) if check.length == "whole px" else px for px in lengths]
@@ -168,11 +170,16 @@ def _box(value: Any) -> tuple[int, int, int, int]:
     return x, y, width, height
 
 
+def numbers_of(text: str, kind: type[Number], count: int = 0, mark: str = ",") -> list[Number]:
+    """The finite numbers between ``mark``; raises ValueError where they are others, or not ``count`` (0: any)."""
+    found = [kind(part) for part in text.lower().split(mark)]
+    if count not in (0, len(found)) or not all(math.isfinite(one) for one in found):
+        raise ValueError(f"give {count} numbers")
+    return found
+
+
 def _read_box(word: str) -> list[int]:
-    values = [int(part) for part in word.split(",")]
-    if len(values) != 4:
-        raise ValueError("give four whole numbers x,y,width,height")
-    return values
+    return numbers_of(word, int, 4)
 
 
 def _rectangle(value: Any) -> tuple[float, float, float, float]:

@@ -123,8 +123,6 @@ class RunInfo:
         Takes a reason and ends a live run cleanly; None in a replay.
     deferred : bool
         Nothing reads the files in ``folder`` before the test has ended, so they need not be flushed often.
-    response : str
-        What the response of each place will be over; empty: none.
     """
 
     config: Config
@@ -134,7 +132,6 @@ class RunInfo:
     start: ClockPair
     end: Callable[[str], None] | None = None
     deferred: bool = False
-    response: str = ""
 
 
 Compose = Callable[[RunInfo, RunState], Sequence[Consumer]]

@@ -16,6 +16,7 @@ from live.pipeline.snapshot import FORCE, STRESS, Snapshot
 from live.pipeline.timed.cycles import CycleWatch
 from live.pipeline.timed.figure import FigureState, TimedFigure
 from live.pipeline.timed.health import Health, force_at, strains_at
+from live.pipeline.timed.response import ResponseWatch
 
 
 @dataclass(slots=True)
@@ -167,6 +168,7 @@ class RunState:
     with_load : bool
         There is a load cell, or recorded forces.
     cycles : CycleWatch
+    response : ResponseWatch
     """
 
     event_log: EventLog
@@ -179,6 +181,7 @@ class RunState:
     specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
     with_load: bool = True
     cycles: CycleWatch = field(default_factory=CycleWatch)
+    response: ResponseWatch = field(default_factory=ResponseWatch)
 
     @classmethod
     def new(

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
+from acquire.session.layout import MAX_FORCE_N
 from acquire.text import Message
 from acquire.text.printable import counted
 from acquire.text.quantity import number as grouped
@@ -34,14 +35,7 @@ from live.replay.export_numbers import (
     two_readings,
     vote,
 )
-from live.replay.export_table import (
-    Table,
-    blocks,
-    cell_of,
-    find_table,
-    is_heading,
-    is_remark,
-)
+from live.replay.export_table import Table, blocks, cell_of, find_table, is_heading, is_remark
 from live.replay.export_text import Rows
 
 MAX_ROWS, MAX_NAMES = 20_000_000, 1_000_000
@@ -345,6 +339,10 @@ class _Reader:
         forces = np.array(self._forces) * (self._newtons * self._given.sign)
         if not np.isfinite(forces).any():
             raise DataError("{where}: holds no forces", self._where)
+        if (most := np.nanmax(np.abs(forces))) > MAX_FORCE_N:
+            raise DataError(
+                "{where}: a force of {most:.3g} N is beyond sense; give --load-unit", self._where, most
+            )
         for kinds in self._kinds.values():
             if self._given.decimal is None and kinds.keys() >= {"?", "plain"} and self._mark not in kinds:
                 raise two_readings(self._where, kinds["?"])

@@ -1,6 +1,6 @@
 """What the heading of an exported column means: force, time, name of a picture or number of a row, and its unit.
 
-Names are English, German, French and Japanese, those of common testing machines; units stand in brackets, after a
+Names are those of common testing machines, in the languages of their programs; units stand in brackets, after a
 slash, comma, blank or underscore, or below the heading.
 """
 
@@ -14,8 +14,9 @@ from acquire.errors import ConfigError
 from acquire.protocols.units import is_mass, newtons_per
 
 _WORDS = {
-    "force": "force load f kraft last charge effort 荷重 試験力 力 fuerza carga forza carico",
-    "time": "time t seconds zeit temps duree 時間 tiempo tempo x_value",
+    "force": "force load f kraft last charge effort 荷重 試験力 力 fuerza carga forza carico"
+    " forca kracht siła сила усилие нагрузка 载荷 负荷 试验力 拉力 力值 하중",
+    "time": "time t seconds zeit temps duree 時間 tiempo tempo tijd tid czas время 时间 시간 x_value",
     "clock": "timestamp date datum datetime uhrzeit heure clock 時刻 日時",
     "date": "date datum fecha data 日付",
     "name": "file filename picture image name bild bilddatei datei dateiname fichier photo ファイル 画像",
@@ -27,7 +28,10 @@ _WORDS = {
     " temperature stiffness step line limit constant mode type unit drop",
 }
 """The words of each kind, folded; of ``name`` and ``row`` they are the whole heading. ``other`` makes it none."""
-_ENDINGS = {"force": ("kraft", "荷重", "試験力"), "time": ("zeit", "時間")}
+_ENDINGS = {
+    "force": ("kraft", "荷重", "試験力", "载荷", "负荷", "试验力"),
+    "time": ("zeit", "時間", "时间"),
+}
 _SECONDS = {
     1.0: "s sec secs second seconds sek sekunde sekunden seconde secondes 秒",
     1e-3: "ms msec millisecond milliseconds millisekunden",
@@ -50,7 +54,7 @@ def _folded(text: str) -> str:
 
 
 _SECONDS_OF = {_folded(word): factor for factor, words in _SECONDS.items() for word in words.split()}
-_KINDS = {kind: frozenset(words.split()) for kind, words in _WORDS.items()}
+_KINDS = {kind: frozenset(map(_folded, words.split())) for kind, words in _WORDS.items()}
 
 
 def plain_unit(cell: str) -> str:

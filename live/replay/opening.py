@@ -6,11 +6,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from acquire.errors import ConfigError
 from acquire.events import ignore_event
 from acquire.frame import Burst, CameraInfo
 from acquire.session import Session
+from acquire.text import Message
 from live.config.gauges import gauges_for
 from live.config.loading import AUTO_GAUGES, Config, load_config, settings_in
 from live.config.values import AUTO
@@ -20,11 +22,14 @@ from live.replay.pictures import picture_source, with_reference
 from live.replay.session import session_config, session_path, session_source
 from live.replay.source import ReplayRequest, ReplaySource, check_window
 from live.results.folder import differing_versions
-from live.setup.devices import open_rig
+from live.setup.frames import camera_of
 from live.setup.grid import grid_for
 from live.setup.pictures import read_mask
 from live.setup.prepared import MeasurePlan, PreparedKernel
 from live.setup.region import FirstLook, located_on
+
+if TYPE_CHECKING:
+    from analysis.field import StrainField
 
 _FORMER_AUTO_GAUGES = ("axial", "transverse")  # of recordings made before November 2026
 
@@ -42,7 +47,7 @@ def open_session_source(
         source = session_source(session, request, config, path)
         screen.print(source.words)
         for note in _notes(session, request):
-            screen.print(f"note: {note}")
+            screen.print(Message("note: {what}", note))
         yield source, _with_fitting_gauges(config, session.camera, request, screen)
 
 
@@ -64,7 +69,10 @@ def _with_fitting_gauges(
         except ConfigError:
             del gauges[name]
             screen.print(
-                f"note: the automatic gauge {name} of the run has no ZOI in this grid, and is left out"
+                Message(
+                    "note: the automatic gauge {name} of the run has no ZOI in this grid, and is left out",
+                    name,
+                )
             )
     return replace(config, gauges=gauges)
 
@@ -102,12 +110,8 @@ def open_source(request: ReplayRequest) -> Iterator[tuple[ReplaySource, Config]]
     request = with_reference(request)
     config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
     config = replace(config, load=replace(config.load, address="none:"))
-    rig = open_rig(config.camera.address, "none:", ignore_event, crop=config.camera.crop)
-    try:
-        with rig.camera as camera:
-            yield picture_source(camera, request, config), config
-    finally:
-        rig.close()
+    with camera_of(config.camera.address, crop=config.camera.crop) as camera, camera:
+        yield picture_source(camera, request, config), config
 
 
 def prepare_replay(
@@ -126,6 +130,16 @@ def prepare_replay(
     plan = MeasurePlan.of(config, camera, mask)
     plan.compile(camera, screen.status, stopped)
     return plan.on(source.reference, f"the reference of {name}")
+
+
+def fields_of(
+    source: ReplaySource, config: Config, name: str, screen: Screen
+) -> Iterator[tuple[float, StrainField]]:
+    """Time (s, monotonic) and field of each burst, with the progress on the screen; raises as ``replay``."""
+    ready = prepare_replay(source, config, name, screen)
+    for m in ready.measurements(source.bursts, source.loads, ignore_event):
+        yield m.t, m.field
+        screen.progress(m.time_step, m.number + 1, source.expected, 0.0)
 
 
 def _noise_of(reference: Burst) -> float | None:

@@ -31,37 +31,34 @@ class ReplayRequest:
     ----------
     source : str
         Path of a session, or an address of pictures (``files:shots/*.tif``, ``video:...``).
+    forces : Path or None
+        A file with the forces (``live.replay.forces``).
+    config_file : Path or None
+    overrides : mapping of "section.key" to value
     as_measured : bool
     start_s, end_s : float or None, s
         Part of the session, in seconds since its start.
     reference : str or None
         An image file as the reference, or the name of one of the pictures, in place of the first.
-    forces : Path or None
-        A file with the forces (``live.replay.forces``).
-    config_file : Path or None
-    overrides : mapping of "section.key" to value
     numbers : range or None
         Numbers of the bursts to measure, in the order within that part; only of a session.
     parts : sequence of Path
         Files of ``measure_part`` for the whole session, in order: joined, and not measured again.
     final_folder : Path or None
         The later folder of the results, where it is not the one they are written to.
-    response : str
-        "stress", "mean", "time" or a gauge: what the response of each place is over; empty: none.
     """
 
     source: str
-    as_measured: bool
-    start_s: float | None
-    end_s: float | None
-    reference: str | None
     config_file: Path | None
     overrides: Mapping[str, Any]
+    as_measured: bool = False
+    start_s: float | None = None
+    end_s: float | None = None
+    reference: str | None = None
     forces: Path | None = None
     numbers: range | None = None
     parts: Sequence[Path] = ()
     final_folder: Path | None = None
-    response: str = ""
 
 
 Work = Burst | NewReference

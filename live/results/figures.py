@@ -149,8 +149,8 @@ def headline(figures: TensileFigures, *, stresses: bool) -> list[TensileRow]:
 
 def evaluate(history: History, loads: LoadLog, specimen: SpecimenConfig) -> TensileFigures:
     """The tensile figures of the run; stresses are forces (N) where the section is not known."""
-    stress = history.forces(loads) / (specimen.area_m2 or 1.0)
-    return evaluate_test(history.curve(stress, specimen.axis), tensile_options(specimen))
+    load = specimen.load(history.forces(loads))
+    return evaluate_test(history.curve(load, specimen.axis), tensile_options(specimen))
 
 
 def tensile_options(specimen: SpecimenConfig) -> TensileOptions:

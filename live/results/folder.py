@@ -18,6 +18,7 @@ from acquire.frame import Burst
 from acquire.text import Message
 from acquire.text.printable import printable
 from live import VERSION
+from live.config.new_files import free_name
 from live.pipeline.measure import NewReference
 from live.pipeline.run_state import RunState
 
@@ -109,7 +110,9 @@ def make_folder(wanted: str | None, now: datetime.datetime) -> Path:
     ConfigError
         It holds a run already (files are never overwritten), or cannot be made.
     """
-    folder = Path(wanted) if wanted else _unused(Path("runs") / now.strftime("%Y%m%dT%H%M%SZ"))
+    runs = Path("runs")
+    own = free_name(now.strftime("%Y%m%dT%H%M%SZ"), lambda name: (runs / name).exists())
+    folder = Path(wanted) if wanted else runs / own
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -118,11 +121,6 @@ def make_folder(wanted: str | None, now: datetime.datetime) -> Path:
         ) from None
     _check_free(folder)
     return folder
-
-
-def _unused(folder: Path) -> Path:
-    tries = [folder, *(folder.with_name(f"{folder.name}-{n}") for n in range(2, 1000))]
-    return next(f for f in tries if not f.exists())
 
 
 class BurstFailures:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 from analysis.field import ZoiGrid
 from live.config.figures import FIGURES
 
@@ -96,7 +97,7 @@ _PLACES = (
     Quantity("instant", UNITLESS, "number of the measurement in strain.h5, from 0"),
 )
 _GAUGE, _SHARE = "gauge_", "share_gauge_"
-_KNOWN = {q.name: q for q in (*_FIELDS, *_RESPONSES, *_PLACES)} | {
+KNOWN = {q.name: q for q in (*_FIELDS, *_RESPONSES, *_PLACES)} | {
     one.plain: Quantity(one.plain, one.unit, one.words) for one in FIGURES if one.column and one.words
 }
 
@@ -112,21 +113,26 @@ MEANS = {
 def quantity_of(name: str) -> Quantity:
     """The quantity of a map or column; one that is not known refers to the description of the format."""
     plain = MEANS.get(name, name)
-    if plain in _KNOWN:
-        return _KNOWN[plain]
+    if plain in KNOWN:
+        return KNOWN[plain]
     gauge = plain.removeprefix("sigma_")
     if plain.startswith(_SHARE):
-        words = f"share of its area that {plain.removeprefix('share_')} stands for, at either end"
+        words = Message(
+            "share of its area that {name} stands for, at either end", plain.removeprefix("share_")
+        )
         return Quantity(plain, UNITLESS, words)
     if gauge.startswith(_GAUGE):
-        words = f"strain of the virtual gauge {gauge.removeprefix(_GAUGE)!r}; nan where it was lost"
-        return Quantity(
-            plain, UNITLESS, words if plain == gauge else f"standard uncertainty (1 sigma) of {gauge}"
-        )
-    of = _KNOWN.get(plain.removeprefix("sigma_"))
+        named = repr(gauge.removeprefix(_GAUGE))
+        words = Message("strain of the virtual gauge {name}; nan where it was lost", named)
+        return Quantity(plain, UNITLESS, words if plain == gauge else _sigma_of(gauge))
+    of = KNOWN.get(plain.removeprefix("sigma_"))
     if of is None or not plain.startswith("sigma_"):
         return Quantity(plain, UNITLESS, "see docs/strain-format.md")
-    return Quantity(plain, of.unit, f"standard uncertainty (1 sigma) of {of.name}")
+    return Quantity(plain, of.unit, _sigma_of(of.name))
+
+
+def _sigma_of(name: str) -> str:
+    return Message("standard uncertainty (1 sigma) of {name}", name)
 
 
 def mean_name(name: str) -> str:

@@ -219,7 +219,7 @@ class Strain(Closing):
         display = display or Display()
 
         def variable(axes: Any, name: str, values: NDArray[Any]) -> tuple[Any, NDArray[Any], dict[str, str]]:
-            return axes, values, {"units": display.unit(name), "long_name": quantity_of(name).words}
+            return axes, values, {"units": display.unit(name), "long_name": str(quantity_of(name).words)}
 
         names = [name for name in self.values if name != "time_s"]
         data = {
@@ -346,3 +346,10 @@ def _warn_of_times(path: Path, times: NDArray[np.float64]) -> None:
     ):
         if count:
             _log.warning("%s: %d %s; they are used as they are", path, count, what)
+
+
+def whole_maps(path: Path) -> dict[str, NDArray[Any]]:
+    """The maps of the whole test in a ``strain.h5``, (R, C), but those without a value; raises DataError."""
+    with Strain.open(path) as strain:
+        maps = {name: strain.maps(name, 0) for name in strain.whole_names}
+    return {name: values for name, values in maps.items() if np.isfinite(values).any()}

@@ -24,6 +24,7 @@ from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from acquire.record_mode import Crop
 from acquire.session import Session
+from acquire.text import Message
 from analysis.evaluate import Curve, LoadAxis, load_axis
 from analysis.field import StrainField
 from live.config.cameras import FIELDS, SIDES
@@ -98,7 +99,7 @@ class RunFolder(Closing):
         try:
             return read()
         except DataError as error:
-            self._notes[f"the recording cannot be read, the results can: {error}"] = None
+            self._notes[Message("the recording cannot be read, the results can: {why}", error)] = None
             return otherwise
 
     @cached_property

@@ -259,14 +259,7 @@ def _group(parent: Any, name: str, nx_class: str, **attrs: Any) -> Any:
 
 
 def _add_mean(entry: Any, info: ResultsInfo) -> None:
-    mean = _group(
-        entry,
-        "mean",
-        "NXdata",
-        signal="eyy",
-        axes=["time_s"],
-        title="Strains of the region",
-    )
+    mean = _group(entry, "mean", "NXdata", signal="eyy", axes=["time_s"], title="Strains of the region")
     mean.attrs["auxiliary_signals"] = ["exx", "exy"]
     mean.attrs["load_axis"] = np.array("x" if info.axis == "x" else "y", "S1")
     mean.attrs["load_angle_deg"] = np.float64(math.nan)

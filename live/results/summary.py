@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +29,9 @@ from live.results.figures import (
     tare_line,
 )
 from live.results.finished.answers import checks_line
-from live.results.finished.findings import doubts, findings
+from live.results.finished.findings import DataCheck, doubts, findings
 from live.results.finished.finished_test import FinishedTest
+from live.words.language import told
 
 _CARD_EVERY_S = 1.0  # of the test
 
@@ -90,11 +92,9 @@ def why_nothing(run_state: RunState) -> str:
     )
 
 
-def belief_lines(test: FinishedTest) -> list[str]:
-    """Whether the figures can be believed: the checks made, and what the data say against the figures."""
-    found = findings(test)
-    looks = [Message("look: {text}", text) for text in doubts(found)]
-    return [*film_line(test.specimen), checks_line(found), *looks]
+def look_lines(found: Sequence[DataCheck]) -> list[str]:
+    """What the data say against the figures."""
+    return [Message("look: {text}", text) for text in doubts(found)]
 
 
 def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
@@ -122,8 +122,9 @@ def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
         noise_line(history),
     ]
     lines += sharpness_line(history.column("blur").tolist(), history.column("sigma_blur").tolist())
-    lines += latency_lines(history) + belief_lines(test)
-    figures = [*test.cycles.lines(), *figure_lines(test.figures, specimen)]
+    found = findings(test)
+    lines += [*latency_lines(history), *film_line(specimen), checks_line(found), *look_lines(found)]
+    figures = [*test.cycles.lines(), *test.response, *figure_lines(test.figures, specimen)]
     if figures:
         figures += tare_line(history, run_state.loads) + lag_line(history, run_state.loads, specimen)
     return lines + figures + alignment_line(history, specimen)
@@ -153,27 +154,37 @@ class StatusCard:
         return True
 
     def written(self, snapshot: Snapshot, history: History) -> str:
-        """The card: the last measurement, and the figures of all of ``history``."""
-        return "\n\n".join(self._lines(snapshot, history))
+        """The card in the language of the terminal: the last measurement, and the figures of all of ``history``."""
+        return "\n\n".join(told(line) for line in self._lines(snapshot, history))
 
     def _lines(self, snapshot: Snapshot, history: History) -> list[str]:
         i, frames, lost = history.time_steps[-1], snapshot.frames, snapshot.lost
         one, mean = Amount.rough("strain", i.zoi_sigma), Amount.rough("strain", i.sigma_eyy, 2)
-        lines = [
-            f"**{i.n_valid} of {i.n_zoi}** ZOIs valid" + (f" ({i.refused})" if i.refused else ""),
-            f"one ZOI **{one}**, region **{mean}** (1 σ)",
+        refused = Message(" ({refused})", i.refused) if i.refused else ""
+        lines: list[str] = [
+            Message("**{valid} of {zois}** ZOIs valid{refused}", i.n_valid, i.n_zoi, refused),
+            Message("one ZOI **{one}**, region **{mean}** (1 σ)", one, mean),
         ]
         lines += film_line(self._specimen)
         blur = Blur(i.blur, i.sigma_blur).text
-        lines += [f"{blur} since the reference"] * bool(blur)
+        lines += [Message("{blur} since the reference", blur)] * bool(blur)
         if part := share_text(i.least_share):
-            lines.append(f"strain **{part}**")
+            lines.append(Message("strain **{part}**", part))
         if snapshot.axis_assumed:
-            lines.append(f"axis of the load **{snapshot.axis}**, assumed")
+            lines.append(Message("axis of the load **{axis}**, assumed", snapshot.axis))
         figures = evaluate(history, self._loads, self._specimen)
-        lines += [line.replace("  ", ", ") for line in elastic_lines(figures, self._specimen)]
+        lines += [told(line).replace("  ", ", ") for line in elastic_lines(figures, self._specimen)]
+        recorded, measured, skipped = (
+            Amount("count", frames[name]) for name in ("recorded", "measured", "skipped")
+        )
+        lost_text = Message("**{lost}**", lost) if lost else 0
         lines.append(
-            f"recorded {frames['recorded']}, measured {frames['measured']}, skipped {frames['skipped']},"
-            f" lost {f'**{lost}**' if lost else 0}"
+            Message(
+                "recorded {recorded}, measured {measured}, skipped {skipped}, lost {lost}",
+                recorded,
+                measured,
+                skipped,
+                lost_text,
+            )
         )
         return lines

@@ -6,12 +6,14 @@ A measurement is written once its force is final (``live.pipeline.measurement.Fo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from acquire.closing import Closing
 from acquire.errors import DataError
+from live.config.loading import Config
 from live.pipeline.consumer import Consumer, Policy, RunInfo
 from live.pipeline.history import AxisFinder
 from live.pipeline.measurement import Measurement
@@ -130,8 +132,24 @@ class ResultsConsumer(Consumer):
         return ""
 
 
+class ResponseConsumer(Consumer):
+    """Fills the response of the places that a test shows while it goes on; a burst that is dropped has no weight."""
+
+    name = "response"
+    queue_size = 64
+
+    def __init__(self, run_state: RunState, config: Config) -> None:
+        self._run_state = run_state
+        run_state.response.channel = config.output.response or ""
+        run_state.response.area_m2 = config.specimen.area_m2 or math.nan
+
+    def matched(self, measurement: Measurement) -> None:
+        """Add one burst."""
+        self._run_state.response.add(measurement, self._run_state.history.current_axis)
+
+
 def write_results(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
-    """The consumers of a run that writes its results and shows nothing.
+    """The consumers of a run that writes its results and shows nothing; it adds up a response that is wanted.
 
     Raises
     ------
@@ -153,10 +171,8 @@ def write_results(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
         lagged=config.load.lag_s != 0,
         plates=bool(config.plate),
         lens=config.lens.focal_px is not None,
-        response=about.response,
+        response=config.output.response or "",
     )
-    return [
-        ResultsConsumer(
-            Results(about.folder, about.grid, info, DEFERRED_FLUSH_S if about.deferred else FLUSH_S)
-        )
-    ]
+    results = Results(about.folder, about.grid, info, DEFERRED_FLUSH_S if about.deferred else FLUSH_S)
+    watch = [ResponseConsumer(run_state, config)] if config.output.response else []
+    return [ResultsConsumer(results), *watch]

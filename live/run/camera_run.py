@@ -6,7 +6,7 @@ import json
 import math
 import time
 
-from acquire.errors import PhasedicError
+from acquire.errors import EXIT_INTERRUPTED, LOSS, exit_code_of
 from acquire.events import Event, EventKind
 from acquire.hdf5 import FolderWatch
 from acquire.text import Message
@@ -23,15 +23,7 @@ from live.run.camera_source import CameraSource, GrabPlan
 from live.run.control import ControlRefused
 from live.run.incoming_bursts import TAKING, IncomingBursts
 from live.run.measurer import Measurer
-from live.run.outcome import (
-    DEFECT,
-    EXIT_INTERRUPTED,
-    INTERRUPTED,
-    LOSS,
-    TIME_IS_OVER,
-    Outcome,
-    StopSignal,
-)
+from live.run.outcome import INTERRUPTED, TIME_IS_OVER, Outcome, StopSignal
 from live.run.pre_trigger import PreTriggerBuffer
 from live.run.prepared_run import PreparedRun
 from live.run.recorder import open_recording
@@ -314,7 +306,7 @@ class CameraRun(Subscriber):
         """The exit code of the run, after it has ended."""
         error = self.source.error
         if error is not None:
-            return error.exit_code if isinstance(error, PhasedicError) else DEFECT
+            return exit_code_of(error)
         if failure := self._keeper.load_failure or self._measurer.failure:
             return failure
         if self._stop.reason == INTERRUPTED:

@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, Protocol, TextIO
 
+from acquire.text import Message
 from live.pipeline.screen import Screen
 from live.run.control import ENDED, Controls, answer
 
@@ -203,7 +204,7 @@ class Keys:
         if self._quit_t - before <= QUIT_AGAIN_S:
             self._controls.stop(ENDED)
         else:
-            self._screen.print(f"q again within {QUIT_AGAIN_S:g} s ends the test")
+            self._screen.print(Message("q again within {seconds:g} s ends the test", QUIT_AGAIN_S))
 
 
 class Keyboard:

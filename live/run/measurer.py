@@ -9,7 +9,7 @@ import threading
 import time
 
 from acquire.burst import LIMIT_PX
-from acquire.errors import PhasedicError, TooLittleMemory
+from acquire.errors import DEFECT, PhasedicError, TooLittleMemory
 from acquire.events import Event, EventKind, EventSink, Level
 from acquire.frame import Burst
 from acquire.system import lower_priority
@@ -250,7 +250,7 @@ class Measurer:
             else:
                 self._measure(ready)
         except TooLittleMemory as error:
-            self.failure = 1
+            self.failure = DEFECT
             text = Message("nothing is measured, recording goes on: {error}", error)
             self._run_state.event_log.emit(EventKind.MEASUREMENT, "measurement", text, "error")
             self._incoming.skip_rest()
@@ -259,7 +259,7 @@ class Measurer:
             self._stop.request(Message("the start failed"))
         except Exception as error:
             log.exception("the measurement failed")
-            self.failure = 1
+            self.failure = DEFECT
             text = Message("measuring has stopped by a defect, recording goes on: {error}", repr(error))
             self._run_state.event_log.emit(EventKind.MEASUREMENT, "measurement", text, "error")
             self._incoming.skip_rest()

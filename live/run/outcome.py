@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from acquire.errors import exit_code_of_all
 from live.config.loading import Config
 from live.pipeline.run_state import RunState
 from live.results.finished.finished_test import FinishedTest
@@ -18,9 +19,8 @@ if TYPE_CHECKING:
 
     from analysis import ZoiGrid
 
-DEFECT, LOSS, EXIT_INTERRUPTED = 1, 5, 130
 INTERRUPTED, TIME_IS_OVER = "interrupted", "the time is over"
-"""Reasons to stop; INTERRUPTED gives EXIT_INTERRUPTED."""
+"""Reasons to stop; INTERRUPTED gives the exit code of that name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,11 +69,8 @@ class OutcomeOfTest:
 
     @property
     def exit_code(self) -> int:
-        """That of all; finished with loss where one camera failed and another did not."""
-        codes = {outcome.exit_code for outcome in self.cameras.values()}
-        if len(codes) == 1:
-            return codes.pop()
-        return next((code for code in (DEFECT, EXIT_INTERRUPTED) if code in codes), LOSS)
+        """That of all (``acquire.errors.exit_code_of_all``)."""
+        return exit_code_of_all(outcome.exit_code for outcome in self.cameras.values())
 
 
 class StopSignal:

@@ -14,12 +14,14 @@ from acquire.clock import ClockPair
 from acquire.errors import ConfigError
 from acquire.hdf5 import compile_loops
 from acquire.record_mode import RecordMode
+from acquire.text import Message
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.results.folder import make_folder
+from live.results.response.rising import check_channel
 from live.run.alarms import check_alarms
 from live.run.outcome import StopSignal
 from live.setup.devices import Rig
@@ -63,7 +65,7 @@ class PreparedRun:
         fps = f", {c.fps:g} fps" if c.fps else ""
         yield f"camera: {c.name}, {c.width} x {c.height} px, {c.bits} bits{fps}"
         yield f"load cell: {cell.name}"
-        yield from (f"warning: {warning}" for warning in (*c.warnings, *cell.warnings))
+        yield from (Message("warning: {what}", warning) for warning in (*c.warnings, *cell.warnings))
         yield f"files: {self.folder}"
 
 
@@ -81,7 +83,7 @@ def new_run_state(config: Config, screen: Screen, *, both_sides: bool = False) -
     with_load = config.load.address != "none:"
     run_state = RunState.new(config.load.max_gap_s, config.load.lag_s, config.specimen, with_load=with_load)
     run_state.event_log.names |= _device_names(config)
-    screen.print(f"opening {config.camera.address}")
+    screen.print(Message("opening {address}", config.camera.address))
     return run_state
 
 
@@ -103,10 +105,11 @@ def set_up(config: Config, rig: Rig, event_log: EventLog, screen: Screen, stop: 
     """
     camera = rig.camera.info
     plan = MeasurePlan.of(config, camera, _mask(config, rig))
+    check_channel(plan.config, forces=config.load.address != "none:")
     bursts = _burst_lengths(config, camera.live)
     took = plan.compile(camera, screen.status, lambda: stop.requested)
     if took > 0:
-        screen.print(f"everything is compiled ({took:.0f} s)")
+        screen.print(Message("everything is compiled ({took:.0f} s)", took))
     compile_loops()
     dry_run(camera, plan.kernel_grid, plan.settings, bursts)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))

@@ -18,15 +18,15 @@ BAND_PICTURES = 128
 
 
 def from_lamp(frames: Iterable[Frame], lamp_Hz: float) -> Readout:
-    """From pictures of anything that stands still in the light of a lamp of ``lamp_Hz``.
+    """From whole pictures of anything that stands still in the light of a lamp of ``lamp_Hz``.
 
     Raises
     ------
     DataError
         Too few pictures, or no bands that move through them.
     """
-    good = (frame for frame in frames if not frame.damaged)
-    profiles = [frame.image.mean(axis=1, dtype=np.float64) for frame in itertools.islice(good, BAND_PICTURES)]
+    taken = itertools.islice(frames, BAND_PICTURES)
+    profiles = [frame.image.mean(axis=1, dtype=np.float64) for frame in taken]
     try:
         return readout_of_bands(np.array(profiles).reshape(len(profiles), -1), lamp_Hz)
     except ValueError as error:

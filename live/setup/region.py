@@ -6,10 +6,10 @@ its folder and a replay use it from there.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -18,19 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
-from acquire.errors import ConfigError, DataError, DeviceError
-from acquire.events import Event, EventSink
-from acquire.frame import QUANTISATION, CameraInfo, Frame
+from acquire.errors import ConfigError, DataError
+from acquire.frame import QUANTISATION, CameraInfo
 from acquire.text import Message
 from live.config.loading import Config
 from live.config.values import ALL, AUTO
-from live.setup.devices import at_rest, open_rig
+from live.setup.frames import camera_of, report_warnings, whole_frames
 from live.setup.grid import grid_for, whole_picture
 from live.setup.pictures import read_mask, with_mask
 from live.setup.placement import with_auto_gauges
 
 if TYPE_CHECKING:
-    from acquire.camera.contract import Camera
     from analysis import ZoiGrid
 
 Box = tuple[int, int, int, int]
@@ -38,8 +36,6 @@ Bools = NDArray[np.bool_]
 
 FIRST_LOOK_FRAMES = 4
 """Frames of a live camera in which the specimen is searched; of recorded pictures, one."""
-SILENCE_S = 20.0
-"""Wait for the next picture of a first look; a run waits for ever, since a test may be under way."""
 FILLS_PICTURE = 0.98  # of the picture: above it the specimen fills the picture, unless it has a hole
 
 
@@ -187,63 +183,14 @@ def first_look(config: Config, print_line: Callable[[str], None]) -> FirstLook:
     DataError
         The camera ended without a whole frame.
     DeviceError
-        No whole picture came for ``SILENCE_S``.
+        See ``frames_of``.
     """
-    rig = open_rig(
-        at_rest(config.camera.address), "none:", report_warnings(print_line), crop=config.camera.crop
-    )
-    n = FIRST_LOOK_FRAMES if rig.camera.info.live else 1
-    images: list[NDArray[Any]] = []
-    try:
-        with rig.camera:
-            for frame in _whole_frames(rig.camera):
-                images.append(frame.image)
-                if len(images) == n:
-                    break
-    finally:
-        rig.close()
+    with camera_of(config.camera.address, report_warnings(print_line), crop=config.camera.crop) as camera:
+        n = FIRST_LOOK_FRAMES if camera.info.live else 1
+        images = [frame.image for frame in islice(whole_frames(camera), n)]
     if not images:
         raise DataError("{address}: gave no whole frame; look at the camera", config.camera.address)
-    return FirstLook(*_mean_and_noise(images), rig.camera.info)
-
-
-def _whole_frames(camera: Camera) -> Iterator[Frame]:
-    """The undamaged frames of a camera; raises DeviceError where none comes for ``SILENCE_S``."""
-    frames, silent = (frame for frame in camera if not frame.damaged), False
-
-    def stop() -> None:
-        nonlocal silent
-        silent = True
-        camera.stop()
-
-    while True:
-        watch = threading.Timer(SILENCE_S, stop)
-        watch.start()
-        try:
-            frame = next(frames, None)
-        finally:
-            watch.cancel()
-        if frame is not None:
-            yield frame
-        elif silent:
-            raise DeviceError(
-                "{name}: no whole picture came in {SILENCE_S:g} s; look at its cable, its trigger and the light, and "
-                "call again",
-                camera.info.name,
-                SILENCE_S,
-            )
-        else:
-            return
-
-
-def report_warnings(print_line: Callable[[str], None]) -> EventSink:
-    """An event sink that passes the warnings and errors of a device to ``print_line``."""
-
-    def report(event: Event) -> None:
-        if event.level != "info":
-            print_line(event.text)
-
-    return report
+    return FirstLook(*_mean_and_noise(images), camera.info)
 
 
 def _mean_and_noise(images: list[NDArray[Any]]) -> tuple[NDArray[Any], float | None]:

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 
-from acquire.errors import PhasedicError
+from acquire.errors import exit_code_of
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
@@ -88,7 +88,7 @@ class StateKeeper(Subscriber):
     def _end_load(self, error: Exception | None) -> None:
         self._load_ended = True
         if error is not None:
-            self.load_failure = error.exit_code if isinstance(error, PhasedicError) else 1
+            self.load_failure = exit_code_of(error)
             text = Message("the load is lost, images go on: {error}", error)
             self._run_state.event_log.emit(EventKind.DEVICE, self._load, text, "error")
         self._run_state.loads.close()

@@ -69,7 +69,11 @@ def _errors(sides: SidesOfTest, specimen: VirtualSpecimen) -> SidesError:
     front = np.array([along.mean + along.bending, across.mean + across.bending]) - true
     over = found / np.array([along.sigma, across.sigma])
     return SidesError(
-        found, over, front, sides.both.E.value / specimen.E - 1, sides.front.E.value / specimen.E - 1
+        found,
+        over,
+        front,
+        sides.figures["both"].E.value / specimen.E - 1,
+        sides.figures["front"].E.value / specimen.E - 1,
     )
 
 

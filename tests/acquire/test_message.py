@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from acquire.text import Message
-from acquire.text.message import about, filled, from_json, joined
+from acquire.text.message import about, filled, from_json, joined, kept, taken
+from acquire.text.quantity import Amount
 
 
 def test_it_is_its_english_text() -> None:
@@ -67,3 +68,43 @@ def test_parts_stay_messages() -> None:
 def test_it_is_filled_by_whoever_shows_it() -> None:
     shown = filled("{a:.1f} und {b}", {"a": 1.25, "b": "c"}, lambda value, spec: f"<{value}|{spec}>")
     assert shown == "<1.25|.1f> und <c|>"
+
+
+def test_a_file_has_the_english_words_and_the_message() -> None:
+    text = about("cell", Message("{force} for {waited:.1f} s", Amount("force", 12.0), 2.5))
+    stored = json.loads(json.dumps(kept(text)))
+    again = taken(stored)
+    assert stored["text"] == again == "cell: 12.0 N for 2.5 s"
+    assert isinstance(again, Message) and again.values["what"].values["force"] == Amount("force", 12.0)
+    assert (
+        kept("plain") == kept(Message("plain")) == {"text": "plain"} and taken({"text": "plain"}) == "plain"
+    )
+
+
+def doubled(depth: int) -> dict[str, object]:
+    inner: dict[str, object] = {"say": "{a}{a}", "with": {"a": "xx"}}
+    for _ in range(depth):
+        inner = {"say": "{a}{a}", "with": {"a": inner}}
+    return inner
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {"say": "other words", "with": {}},
+        {"say": "{a:999999999}", "with": {"a": "x"}},
+        {"say": "{a:.999999999f}", "with": {"a": 1.5}},
+        {"say": "{gone}", "with": {}},
+        {"say": 7, "with": {}},
+        {"say": "{a}", "with": [1]},
+        {"say": "{a}", "with": {"a": Amount("strain", 1.0).to_json() | {"digits": 10**9}}},
+        {"say": "{a}", "with": {"a": Amount("strain", 1.0).to_json() | {"kind": "no kind"}}},
+        doubled(60),
+        doubled(100_000 // 200),
+        None,
+        "words",
+    ],
+)
+def test_a_message_of_a_file_that_says_something_else_is_not_taken(message: object) -> None:
+    assert type(taken({"text": "the words", "message": message})) is str
+    assert taken({"text": "the words", "message": message}) == "the words"

@@ -46,6 +46,20 @@ def test_a_number_reads_back_to_its_last_place(value: float, decimals: int) -> N
     assert not (text.startswith("−") and back == 0)
 
 
+@given(
+    st.sampled_from(sorted(UNITS)),
+    st.floats(-1e300, 1e300) | st.just(math.inf),
+    st.floats(),
+    st.integers(1, 3),
+)
+def test_any_number_is_printed(kind: str, value: float, sigma: float, digits: int) -> None:
+    printed = str(Amount(kind, value, sigma, digits))
+    assert len(printed) < 120
+    assert float(number(value).replace(GAP, "").replace("−", "-").replace("–", "0")) == pytest.approx(
+        value if math.isfinite(value) else 0, rel=5.1e-4, abs=0.5
+    )
+
+
 @given(st.sampled_from(sorted(UNITS)), st.floats(-1e11, 1e11), st.floats(1e-9, 1e9))
 def test_a_live_figure_has_few_digits_and_tells_its_sigma(kind: str, value: float, sigma: float) -> None:
     one = unit_of(kind, value).one

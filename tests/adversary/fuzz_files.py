@@ -48,7 +48,7 @@ def look_at_session(path: Path) -> Numbers:
             numbers[f"load {sample.t}"] = (repr(sample.force), sample.raw)
         session.events(), session.frame_counts, session.clock_pairs
         for as_measured in (True, False):
-            request = ReplayRequest(str(path), as_measured, None, None, None, None, {})
+            request = ReplayRequest(str(path), None, {}, as_measured)
             config = session_config(session, request, {}, path)
             material = session_source(session, request, config, path)
             for burst in material.bursts:

@@ -13,9 +13,8 @@ from typing import Any
 
 import pytest
 
-from acquire.errors import ConfigError, DataError, DeviceError
+from acquire.errors import EXIT_INTERRUPTED, ConfigError, DataError, DeviceError
 from live import cli
-from live.commands.exit_codes import EXIT_INTERRUPTED
 
 
 def ended(error: BaseException | None, monkeypatch: pytest.MonkeyPatch) -> int:

@@ -92,12 +92,13 @@ def test_the_mean_has_neither_motion_nor_bending(good: Path) -> None:
         np.testing.assert_allclose(found[f"bending_{name}"], bent, atol=1.5e-5)
     with open_run(good / "front") as front, open_run(good / "back") as back:
         sides = SidesOfTest.of_folders(front, back)
-    assert sides.both.E.value == pytest.approx(specimen.E, rel=0.01)
-    assert sides.both.E.low < specimen.E < sides.both.E.high
-    assert sides.front.E.value < 0.85 * specimen.E
-    assert sides.back.E.value > 1.2 * specimen.E
+    assert sides.figures["both"].E.value == pytest.approx(specimen.E, rel=0.01)
+    assert sides.figures["both"].E.low < specimen.E < sides.figures["both"].E.high
+    assert sides.figures["front"].E.value < 0.85 * specimen.E
+    assert sides.figures["back"].E.value > 1.2 * specimen.E
     assert not any("limits" in line for line in sides.figure_lines(stresses=True))
-    stated = replace(sides, both=replace(sides.both, budget={"scatter": 1e-3, "load cell": 3e-3}))
+    both = replace(sides.figures["both"], budget={"scatter": 1e-3, "load cell": 3e-3})
+    stated = replace(sides, figures={"both": both})
     assert list(stated.figure_lines(stresses=True))[-1] == "±: 95% interval, of E with limits of load cell"
 
 
@@ -241,7 +242,7 @@ class Commanding(Screen):
         if self.both is None or not snapshot.time_step:
             return
         runs = self.both.cameras
-        self.shown.append(newest(runs["front"].run_state, runs["back"].run_state))
+        self.shown.append(newest({name: run.run_state for name, run in runs.items()}))
         if len(self.shown) == 1:
             self.both.command(EventKind.NOTE, "seen")
 

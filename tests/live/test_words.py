@@ -12,10 +12,13 @@ from typing import Any
 import pytest
 from babel.messages.extract import extract
 
+from acquire.events import EventKind
 from acquire.text import Message
 from acquire.text.message import FIELD, about, fields
 from analysis.evaluate import GAUGE_KINDS
 from live.results.maps.field_maps import FIELD_MAPS
+from live.results.quantities import KNOWN as QUANTITIES
+from live.results.report.record import FIGURES
 from live.words import language
 from live.words.language import LANGUAGES, entries, parsed, said
 from tests.live.ui.web.browser import ROOT
@@ -146,6 +149,9 @@ def test_every_message_is_translated(name: str) -> None:
 @pytest.mark.parametrize("name", LANGUAGES)
 def test_every_text_of_the_page_is_translated(name: str) -> None:
     served = {word for kind in GAUGE_KINDS.values() for word in (kind.label, kind.hint)}
+    served |= {str(kind) for kind in EventKind}
+    served |= {one.words for one in QUANTITIES.values() if not isinstance(one.words, Message)}
+    served |= {words for _, _, words in FIGURES} | {item for item, _, _ in practice_rows()}
     assert not {text for text in {*of_the_page(), *FIELD_MAPS, *served} if text not in entries(name)}
 
 
@@ -175,6 +181,15 @@ def test_every_field_has_a_value() -> None:
                     given = len(node.args) - 1 + len(node.keywords)
                     want = len(fields(text)) if given or name == "Message" else 0
                     assert given == want, f"{path}:{node.lineno}: {text}"
+
+
+def practice_rows() -> list[tuple[str, str, str]]:
+    tree = ast.parse((ROOT / "live" / "results" / "report" / "practice.py").read_text("utf-8"))
+    rows = (node for node in ast.walk(tree) if isinstance(node, ast.Tuple) and len(node.elts) == 3)
+    heads = [tuple(getattr(one, "value", "") for one in row.elts) for row in rows]
+    found = [row for row in heads if isinstance(row[0], str) and row[0][:1].isupper()]
+    assert len(found) > 20
+    return found
 
 
 HOLD_MESSAGES = ("why", "words", "remark", "reason", "refused", "apart", "state", "doing", "trouble", "text")

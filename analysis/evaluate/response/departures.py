@@ -32,6 +32,7 @@ class _Instant:
     x: float
     y: Floats
     sigma: Floats
+    noise: tuple[float, float]
 
 
 class Departures:
@@ -54,6 +55,8 @@ class Departures:
         x where the place left its line; NaN where it did not.
     seen : (...) bool
         It had a value in the last instants.
+    sums : ResponseSums
+        Of the line of each place, from the instants before the last look.
     window : int
         Instants of a look.
     segments : list of int
@@ -67,24 +70,26 @@ class Departures:
         self.window = min(max(WINDOW, looks // _PARTS), _WIDEST)
         self.limit = max(LIMIT, NormalDist().inv_cdf(1 - CHANCE / max(looks, 1) / 2))
         self._when = np.zeros(shape, np.intp)  # the instant at which it was found
-        self._sums = ResponseSums()
+        self.sums = ResponseSums()
         self._held: deque[_Instant] = deque()
         self._segment, self._reference = 0, 0
         # Of what all have in common in the line: sum of squares, instants, the last.
         self._usual = 0.0, 0, 0.0
 
-    def add(self, x: float, y: Floats, sigma: Floats, reference: int = 0) -> None:
-        """One instant; parameters as ``ResponseSums.of``."""
+    def add(
+        self, x: float, y: Floats, sigma: Floats, reference: int = 0, noise: tuple[float, float] = (0.0, 0.0)
+    ) -> None:
+        """One instant; parameters as ``ResponseSums.of``, ``noise`` its last two."""
         if reference != self._reference:
             while self._held:
                 self._absorb(None)
             self._segment, self._reference = self._segment + 1, reference
         self.segments.append(self._segment)
-        self._held.append(_Instant(len(self.segments) - 1, x, y, sigma))
+        self._held.append(_Instant(len(self.segments) - 1, x, y, sigma, noise))
         self.seen = np.any([np.isfinite(one.y) for one in self._held], axis=0)
         if len(self._held) < self.window:
             return
-        lines = self._sums.lines() if len(self.segments) > FIRST + self.window - 1 else None
+        lines = self.sums.lines() if len(self.segments) > FIRST + self.window - 1 else None
         if lines is None or self._look(lines):
             self._absorb(lines)
 
@@ -95,7 +100,7 @@ class Departures:
         if np.isfinite(off):
             self._usual = self._usual[0] + off**2, self._usual[1] + 1, off
         on = np.where(np.isnan(self.at), one.y, np.nan)
-        self._sums += ResponseSums.of(one.x, on, one.sigma, self.segments[one.number])
+        self.sums += ResponseSums.of(one.x, on, one.sigma, self.segments[one.number], *one.noise)
 
     def _look(self, lines: ResponseLines) -> bool:
         """Judge the held instants; whether the oldest of them may become one of the line."""

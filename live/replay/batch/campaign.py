@@ -8,7 +8,6 @@ from __future__ import annotations
 import csv
 import dataclasses
 import io
-import os
 import threading
 import time
 from collections.abc import Mapping, Sequence
@@ -17,10 +16,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.errors import EXIT_INTERRUPTED, ConfigError, DataError, PhasedicError
 from acquire.text import Message
 from acquire.text.printable import counted
 from live.config.loading import load_config
+from live.config.new_files import replaced_file
 from live.pipeline.screen import Screen
 from live.replay.batch.cluster import Cluster, check_scheduler
 from live.replay.batch.keys import key_of, longest_first
@@ -46,7 +46,8 @@ def write_summary(rows: Sequence[BatchRow], out: Path) -> list[Path]:
     if (table := as_parquet(rows)) is not None:
         made["summary.parquet"] = table
     for name, content in made.items():
-        _put(out / name, content)
+        with replaced_file(out / name) as part:
+            part.write_bytes(content)
     return [out / name for name in made]
 
 
@@ -76,18 +77,6 @@ def as_parquet(rows: Sequence[BatchRow]) -> bytes | None:
 def _cell(value: Value) -> Any:
     """The value as a cell that no spreadsheet reads as a formula."""
     return value.lstrip("=+-@\t ") if isinstance(value, str) else "" if value is None else value
-
-
-def _put(path: Path, content: bytes) -> None:
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        part.write_bytes(content)
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise DataError(
-            "{path}: cannot be written ({why}); make room and call again", path, error.strerror
-        ) from error
 
 
 _POLL_S = 0.1
@@ -176,7 +165,7 @@ def run_campaign(wanted: CampaignRequest, screen: Screen, stopping: threading.Ev
             _work(wanted, longest_first(tasks), rows, screen, stopping, processes)
     _sweep(wanted.out, rows, tasks)
     if stopping.is_set():
-        return Campaign(tuple(rows.values()), len(tasks), (), 130)
+        return Campaign(tuple(rows.values()), len(tasks), (), EXIT_INTERRUPTED)
     found = tuple(rows[test.name] for test in wanted.tests)
     files = write_summary(found, wanted.out)
     code = 0 if all(row.is_well for row in found) else 5

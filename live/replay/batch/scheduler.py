@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.errors import PhasedicError
+from acquire.errors import DEFECT, PhasedicError
 from acquire.text.printable import duration
 from live.pipeline.screen import Screen
 from live.replay.batch.keys import is_session, key_of_chunk
@@ -220,7 +220,7 @@ class Scheduler:
             return self._whole(name)
         if not row.is_done:
             del self._left[name]
-            code = int(row.values["exit_code"] or 1)
+            code = int(row.values["exit_code"] or DEFECT)
             self._end(name, failed(name, task.source, str(row.values["error"]), code))
             return ()
         self._left[name].discard(task.name)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
-from live.results.export.atomic_file import new_file, new_folder
+from live.config.new_files import new_file, new_folder
 from live.results.export.job import ExportJob
 from live.results.maps.painting import Levels, Painter, caption
 from live.results.maps.scale import ColourScale
@@ -22,10 +22,7 @@ from live.results.response.words import response_title
 
 # Codec of the encoders in OpenCV's wheel, and the programs that do not play it.
 _CODECS = {
-    ".mp4": (
-        "mp4v",
-        "MPEG-4 part 2: web browsers do not play it; give --to gif or --out NAME.webm for them",
-    ),
+    ".mp4": ("mp4v", "MPEG-4 part 2: web browsers do not play it; give --to gif or --out NAME.webm for them"),
     ".webm": (
         "VP90",
         "VP9: old versions of QuickTime and PowerPoint do not play it; give --out NAME.mp4 for them",

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
+from acquire.text import Message
 from analysis.field import Status
 from live.pipeline.screen import Screen
 from live.results.quantities import Display
@@ -103,7 +104,9 @@ class ExportJob:
             spent = now() - began
             if spent > QUIET_S and k:
                 left = spent / k * (len(self.rows) - k)
-                self.screen.status(f"instant {k} of {len(self.rows)}, about {left:.0f} s left")
+                self.screen.status(
+                    Message("instant {k} of {n}, about {left:.0f} s left", k, len(self.rows), left)
+                )
             yield k, row
 
     def notes(self) -> list[str]:

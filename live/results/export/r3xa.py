@@ -12,7 +12,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from live.results.export.atomic_file import new_folder
+from live.config.new_files import new_folder
 from live.results.export.job import ExportJob
 from live.results.export.tables import field_table, load_table, means
 from live.results.run_folder import RunFolder

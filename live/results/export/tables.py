@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from live.results.export.atomic_file import new_file, new_folder
+from live.config.new_files import new_file, new_folder
 from live.results.export.job import ExportJob
 from live.results.quantities import mean_name, quantity_of
 from live.results.run_folder import RunFolder
@@ -187,8 +187,8 @@ def _about(job: ExportJob) -> dict[str, Any]:
     names = {mean_name(name): name for name in job.strain.values}
     units = {name: job.display.unit(name) or "1" for name in ("x", "y", *job.fields)}
     units |= {shown: job.display.unit(name) or "1" for shown, name in names.items()}
-    words = {name: quantity_of(name).words for name in ("x", "y", *job.fields)}
-    words |= {shown: quantity_of(name).words for shown, name in names.items()}
+    words = {name: str(quantity_of(name).words) for name in ("x", "y", *job.fields)}
+    words |= {shown: str(quantity_of(name).words) for shown, name in names.items()}
     return {"notes": job.notes(), "units": units, "definitions": words}
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
-from live.results.export.atomic_file import new_file
+from live.config.new_files import new_file
 from live.results.export.job import ExportJob
 
 _MAX_BYTES = 2**32 - 2**20

@@ -16,7 +16,7 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from live.results.export.atomic_file import new_folder
+from live.config.new_files import new_folder
 from live.results.export.job import ExportJob
 
 _TYPES = {"f4": "Float32", "f8": "Float64", "u1": "UInt8", "i8": "Int64"}

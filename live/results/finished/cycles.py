@@ -19,7 +19,7 @@ from analysis.evaluate.curve import broken_at
 from analysis.evaluate.cyclic.cycles import CycleTable
 from analysis.evaluate.cyclic.loop import BurstStrains
 from analysis.evaluate.figure import quantile
-from live.results.export.atomic_file import new_file
+from live.config.new_files import new_file
 from live.results.figures import figure_text
 
 Floats = NDArray[np.float64]

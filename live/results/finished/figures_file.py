@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from acquire.errors import DataError, PhasedicError
 from acquire.events import EventKind
 from acquire.text import Message
+from acquire.text.message import kept, taken
 from analysis.evaluate import CONFIDENCE, Figure
 from analysis.evaluate.elastic import FILM
 from live.config.loading import Config
+from live.config.new_files import new_file
 from live.pipeline.run_state import RunState
-from live.results.export.atomic_file import new_file
 from live.results.figures import tensile_table
 from live.results.finished.findings import DataCheck, findings
 from live.results.finished.finished_test import FinishedTest
@@ -25,6 +26,7 @@ from live.results.run_folder import RunFolder
 
 FILE, FORMAT, VERSION = "figures.json", "phasedic-figures", 1
 COUNTS = ("grabbed", "recorded", "measured", "skipped", "lost", "without_force")
+T = TypeVar("T")
 _SI = {"MPa": "Pa", "GPa": "Pa", "kN": "N", "%": "1", "": "1"}
 NamedFigure = tuple[str, Figure, str]
 """Name, figure and SI unit."""
@@ -43,20 +45,30 @@ class FiguresFile:
         ``COUNTS``.
     checks : sequence of DataCheck
     exit_code : int
+    remarks : sequence of str
+        Further lines of the summary of a replay.
     """
 
     figures: Sequence[Mapping[str, Any]]
     counts: Mapping[str, int | None]
     checks: Sequence[DataCheck]
     exit_code: int
+    remarks: Sequence[str] = ()
 
     @classmethod
     def of(
-        cls, test: FinishedTest, counts: Mapping[str, int], exit_code: int, more: Iterable[NamedFigure] = ()
+        cls,
+        test: FinishedTest,
+        counts: Mapping[str, int],
+        exit_code: int,
+        more: Iterable[NamedFigure] = (),
+        remarks: Sequence[str] = (),
     ) -> FiguresFile:
         """The file of a finished test, with ``more`` figures; of the counts of frames those in ``COUNTS`` are taken."""
         chosen = {name: counts.get(name) for name in COUNTS}
-        return cls([*_figures(test), *(_row(*one) for one in more)], chosen, findings(test), exit_code)
+        return cls(
+            [*_figures(test), *(_row(*one) for one in more)], chosen, findings(test), exit_code, remarks
+        )
 
     @property
     def text(self) -> str:
@@ -69,6 +81,7 @@ class FiguresFile:
             "counts": self.counts,
             "checks": checks,
             "exit_code": self.exit_code,
+            "remarks": [kept(one) for one in self.remarks],
         }
         return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
@@ -85,23 +98,23 @@ def finished(
     exit_code: int,
     reference_N: float,
     start_t: float = 0.0,
-    response: str = "",
+    remarks: Sequence[str] = (),
 ) -> FinishedTest:
     """Evaluate a run or replay that has just ended, and write its ``figures.json`` and ``cycles.csv``.
 
     Where writing fails it is an event. ``reference_N`` is the force at the reference, N; NaN where it is not known;
-    ``start_t`` the time, s, that times of the results count from; ``response`` the channel that a response of the
-    places is wanted over.
+    ``start_t`` the time, s, that times of the results count from; ``remarks`` what the summary says beside the
+    figures. A response of the places that is wanted is evaluated.
     """
     test = FinishedTest.of_run(run_state, config.specimen, config.gauges, reference_N, start_t)
     further: Sequence[NamedFigure] = ()
-    if response:
-        lines, further = response_of(folder, test.figures, response)
+    if config.output.response:
+        lines, further = response_of(folder, test.figures, config.output.response)
         test = replace(test, response=tuple(lines))
     try:
         test.cycles.write(folder)
         counts = run_state.frame_counts.as_dict()
-        FiguresFile.of(test, counts, exit_code, further).write(folder)
+        FiguresFile.of(test, counts, exit_code, further, remarks).write(folder)
     except PhasedicError as error:
         run_state.event_log.emit(EventKind.RECORDER, FILE, error.text, "warning")
     return test
@@ -115,15 +128,28 @@ def finished_in(run: RunFolder) -> FinishedTest:
 
 def stored_lag(folder: Path) -> Figure | None:
     """The lag that the run or replay found, s, from its ``figures.json``; None where there is no such file."""
+    return _read(folder, _lag_of)
+
+
+def stored_remarks(folder: Path) -> list[str]:
+    """What the summary of a replay said beside the figures; nothing where there is no ``figures.json``."""
+    return _read(folder, lambda content: [*map(taken, content.get("remarks", ()))]) or []
+
+
+def _lag_of(content: Mapping[str, Any]) -> Figure:
+    found = {one["name"]: one for one in content["figures"]}["lag"]
+    value, low, high = (
+        math.nan if found[key] is None else float(found[key]) for key in ("value", "low", "high")
+    )
+    return Figure(value, low, high, str(found["reason"] or ""))
+
+
+def _read(folder: Path, of: Callable[[Mapping[str, Any]], T]) -> T | None:
     path = folder / FILE
     if not path.exists():
         return None
     try:
-        found = {one["name"]: one for one in json.loads(path.read_text(encoding="utf-8"))["figures"]}["lag"]
-        value, low, high = (
-            math.nan if found[key] is None else float(found[key]) for key in ("value", "low", "high")
-        )
-        return Figure(value, low, high, str(found["reason"] or ""))
+        return of(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DataError(
             "{path}: cannot be read ({why}); make the results again with phasedic replay", path, error

@@ -91,7 +91,7 @@ class FinishedTest:
         """
         history, loads = run_state.history, run_state.loads
         samples = Track(*loads.arrays())
-        curve = history.curve(history.forces(loads) / (specimen.area_m2 or 1.0), specimen.axis)
+        curve = history.curve(specimen.load(history.forces(loads)), specimen.axis)
         t, force = loads.arrays(zero_of=float(curve.t[0]) if len(curve.t) else None)
         strain, width = history.along(specimen.axis)[0], history.column("width_s")
         return cls(

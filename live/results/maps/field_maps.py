@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -21,6 +22,8 @@ from live.results.maps.scale import (
     status_legend,
 )
 
+Floats = NDArray[np.floating]
+NO_MAPS: Mapping[str, Floats] = MappingProxyType({})
 _PRINCIPAL = ("e1", "e2")
 _STRAINS = ("exx", "eyy", "exy", *_PRINCIPAL)
 FIELD_MAPS = (*_STRAINS, "u", "v", "sigma", "residual", "status")
@@ -38,14 +41,15 @@ class Painted:
         None for the map of statuses.
     legend : tuple of StatusCount
         Of the map of statuses.
-    values : (R, C) float or None
-        None for the map of statuses.
+    values, sigmas : (R, C) float or None
+        None for the map of statuses; no sigma of those that have none.
     """
 
     rgba: NDArray[np.uint8]
     scale: ColourScale | None
     legend: tuple[StatusCount, ...] = ()
-    values: NDArray[np.floating] | None = None
+    values: Floats | None = None
+    sigmas: Floats | None = None
 
 
 class FieldMaps:
@@ -72,31 +76,41 @@ class FieldMaps:
         alpha: int = OPACITY,
     ) -> None:
         self._along, self._alpha = f"e{axis * 2}", alpha
+        self._fixed, self._is_symmetric = fixed, is_symmetric
         self._ranges: dict[str, AutoRange] = {}
-        for name in FIELD_MAPS:
-            kind: Kind = range_kind(name)
-            if kind == "free" and is_symmetric:
-                kind = "about zero"
-            self._ranges[name] = AutoRange(kind, fixed if name in _STRAINS else None)
 
-    def paint(self, field: StrainField, names: Iterable[str]) -> dict[str, Painted]:
-        """The named maps, of ``FIELD_MAPS``."""
+    def _range(self, name: str) -> AutoRange:
+        kind: Kind = range_kind(name)
+        if kind == "free" and self._is_symmetric:
+            kind = "about zero"
+        return AutoRange(kind, self._fixed if name in _STRAINS else None)
+
+    def paint(
+        self, field: StrainField, names: Iterable[str], more: Mapping[str, Floats] = NO_MAPS
+    ) -> dict[str, Painted]:
+        """The named maps, of ``FIELD_MAPS`` or of ``more``, which has them with their ``sigma_``."""
         wanted = tuple(names)
         principal = field.strain(field.measure).principal[:2] if set(wanted) & {*_PRINCIPAL} else ()
-        known = dict(zip(_PRINCIPAL, principal, strict=False))
-        return {name: self._painted(field, name, known.get(name)) for name in wanted}
+        known = dict(zip(_PRINCIPAL, principal, strict=False)) | dict(more)
+        nothing = {name: np.full(field.grid.shape, np.nan) for name in {*wanted} - {*FIELD_MAPS, *more}}
+        known |= nothing  # yet
+        return {
+            name: self._painted(field, name, known.get(name), known.get(f"sigma_{name}")) for name in wanted
+        }
 
-    def _painted(self, field: StrainField, name: str, values: NDArray[np.floating] | None) -> Painted:
+    def _painted(
+        self, field: StrainField, name: str, values: Floats | None, sigmas: Floats | None = None
+    ) -> Painted:
         if name == "status":
             return Painted(status_colours(field.status, self._alpha), None, status_legend(field.status))
-        sigmas: NDArray[np.floating] | None = None
+        own = sigmas
         if name == "residual":
             values = np.where(field.ok, field.residual, np.nan)
         elif name == "sigma":
             values = field.sigma(self._along)
         elif values is None:
-            values, sigmas = field.value(name), field.sigma(name)
-        else:
-            sigmas = field.sigma(self._along)
-        scale = ColourScale.of(name, self._ranges[name].update(values, sigmas))
-        return Painted(scale.colours(values, self._alpha), scale, values=values)
+            values, own = field.value(name), field.sigma(name)
+        noise = field.sigma(self._along) if name in _PRINCIPAL else own
+        span = self._ranges.setdefault(name, self._range(name)).update(values, noise)
+        scale = ColourScale.of(name, span)
+        return Painted(scale.colours(values, self._alpha), scale, values=values, sigmas=own)

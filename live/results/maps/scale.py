@@ -12,14 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Status
-from live.results.maps.colours import (
-    colour,
-    diverging_table,
-    nice_above,
-    number,
-    sequential_table,
-    unit_for,
-)
+from live.results.maps.colours import colour, diverging_table, nice_above, number, sequential_table, unit_for
 
 if TYPE_CHECKING:
     from live.results.reader import Strain

@@ -14,6 +14,7 @@ from acquire.cv2_loader import load_cv2
 from acquire.frame import CameraInfo
 from acquire.text import Message
 from acquire.text.message import about
+from acquire.text.message import joined as texts
 from live.results.maps.colours import ticks
 from live.results.maps.painting import Levels, Painter, caption
 from live.results.maps.scale import ColourScale, status_legend
@@ -99,7 +100,8 @@ def whole_maps(run: RunFolder, row: int, pictures: MapPictures, longest: int) ->
         picture = _picture(
             painter.over(base, row, values, moved=False), Message("{name} of each place", name)
         )
-        words = f"{response_title(run.strain, name)}{f', {scale.unit}' * bool(scale.unit)}; {quantity_of(name).words}"
+        title = texts(", ", (response_title(run.strain, name), scale.unit))
+        words = texts("; ", (title, quantity_of(name).words))
         shown.append(captioned(joined([picture, _bar(name, scale)], ""), words))
     lines = [paragraph(line) for line in response_lines(run.strain)]
     return [*lines, element("div", joined(shown), class_="plots")] if shown else lines

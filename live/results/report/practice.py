@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from acquire.events import EventKind
 from acquire.frame import CameraInfo
+from acquire.text import Message
+from acquire.text.message import joined
 from analysis.evaluate import NoiseFloor
 from analysis.picture.pattern import describe_pattern
 from analysis.quality.pattern import FWHM_OF_RADIUS, SPECKLE_RADIUS_PX
@@ -50,19 +52,20 @@ class PracticeValues:
 def reporting_table(known: PracticeValues) -> Html:
     """Both halves of the table: hardware and analysis."""
     rows = [*_hardware(known), *_analysis(known)]
-    shown = [(item, value if value else _open(item, key)) for item, key, value in rows]
-    return table(("", "this test"), shown)
+    shown = [(Message("{what}", item), value if value else _open(key)) for item, key, value in rows]
+    return table(("", Message("this test")), shown)
 
 
-def _open(item: str, key: str) -> Html:
+def _open(key: str) -> Html:
     hint = f" (phasedic run --meta {key}=...)" if key else ""
-    return element("span", f"not recorded{hint}", class_="open")
+    return element("span", Message("not recorded") + hint, class_="open")
 
 
 def _hardware(known: PracticeValues) -> list[tuple[str, str, str]]:
     meta, camera, scale = _metadata(known.run), known.camera, known.mm_per_px
-    size = f"{camera.width} x {camera.height} px, {camera.bits} bits" if camera else ""
+    size = Message("{w} x {h} px, {bits} bits", camera.width, camera.height, camera.bits) if camera else ""
     view = f"{camera.width * scale:.4g} x {camera.height * scale:.4g} mm" if camera and scale else ""
+    rate = Message("{fps:g} frames/s", camera.fps) if camera and camera.fps else ""
     return [
         ("Camera", "camera", camera.name if camera else meta("camera")),
         ("Image resolution", "", size),
@@ -71,8 +74,8 @@ def _hardware(known: PracticeValues) -> list[tuple[str, str, str]]:
         ("Field of view", "field_of_view", view or meta("field_of_view")),
         ("Image scale", "scale", f"{scale:g} mm/px" if scale else meta("scale")),
         ("Stand-off distance", "standoff", meta("standoff")),
-        ("Stereo angle", "", "one camera, in-plane measurement"),
-        ("Image acquisition rate", "", f"{camera.fps:g} frames/s" if camera and camera.fps else ""),
+        ("Stereo angle", "", Message("one camera, in-plane measurement")),
+        ("Image acquisition rate", "", rate),
         ("Exposure time", "exposure", _exposure(camera) or meta("exposure")),
         ("Lighting", "lighting", meta("lighting")),
         ("Patterning technique", "pattern", meta("pattern")),
@@ -104,46 +107,52 @@ def _feature(known: PracticeValues) -> str:
         return ""
     scale = f" ({width * known.mm_per_px:.3g} mm)" if known.mm_per_px else ""
     radius, (low, high) = width / FWHM_OF_RADIUS, SPECKLE_RADIUS_PX
-    judged = "" if low <= radius <= high else f" (LOOK: wanted are {low:g} to {high:g} px)"
-    return f"{width:.1f} px{scale}, full width at half height of the autocorrelation; radius {radius:.2f} px{judged}"
+    judged = Message(" (LOOK: wanted are {low:g} to {high:g} px)", low, high) * (not low <= radius <= high)
+    return Message(
+        "{width:.1f} px{scale}, full width at half height of the autocorrelation; radius {radius:.2f} px{judged}",
+        width, scale, radius, judged,
+    )  # fmt: skip
 
 
 def _analysis(known: PracticeValues) -> list[tuple[str, str, str]]:
     run, measure = known.run, known.run.section("measure")
     grid, camera = run.strain.grid, run.section("camera")
-    order = "quadratic (12 parameters)" if measure.get("order") == 2 else "affine (6 parameters)"
-    fields = [name for name in ("dark", "flat") if camera.get(name)]
-    filtering = "Wiener filter of the reference by its own spectrum" + (
-        f"; {' and '.join(fields)} frame" if fields else ""
+    order = (
+        Message("quadratic (12 parameters)")
+        if measure.get("order") == 2
+        else Message("affine (6 parameters)")
     )
+    fields = [Message("{name} frame", name) for name in ("dark", "flat") if camera.get(name)]
+    wiener = Message("Wiener filter of the reference by its own spectrum")
     window = str(measure.get("window", "gaussian"))
+    weight = Message("{size} px, {window} weight", grid.size, window) + _gaussian(window, grid.size)
     return [
         ("DIC software", "", f"phasedic {run.strain.versions.get('phasedic', '')}, phase-DIC"),
-        ("Image filtering", "", filtering),
+        ("Image filtering", "", joined("; ", (wiener, *fields))),
         ("Frames averaged", "", _bursts(run)),
-        ("Subset size (ZOI)", "", f"{grid.size} px, {window} weight" + _gaussian(window, grid.size)),
+        ("Subset size (ZOI)", "", weight),
         ("Step size", "", f"{grid.step} px"),
         ("Subset shape function", "", order),
-        ("Matching criterion", "", "weighted least squares, gain and offset of the light free"),
-        ("Interpolant", "", "B-spline of degree 5"),
-        ("Strain window", "", "none: gradients are parameters of each ZOI"),
-        ("Virtual strain gauge size", "", f"{grid.size} px, one ZOI"),
+        ("Matching criterion", "", Message("weighted least squares, gain and offset of the light free")),
+        ("Interpolant", "", Message("B-spline of degree 5")),
+        ("Strain window", "", Message("none: gradients are parameters of each ZOI")),
+        ("Virtual strain gauge size", "", Message("{size} px, one ZOI", grid.size)),
         ("Strain formulation", "", run.strain.strain_measure),
-        ("Post-filtering of strains", "", "none"),
+        ("Post-filtering of strains", "", Message("none")),
         ("Displacement noise floor", "", _floor(known.noise, ("u", "v"), 1.0, "px")),
         ("Strain noise floor", "", _floor(known.noise, ("exx", "eyy", "exy"), _MICRO, "µm/m")),
     ]
 
 
 def _gaussian(window: str, size: int) -> str:
-    return f" of standard deviation {size / 6:.1f} px" if window == "gaussian" else ""
+    return Message(" of standard deviation {sigma:.1f} px", size / 6) if window == "gaussian" else ""
 
 
 def _bursts(run: RunFolder) -> str:
     frames = np.asarray(run.strain.values["n_frames"])
     references = [event for event in _reference_events(run) if event.get("n")]
-    reference = f"; reference {references[0]['n']}" if references else ""
-    return f"{int(np.median(frames))}{reference}" if len(frames) else ""
+    reference = Message("; reference {n}", references[0]["n"]) if references else ""
+    return joined("", (f"{np.median(frames):.0f}", reference)) if len(frames) else ""
 
 
 def _reference_events(run: RunFolder) -> list[dict[str, object]]:
@@ -151,5 +160,8 @@ def _reference_events(run: RunFolder) -> list[dict[str, object]]:
 
 
 def _floor(noise: Mapping[str, NoiseFloor], names: tuple[str, ...], factor: float, unit: str) -> str:
-    found = [f"{name} {noise[name].measured * factor:.3g}" for name in names if name in noise]
-    return f"{', '.join(found)} {unit} (1 standard deviation of one ZOI, still phase)" if found else ""
+    found = [
+        Message("{name} {sigma:.3g}", one, noise[one].measured * factor) for one in names if one in noise
+    ]
+    still = Message(" {unit} (1 standard deviation of one ZOI, still phase)", unit)
+    return joined("", (joined(", ", found), still)) if found else ""

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.events import EventKind
 from acquire.text import Message
 from acquire.text.quantity import Amount
 from analysis.evaluate import CONFIDENCE
@@ -15,16 +16,18 @@ from live.pipeline.event_log import counted_text
 from live.pipeline.repeats import Repeats
 from live.pipeline.screen import Screen
 from live.results.figures import NOT_KNOWN, figure_text
+from live.results.finished.figures_file import stored_remarks
 from live.results.finished.finished_test import FinishedTest
 from live.results.folder import versions
 from live.results.maps.colours import unit_for
 from live.results.quantities import MEANS, quantity_of
 from live.results.report.page import Html, element, facts, joined, paragraph, table
 from live.results.run_folder import RunFolder
+from live.words.language import told
 
 _MAX_EVENTS = 3000
 _KINDS = (".h5", ".csv", ".json", ".png", ".tif")
-_FIGURES = (
+FIGURES = (
     (
         "E",
         "Pa",
@@ -101,7 +104,7 @@ def frame_counts(run: RunFolder) -> Html:
     if not found:
         return paragraph(Message("No frame counts were recorded."), "dim")
     counts = {name: Amount("count", one) if isinstance(one, int) else one for name, one in found.items()}
-    return facts({Message("{what}", name): one for name, one in counts.items()})
+    return facts({Message("{what}", name): Message("{what}", one) for name, one in counts.items()})
 
 
 def events(run: RunFolder) -> Html:
@@ -113,10 +116,12 @@ def events(run: RunFolder) -> Html:
     rows = [
         (
             Message("{t:.3f}", event.t - run.start_monotonic),
-            element("span", event.level, class_=event.level),
-            event.kind.value,
-            event.source,
-            counted_text(event.text, count),
+            element("span", Message("{what}", event.level), class_=event.level),
+            Message("{what}", event.kind.value),
+            Message("{what}", event.source),
+            event.text
+            if event.kind is EventKind.NOTE
+            else Message("{what}", counted_text(event.text, count)),
         )
         for event, count in found[:_MAX_EVENTS]
     ]
@@ -128,16 +133,25 @@ def events(run: RunFolder) -> Html:
     return joined([table(heads, rows, (0,)), more])
 
 
+def remarks(run: RunFolder) -> Html:
+    """What the summary of a replay said beside its figures, and what of the run cannot be read."""
+    told_then = [paragraph(Message("{what}", one)) for one in stored_remarks(run.path)]
+    return joined([*told_then, *(paragraph(note, "warning") for note in run.notes)])
+
+
 def definitions(run: RunFolder) -> Html:
     """The definition of every number."""
     names = ["x", "y", *run.strain.names, *(MEANS.get(name, name) for name in run.strain.values)]
     known = {q.name: q for q in map(quantity_of, names)}
-    rows = [(q.name, q.unit or "1", q.words) for q in known.values()]
-    words = (
-        "x right, y down, from the centre of the first pixel; all maps lie on the reference picture. Strain"
-        f" measure: {run.strain.strain_measure}. Strains are dimensionless in the files."
+    rows = [*((q.name, q.unit or "1", q.words) for q in known.values()), *FIGURES]
+    words = Message(
+        "x right, y down, from the centre of the first pixel; all maps lie on the reference picture. "
     )
-    return joined([paragraph(words), table(("", "unit", "definition"), [*rows, *_FIGURES])])
+    words += Message(
+        "Strain measure: {name}. Strains are dimensionless in the files.", run.strain.strain_measure
+    )
+    told_rows = [(name, unit, Message("{what}", what)) for name, unit, what in rows]
+    return joined([paragraph(words), table(("", Message("unit"), Message("definition")), told_rows)])
 
 
 def version_table(run: RunFolder) -> Html:
@@ -155,7 +169,7 @@ def hashes(run: RunFolder, screen: Screen) -> Html:
     beside = [session] if session is not None and session.parent.resolve() != run.path.resolve() else []
     rows = []
     for path in [*sorted(files), *beside]:
-        screen.status(f"reading {path.name} for its hash")
+        screen.status(Message("reading {name} for its hash", path.name))
         size = Amount("count", path.stat().st_size)
         rows.append((path.name, size, element("span", _sha256(path), class_="code")))
     return table((Message("file"), Message("bytes"), "SHA-256"), rows, (1,))
@@ -166,4 +180,4 @@ def _sha256(path: Path) -> str:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
-        return f"cannot be read: {error.strerror}"
+        return told(Message("cannot be read: {why}", error.strerror))

@@ -32,7 +32,7 @@ from live.results.finished.belief import belief
 from live.results.finished.figures_file import finished_in
 from live.results.finished.findings import NO_FORCE, doubts, findings
 from live.results.finished.finished_test import FinishedTest
-from live.results.report import curves
+from live.results.report import curves, record
 from live.results.report.cycles import cycle_plots, cycle_table
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
 from live.results.report.maps import MapPictures, map_pictures, maps, statuses, whole_maps
@@ -53,7 +53,6 @@ from live.results.report.page import (
     tiles,
 )
 from live.results.report.practice import PracticeValues, reporting_table
-from live.results.report.record import definitions, events, frame_counts, gauges, hashes, times, version_table
 from live.results.report.svg import Plot, draw
 from live.results.row import LENS
 from live.results.run_folder import RunFolder
@@ -127,7 +126,7 @@ def _content(run: RunFolder, wanted: ReportRequest, screen: Screen) -> _Content:
     chosen = nearest_rows(run, wanted.times) if wanted.times else time_steps(run, curve)
     return _Content(
         run, finished_in(run), curve, _figures(run, curve), chosen, map_pictures(run, list(chosen)),
-        still_phase_of(run.strain), hashes(run, screen),
+        still_phase_of(run.strain), record.hashes(run, screen),
     )  # fmt: skip
 
 
@@ -157,23 +156,24 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
         if content.test.cycles.any
         else Html(""),
         section(Message("Budget of E"), *budget_table(run, content.curve)),
-        section(Message("Virtual gauges"), gauges(run)),
-        section(Message("Lag and latency"), times(run, content.test)),
+        section(Message("Virtual gauges"), record.gauges(run)),
+        section(Message("Lag and latency"), record.times(run, content.test)),
         section(Message("Maps"), *(maps(run, name, chosen, pictures, side) for name in fields)),
         section(Message("Response of each place"), *whole_maps(run, min(chosen), pictures, min(side, 480))),
         section(Message("Noise floor"), *_noise_section(content)),
         *_sharpness_section(run),
         *_lens_section(run),
         section(Message("Status of the ZOIs"), statuses(run, max(chosen), pictures, min(side, 480))),
-        section(Message("Frame counts and events"), frame_counts(run), events(run), *_unreadable(run)),
+        section(
+            Message("Frame counts and events"),
+            record.frame_counts(run),
+            record.events(run),
+            record.remarks(run),
+        ),
         fold(Message("Reporting table (iDICs Good Practices Guide)"), reporting_table(known)),
-        fold(Message("Definitions"), definitions(run)),
-        fold(Message("Versions and files"), version_table(run), content.files),
+        fold(Message("Definitions"), record.definitions(run)),
+        fold(Message("Versions and files"), record.version_table(run), content.files),
     ]
-
-
-def _unreadable(run: RunFolder) -> list[Html]:
-    return [paragraph(note, "warning") for note in run.notes]
 
 
 def _head(run: RunFolder, curve: EvaluatedCurve, test: FinishedTest) -> Html:
@@ -303,8 +303,7 @@ def _about_curves(curve: EvaluatedCurve) -> Html:
     if not curve.has_load:
         none = Message("No force is known at any instant, so there is no stress-strain curve.")
         return paragraph(none, "dim")
-    words = [Message("Bands: one standard uncertainty on either side.")]
-    figures = curve.figures
+    words, figures = [Message("Bands: one standard uncertainty on either side.")], curve.figures
     if not figures.E.known:
         words.append(Message("E is not known: {why}", figures.E.why))
     if figures.span is not None:

@@ -16,8 +16,8 @@ import numpy as np
 
 from acquire.errors import ConfigError, DataError
 from acquire.text import Message
+from live.config.new_files import new_file, new_folder
 from live.pipeline.screen import Screen
-from live.results.export.atomic_file import new_file, new_folder
 from live.results.report.report import Report
 from live.results.report.svg import HEIGHT, WIDTH, Plot, draw
 
@@ -111,7 +111,7 @@ def save_figures(figures: Sequence[Plot], folder: Path, screen: Screen) -> None:
             svg.write_text(draw(figure, standalone=True), encoding="utf-8")
             (part / f"{figure.name}.csv").write_text(as_csv(figure), encoding="utf-8")
         if trouble := _png_trouble([part / f"{figure.name}.svg" for figure in figures]):
-            screen.print(f"warning: {trouble}")
+            screen.print(Message("warning: {what}", trouble))
 
 
 def _png_trouble(pictures: Sequence[Path]) -> str:

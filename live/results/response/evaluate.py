@@ -18,18 +18,10 @@ from analysis.evaluate import Figure, TensileFigures
 from analysis.evaluate.response.departures import NOT_USED, Departures
 from analysis.evaluate.response.lines import ResponseSums
 from analysis.picture.pattern import gauge_length
+from live.pipeline.timed.response import MEAN, STRESS, TIME, leaves_name, slope_name
 from live.results.reader import Strain
 from live.results.response.rising import Channel
-from live.results.response.stored import (
-    FATE,
-    MEAN,
-    STRESS,
-    TIME,
-    fill_group,
-    leaves_name,
-    read_noise,
-    slope_name,
-)
+from live.results.response.stored import FATE, fill_group, read_noise
 from live.results.response.words import response_figures, response_lines
 from live.results.run_folder import STRAIN, RunFolder, open_run
 from live.results.stored_fields import window_of

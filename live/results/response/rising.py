@@ -12,7 +12,7 @@ from analysis.evaluate import Curve, TensileFigures
 from analysis.evaluate.curve import Loading
 from analysis.evaluate.programme import KindOfTest
 from live.config.loading import Config
-from live.results.response.stored import CHANNELS, MEAN, STRESS, TIME
+from live.pipeline.timed.response import CHANNELS, MEAN, STRESS, TIME
 from live.results.row import gauge_columns
 from live.results.run_folder import RunFolder
 
@@ -73,13 +73,14 @@ def _rising(curve: Curve, figures: TensileFigures, test: str) -> NDArray[np.intp
     return np.flatnonzero(np.isin(curve.t, loading.t[first : loading.top + 1]))
 
 
-def check_channel(name: str, config: Config, *, forces: bool) -> None:
+def check_channel(config: Config, *, forces: bool) -> None:
     """Refuse a channel that the test will not have; ``forces``: there are any.
 
     Raises
     ------
     ConfigError
     """
+    name = config.output.response or ""
     if name == STRESS and not (forces and config.specimen.area_m2):
         what = "a section (--section W,T)" if forces else "forces (--load FILE.csv)"
         raise ConfigError("--response stress needs {what}; --response mean needs neither", what)

@@ -27,27 +27,14 @@ from acquire.hdf5 import (
     storable,
 )
 from acquire.text.printable import printable
+from live.pipeline.timed.response import leaves_name, slope_name
 from live.results.quantities import quantity_of
 
 GROUP, CURRENT, CORRELATION, FATE = "response", "current", "correlation", "fate"
-STRESS, MEAN, TIME = "stress", "mean", "time"
-CHANNELS = (STRESS, MEAN, TIME)
-"""What a strain may be held against, besides a gauge by its name."""
-_SLOPES = {STRESS: "compliance", TIME: "rate"}
 ATTRIBUTES = {
     "channel": Declared("text"), "strain": Declared("text"), "instants": Declared("int", (), 0),
     "first": Declared("f8"), "last": Declared("f8"), "common": Declared("f8", (), 0), "vsg_px": Declared("f8", (), 0),
 }  # fmt: skip
-
-
-def slope_name(channel: str) -> str:
-    """Of the map of slopes over ``channel``: compliance, rate or amplification."""
-    return _SLOPES.get(channel, "amplification")
-
-
-def leaves_name(channel: str) -> str:
-    """Of the map of where places leave their lines; empty over time."""
-    return "" if channel == TIME else "leaves_at_stress" if channel == STRESS else "leaves_at_strain"
 
 
 def map_names(channel: str) -> tuple[str, ...]:
@@ -73,7 +60,7 @@ def add_group(entry: Any, channel: str, shape: tuple[int, int]) -> None:
             name, (0,) * grows + rest, "f4", maxshape=(None,) * grows + rest, chunks=True, fletcher32=True,
             fillvalue=np.nan,
         )  # fmt: skip
-        dataset.attrs.update(units=quantity_of(name).unit, long_name=quantity_of(name).words)
+        dataset.attrs.update(units=quantity_of(name).unit, long_name=str(quantity_of(name).words))
     for name in ("x", "y"):
         group[name] = entry[f"strain/{name}"]
 

@@ -6,12 +6,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from acquire.text import Message
 from analysis.evaluate import Figure
 from analysis.evaluate.response.departures import FIRST, WINDOW
+from live.pipeline.timed.response import STRESS, TIME, leaves_name, slope_name
 from live.results.maps.scale import shown_unit
 from live.results.quantities import quantity_of
 from live.results.reader import Strain
-from live.results.response.stored import FATE, STRESS, TIME, StoredResponse, leaves_name, slope_name
+from live.results.response.stored import FATE, StoredResponse
 
 
 def response_title(strain: Strain, name: str) -> str:
@@ -19,7 +21,8 @@ def response_title(strain: Strain, name: str) -> str:
     found = strain.response
     if found is None or name not in found.names:
         return ""
-    return f"{name} over {found.channel}, {found.instants} instants, {_side(strain, found)}"
+    side = _side(strain, found)
+    return Message("{name} over {channel}, {n} instants, {side}", name, found.channel, found.instants, side)
 
 
 def response_lines(strain: Strain) -> list[str]:
@@ -30,23 +33,31 @@ def response_lines(strain: Strain) -> list[str]:
     name = slope_name(found.channel)
     unit, factor = shown_unit(name)
     slope, sigma, chi2, poisson = (
-        found.map(one)[strain.grid.active] for one in (name, f"sigma_{name}", "chi2", "poisson")
+        found.map(one)[strain.grid.active].astype(np.float64)
+        for one in (name, f"sigma_{name}", "chi2", "poisson")
     )
     known = slope[np.isfinite(slope)] * factor
     if not known.size:
-        return [f"response over {found.channel}: no place has one in {found.instants} instants"]
+        none = Message(
+            "response over {channel}: no place has one in {n} instants", found.channel, found.instants
+        )
+        return [none]
     low, high = np.percentile(known, (5, 95))
     # A strain that all places have in common is in that of the channel too.
-    of = " of the distance from 1" * (name == "amplification")
-    beside = f", all together ± {100 * found.common:.2g} %{of}" * (found.common > 0)
-    value = f"{name} {np.median(known):.4g} {unit}".rstrip()
-    across = f"; Poisson {np.nanmedian(poisson):.3f}" if np.isfinite(poisson).any() else ""
-    return [
-        f"response over {found.channel}, {found.instants} instants{_span(found)}: {value} (median; 5 to 95 %: {low:.4g}"
-        f" to {high:.4g}), one place ± {np.nanmedian(sigma) * factor:.2g}{beside}; chi2 {np.nanmedian(chi2):.2f},"
-        f" {_side(strain, found)}{across}",
-        *_departures(strain, found),
-    ]
+    of = Message(" of the distance from 1") * (name == "amplification")
+    beside = Message(", all together ± {share:.2g} %{of}", 100 * found.common, of) * (found.common > 0)
+    known_across = np.isfinite(poisson).any()
+    across = Message("; Poisson {ratio:.3f}", np.nanmedian(poisson)) if known_across else ""
+    first = Message(
+        "response over {channel}, {n} instants{span}: {name} {median:.4g}{unit} (median; 5 to 95 %: {low:.4g} to "
+        "{high:.4g})",
+        found.channel, found.instants, _span(found), name, np.median(known), f" {unit}".rstrip(), low, high,
+    )  # fmt: skip
+    then = Message(
+        ", one place ± {sigma:.2g}{beside}; chi2 {chi2:.2f}, {side}{across}",
+        np.nanmedian(sigma) * factor, beside, np.nanmedian(chi2), _side(strain, found), across,
+    )  # fmt: skip
+    return [first + then, *_departures(strain, found)]
 
 
 def response_figures(strain: Strain) -> Iterator[tuple[str, Figure, str]]:
@@ -68,23 +79,27 @@ def _departures(strain: Strain, found: StoredResponse) -> list[str]:
     leaves = leaves_name(found.channel)
     if not leaves:
         return []
-    at, fate = (found.map(one)[strain.grid.active] for one in (leaves, FATE))
+    at, fate = (found.map(one)[strain.grid.active].astype(np.float64) for one in (leaves, FATE))
     unit, factor = shown_unit(leaves) if found.channel == STRESS else ("µm/m", 1e6)
     _, left, lost = (int(np.count_nonzero(fate == code)) for code in range(3))
     if not left and found.instants < FIRST + WINDOW:
-        return [f"where places leave their lines is not known: that takes {FIRST + WINDOW} instants"]
-    words = f"{left} of {np.isfinite(fate).sum()} places leave their line"
+        return [
+            Message("where places leave their lines is not known: that takes {n} instants", FIRST + WINDOW)
+        ]
+    words = Message("{left} of {places} places leave their line", left, np.isfinite(fate).sum())
     if left:
         low, middle, high = np.nanpercentile(at, (1, 50, 99)) * factor
-        words += f" at {middle:.4g} {unit} (median; 1 to 99 %: {low:.4g} to {high:.4g})"
-    return [words + f"; lost before: {lost}" * (lost > 0)]
+        words += Message(
+            " at {middle:.4g} {unit} (median; 1 to 99 %: {low:.4g} to {high:.4g})", middle, unit, low, high
+        )
+    return [words + Message("; lost before: {lost}", lost) * (lost > 0)]
 
 
 def _span(found: StoredResponse) -> str:
     unit, factor = {STRESS: ("MPa", 1e-6), TIME: ("s", 1.0)}.get(found.channel, ("µm/m", 1e6))
     first, last = found.first * factor, found.last * factor
-    return f" from {first:.4g} to {last:.4g} {unit}"
+    return Message(" from {first:.4g} to {last:.4g} {unit}", first, last, unit)
 
 
 def _side(strain: Strain, found: StoredResponse) -> str:
-    return f"ZOI {strain.grid.size} px, VSG {found.vsg_px:.0f} px"
+    return Message("ZOI {size} px, VSG {vsg:.0f} px", strain.grid.size, found.vsg_px)

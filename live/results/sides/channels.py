@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from acquire.text import Message
-from live.config.cameras import BACK, FRONT
+from live.config.cameras import FRONT
 from live.pipeline.measurement import AXIAL, TimeStep
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import BURST
@@ -41,7 +41,7 @@ class JointChannels:
         """
         if not self._states or self.lost:
             return {}
-        strains = newest(self._states[FRONT], self._states[BACK], self._clock())
+        strains = newest(self._states, self._clock())
         found = {"mean_time_s": strains[AXIAL].t - start} if AXIAL in strains else {}
         for name, one in strains.items():
             channel = name if name == AXIAL else f"gauge_{name}"
@@ -66,7 +66,7 @@ class JointChannels:
         limit = max(LATE_S, *(longest_gap(np.array([s.t for s in one[-3:]])) for one in steps.values()))
         if _went_on(steps[ahead], ends[late]) > limit:
             return Message("the {late} gives no strains", late)
-        joint = newest(self._states[FRONT], self._states[BACK], self._clock())
+        joint = newest(self._states, self._clock())
         if AXIAL in joint:
             self._last_t = joint[AXIAL].t
         since = _went_on(steps[late], self._last_t)

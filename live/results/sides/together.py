@@ -8,9 +8,9 @@ from __future__ import annotations
 import csv
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TextIO
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from analysis.evaluate import (
     TwoSides,
     evaluate_test,
 )
-from live.config.cameras import SIDES
+from live.config.cameras import BACK, FRONT, SIDES
 from live.config.sections import SpecimenConfig
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.pipeline.run_state import RunState
@@ -86,7 +86,7 @@ class SideOfTest:
             value, sigma = steps.gauge(name), steps.gauge_sigma(name)
             if value is not None and sigma is not None:
                 courses[name] = Course(t, value[: len(t)], sigma[: len(t)])
-        curve = history.curve(force / (specimen.area_m2 or 1.0), history.current_axis)
+        curve = history.curve(specimen.load(force), history.current_axis)
         return cls(courses, curve, force)
 
 
@@ -101,25 +101,24 @@ class SidesOfTest:
     force : (N,) float64, N
     curve : Curve
         Of the mean strain.
-    front, back, both : TensileFigures
-        By the strain of one side, and by the mean of both; all with the force of the front.
+    figures : mapping of str to TensileFigures
+        By the mean ("both"), by the strain of the front and by that of the back; all with the force of the front.
     """
 
     courses: dict[str, TwoSides]
     force: NDArray[np.float64]
     curve: Curve
-    front: TensileFigures
-    back: TensileFigures
-    both: TensileFigures
+    figures: dict[str, TensileFigures]
 
     @classmethod
     def of(cls, front: SideOfTest, back: SideOfTest, options: TensileOptions) -> SidesOfTest:
         """Both sides put together; NaN where they have no instant in common."""
         gap = longest_gap(back.curve.t)
-        courses = two_sides(front.courses, back.courses, gap)
-        curves = front.curve, _at_the_front(front.curve, back.curve, gap)
-        mean = _mean_of(*curves)
-        return cls(courses, front.force, mean, *(evaluate_test(curve, options) for curve in (*curves, mean)))
+        moved = _at_the_front(front.curve, back.curve, gap)
+        mean = _mean_of(front.curve, moved)
+        curves = {"both": mean, FRONT: front.curve, BACK: moved}
+        figures = {name: evaluate_test(curve, options) for name, curve in curves.items()}
+        return cls(two_sides(front.courses, back.courses, gap), front.force, mean, figures)
 
     @classmethod
     def of_folders(cls, front: RunFolder, back: RunFolder) -> SidesOfTest:
@@ -142,11 +141,11 @@ class SidesOfTest:
 
     def figure_lines(self, *, stresses: bool) -> Iterator[str]:
         """E, nu and strengths by the mean, by the front and by the back; ``stresses``: the section is known."""
-        for where in ("both", *SIDES):
-            rows = (row for row in headline(getattr(self, where), stresses=stresses) if row.figure.known)
+        for where, figures in self.figures.items():
+            rows = (row for row in headline(figures, stresses=stresses) if row.figure.known)
             known = joined("  ", [Message("{name} = {text}", row.name, row.text) for row in rows])
             yield Message("{where:<7}{known}", f"{where}:", known or Message("no figure is known"))
-        if held := beyond_scatter(self.both):
+        if held := beyond_scatter(self.figures["both"]):
             yield Message("±: {CONFIDENCE:.0%} interval, of E with {held}", CONFIDENCE, held)
 
 
@@ -169,28 +168,32 @@ class JointStrain(NamedTuple):
     t: float
 
 
-def newest(front: RunState, back: RunState, now: float | None = None) -> dict[str, JointStrain]:
+def newest(states: Mapping[str, RunState], now: float | None = None) -> dict[str, JointStrain]:
     """The axial strain and each gauge at the newest instant that both sides have.
 
-    None once a camera has failed, and where the bursts of a side are not live at ``now`` (s, monotonic; None: this
-    moment).
+    None without sides, once a camera has failed, and where the bursts of a side are not live at ``now`` (s, monotonic;
+    None: this moment).
     """
-    if front.health.camera_failed or back.health.camera_failed:
+    if FRONT not in states or any(state.health.camera_failed for state in states.values()):
         return {}
     now = time.monotonic() if now is None else now
-    if not all(state.snapshot(now).figure(BURST).known for state in (front, back)):
+    if not all(state.snapshot(now).figure(BURST).known for state in states.values()):
         return {}
-    one, other = _recent(front), _recent(back)
+    one, other = (_recent(states[side]) for side in SIDES)
     if not one or not other:
         return {}
+    return at_end(two_sides(one, other, longest_gap(other[AXIAL].t)))
+
+
+def at_end(courses: Mapping[str, TwoSides]) -> dict[str, JointStrain]:
+    """The last instant of each strain that both sides have."""
     found = {}
-    for name, both in two_sides(one, other, longest_gap(other[AXIAL].t)).items():
+    for name, both in courses.items():
         known = np.flatnonzero(np.isfinite(both.mean))
         if len(known):
             k = known[-1]
-            found[name] = JointStrain(
-                *(float(one[k]) for one in (both.mean, both.bending, both.sigma, both.t))
-            )
+            values = both.mean[k], both.bending[k], both.sigma[k], both.t[k]
+            found[name] = JointStrain(*map(float, values))
     return found
 
 
@@ -210,37 +213,28 @@ def _recent(state: RunState) -> dict[str, Course]:
 def _at_the_front(front: Curve, back: Curve, gap: float) -> Curve:
     """The strains of the back over the stress of the front, at its instants."""
 
-    def moved(values: NDArray[np.float64] | None) -> NDArray[np.float64] | None:
-        return None if values is None else Course(back.t, values, values).at(front.t, gap).value
-
-    strain = moved(back.strain)
-    assert strain is not None
-    return replace(
-        back, t=front.t, strain=strain, stress=front.stress, transverse=moved(back.transverse),
-        elastic=moved(back.elastic), uneven=moved(back.uneven), misfit=moved(back.misfit),
-        narrowing=moved(back.narrowing), lens=moved(back.lens), blur=moved(back.blur),
-    )  # fmt: skip
+    names = "strain", "transverse", "elastic", "uneven", "misfit", "narrowing", "lens", "blur"
+    known = {name: values for name in names if (values := getattr(back, name)) is not None}
+    moved: dict[str, Any] = {
+        name: Course(back.t, values, values).at(front.t, gap).value for name, values in known.items()
+    }
+    return replace(back, t=front.t, stress=front.stress, **moved)
 
 
 def _mean_of(front: Curve, back: Curve) -> Curve:
     """The mean of two curves; what only one of them has is left out."""
 
-    def mean(
-        one: NDArray[np.float64] | None, other: NDArray[np.float64] | None
-    ) -> NDArray[np.float64] | None:
-        return None if one is None or other is None else (one + other) / 2
+    def of(name: str) -> list[NDArray[np.float64]]:
+        return [values for one in (front, back) if (values := getattr(one, name)) is not None]
 
-    strain = (front.strain + back.strain) / 2
-    transverse, elastic = mean(front.transverse, back.transverse), mean(front.elastic, back.elastic)
-    narrowing = mean(front.narrowing, back.narrowing)
-    known = [lens for lens in (front.lens, back.lens) if lens is not None]
-    lens = np.hypot.reduce(known) / 2 if known else None
+    pairs = {name: of(name) for name in ("strain", "transverse", "elastic", "narrowing")}
+    mean = {name: (pair[0] + pair[1]) / 2 for name, pair in pairs.items() if len(pair) == 2}
+    lens, blurs = of("lens"), of("blur")
     # Errors of the two cameras by their blur are not alike: as variances of independent errors.
-    blurs = [blur for blur in (front.blur, back.blur) if blur is not None]
     blur = np.sqrt(np.hypot.reduce([one**2 for one in blurs]) / 2) if len(blurs) == 2 else None
     return Curve(
-        front.t, strain, front.stress, transverse, elastic, narrowing=narrowing, lens=lens,
-        source=f"mean of both sides: {front.source}", elastic_source=front.elastic_source, blur=blur,
+        front.t, stress=front.stress, lens=np.hypot.reduce(lens) / 2 if lens else None, blur=blur, **mean,
+        source=f"mean of both sides: {front.source}", elastic_source=front.elastic_source,
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from acquire.text import Message
 from live.config.loading import Config
 from live.pipeline.measurement import AXIAL
 from live.results.budget import CameraView, budget_cells, budget_rows
@@ -26,7 +27,9 @@ def budget_lines(figures: CheckFigures, config: Config) -> list[str]:
     view = CameraView.of(config.camera, config.scale, plates=bool(config.plate))
     expected = config.specimen.modulus_GPa or math.nan
     rows = budget_rows(shares, strain, expected, view, stresses=config.specimen.area_m2 is not None)
-    head = f"budget of E, standard uncertainties, at a strain of {strain:.2%} (scatter: of one value)"
+    head = Message(
+        "budget of E, standard uncertainties, at a strain of {strain:.2%} (scatter: of one value)", strain
+    )
     return [head, *(_line(*cells) for cells in budget_cells(rows, "GPa", 1.0))]
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.load_cell.check import LoadReport
+from acquire.text import Message
 from analysis.picture.blocks import BLOCKS, blockiness
 from analysis.quality.exposure import Depth, Exposure, depth, exposure
 from analysis.quality.pattern import speckle_radius, zoi_pattern
@@ -163,10 +164,7 @@ class KernelFigures:
 
 
 def examine(
-    stack: FrameStack,
-    config: Config,
-    load: LoadReport | None = None,
-    table: bool = True,
+    stack: FrameStack, config: Config, load: LoadReport | None = None, table: bool = True
 ) -> CheckFigures:
     """All figures from frames of a still specimen.
 
@@ -286,7 +284,10 @@ def table_lines(figures: CheckFigures) -> list[str]:
     head = f"  ZOI order {f'l_10% {unit}':>9} {f'VSG {unit}':>7}  " + "".join(f"{n:>15}" for n in bursts)
     reference = figures.floors[0].reference if figures.floors else 0
     return [
-        f"strain noise of one ZOI, µm/m: measured (predicted) for bursts of so many frames, reference of {reference}",
+        Message(
+            "strain noise of one ZOI, µm/m: measured (predicted) for bursts of so many frames, reference of {n}",
+            reference,
+        ),
         head,
         *(_row(floor, bursts, figures) for floor in figures.floors),
     ]
@@ -298,7 +299,7 @@ def _row(floor: ZoiFloor, bursts: list[int], figures: CheckFigures) -> str:
     lengths = f"{floor.l10 * factor:>9.{digits}f} {floor.vsg * factor:>7.{digits}f}"
     front = f"{'*' if of_test else ' '} {floor.zoi:>3} {floor.order:>5} {lengths}  "
     if not floor.noises:
-        return front + "   does not fit, or has no pattern"
+        return front + Message("   does not fit, or has no pattern")
     return front + "".join(f"{_cell(floor.of(n)):>15}" for n in bursts)
 
 

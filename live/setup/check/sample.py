@@ -19,7 +19,7 @@ from analysis.picture.pattern import noise_of_picture
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST
 from live.pipeline.reference import Correction, averaged
-from live.setup.devices import at_rest, open_rig
+from live.setup.frames import camera_of, frames_of
 from live.setup.grid import kernel_settings
 from live.setup.pictures import correction
 from live.setup.region import Region
@@ -122,23 +122,20 @@ def take(config: Config, on_event: EventSink = ignore_event) -> FrameStack:
     ------
     DataError
         The camera gave too few frames.
+    DeviceError
+        See ``frames_of``.
     """
     reference = config.measure.reference_burst or DEFAULT_REFERENCE_BURST
-    rig = open_rig(at_rest(config.camera.address), "none:", on_event, crop=config.camera.crop)
     frames: list[Frame] = []
     lost = 0
-    try:
-        camera = rig.camera.info
-        n = max(min(2 * reference, MAX_BYTES // (camera.width * camera.height * 2)), MIN_FRAMES)
-        with rig.camera:
-            for frame in rig.camera:
-                lost += (frame.lost_before if frames else 0) + frame.damaged
-                frames += [] if frame.damaged else [frame]
-                if len(frames) == n:
-                    break
-    finally:
-        rig.close()
-    return stack_of(frames, camera, lost, config.camera.address)
+    with camera_of(config.camera.address, on_event, crop=config.camera.crop) as camera:
+        n = max(min(2 * reference, MAX_BYTES // (camera.info.width * camera.info.height * 2)), MIN_FRAMES)
+        for frame in frames_of(camera):
+            lost += (frame.lost_before if frames else 0) + frame.damaged
+            frames += [] if frame.damaged else [frame]
+            if len(frames) == n:
+                break
+    return stack_of(frames, camera.info, lost, config.camera.address)
 
 
 def stack_of(frames: Sequence[Frame], camera: CameraInfo, lost: int, address: str) -> FrameStack:

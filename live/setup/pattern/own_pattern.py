@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from acquire.errors import ConfigError, DataError
 from acquire.opencv.images import read_image
 from analysis.picture.pattern import PatternReport, describe_pattern
+from live.config.values import numbers_of
 from live.setup.pattern.imposed import ExpectedErrors, Imposed, expected
 from live.setup.pattern.outcome import (
     ExperimentContext,
@@ -85,7 +86,7 @@ def _picture(path: Path, roi: str | None) -> tuple[NDArray[Any], int]:
     bits = _depth(picture)
     if roi is not None:
         try:
-            x, y, width, height = (int(part) for part in roi.split(","))
+            x, y, width, height = numbers_of(roi, int, 4)
         except ValueError:
             raise ConfigError("--roi {roi}: give four whole numbers x,y,width,height", roi) from None
         rows, columns = picture.shape

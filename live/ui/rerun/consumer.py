@@ -22,7 +22,7 @@ from live.ui.rerun.view import View
 CLOSE_S = 10.0
 """At the end of a test: to draw what waits and to close the file."""
 
-IDLE_S = 0.5
+IDLE_S, RESPONSE_S = 0.5, 10.0
 CARD_TIME_STEPS = 2000
 """The figures of the card use at most so many time steps, evenly thinned; those of the summary use all."""
 
@@ -70,7 +70,7 @@ class RerunConsumer(Consumer):
 
 
 class CardWriter(Consumer):
-    """Writes the status card of the view once a second of the test, in its own thread."""
+    """Writes the status card of the view once a second of the test, in its own thread; now and then the response."""
 
     name = "status card"
 
@@ -80,6 +80,7 @@ class CardWriter(Consumer):
         self._clock = clock
         self._view, self._card, self._run_state = view, card, run_state
         self._time_steps: Thinned[TimeStep] = Thinned(CARD_TIME_STEPS)
+        self._response_t = -math.inf
 
     def measurement(self, measurement: Measurement) -> None:
         """Keep the means; write the card when it is due."""
@@ -90,6 +91,14 @@ class CardWriter(Consumer):
                 history.add(time_step)
             snapshot = self._run_state.snapshot(self._clock(), measurement.time_step)
             self._view.status(self._card.written(snapshot, history))
+            if measurement.t - self._response_t >= RESPONSE_S:
+                self._response_t = measurement.t
+                self._view.whole(self._run_state.response.maps())
+
+    def end(self) -> str:
+        """Show the last response."""
+        self._view.whole(self._run_state.response.maps())
+        return ""
 
 
 class FiguresWriter(Consumer):

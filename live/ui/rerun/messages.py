@@ -22,6 +22,7 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
 from live.pipeline.timed.figure import BEYOND, LACKING, FigureState, TimedFigure
 from live.ui.rerun.wire import Kind, Parcel, WireError
+from live.words.language import told
 
 STRAINS = ("exx", "eyy", "exy")
 MAPS = (*STRAINS, "e1", "e2", "sigma", "residual", "status")
@@ -66,7 +67,7 @@ class ViewSetup:
     scale : "symmetric" | "automatic"
         Colour range of the maps: symmetric about zero; or that of the values, about zero where they have both signs.
     whole : sequence of str
-        Further maps: those of the whole test, of a finished one.
+        Further maps: those of the whole test.
     """
 
     title: str
@@ -282,8 +283,8 @@ def picture_of(message: Parcel) -> PictureMessage:
 
 
 def events_message(events: Sequence[Event]) -> Parcel:
-    """Events, without their data."""
-    return Parcel(Kind.EVENTS, {"events": [[e.t, e.kind, e.source, e.text, e.level] for e in events]})
+    """Events in the language of the terminal, without their data."""
+    return Parcel(Kind.EVENTS, {"events": [[e.t, e.kind, e.source, told(e.text), e.level] for e in events]})
 
 
 def events_of(message: Parcel) -> list[Event]:

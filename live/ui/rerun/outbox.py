@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from live.pipeline.queues import Thinned
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from acquire.events import Event
     from acquire.frame import Frame
     from analysis.field import StrainField
+    from live.pipeline.timed.response import Floats
 
 MAX_ROWS, MAX_EVENTS = 20_000, 1000
 HISTORY_ROWS = {Kind.MEANS: 5000, Kind.LOADS: 10_000, Kind.POINTS: 800}
@@ -54,6 +55,8 @@ class Pending:
     status : str or None
         Markdown.
     figures : Snapshot or None
+    whole : mapping of str to (R, C) array
+        Maps of the whole test so far.
     dropped : int
         Rows and events dropped because too many waited.
     """
@@ -65,6 +68,7 @@ class Pending:
         self.picture: Frame | None = None
         self.status: str | None = None
         self.figures: Snapshot | None = None
+        self.whole: Mapping[str, Floats] = {}
         self.dropped = 0
 
     def row(self, kind: Kind, row: Row) -> None:
@@ -95,12 +99,14 @@ class PastMessages:
     rows : mapping of Kind to Thinned
     events : deque of Event
     status : str or None
+    whole : mapping of str to (R, C) array
     """
 
     def __init__(self) -> None:
         self.rows: dict[Kind, Thinned[Row]] = {kind: Thinned(limit) for kind, limit in HISTORY_ROWS.items()}
         self.events: deque[Event] = deque(maxlen=MAX_EVENTS)
         self.status: str | None = None
+        self.whole: Mapping[str, Floats] = {}
 
 
 class Outbox:
@@ -142,6 +148,8 @@ class Outbox:
         yield events_message(list(self._past.events))
         if self._past.status is not None:
             yield Parcel(Kind.STATUS, {"markdown": self._past.status})
+        if self._past.whole:
+            yield Parcel(Kind.WHOLE, {}, {**self._past.whole})
         yield from self._playback()
 
     def next(self, now: float) -> Parcel | None:
@@ -163,6 +171,9 @@ class Outbox:
         if pending.status is not None:
             past.status, pending.status = pending.status, None
             return Parcel(Kind.STATUS, {"markdown": past.status})
+        if pending.whole:
+            past.whole, pending.whole = pending.whole, {}
+            return Parcel(Kind.WHOLE, {}, {**past.whole})
         if pending.figures is not None:
             figures, pending.figures = pending.figures, None
             return figures_message(figures)

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Level
 from acquire.frame import Frame, frozen
+from acquire.text import Message
+from acquire.text.message import about
 from acquire.text.quantity import Amount
 from analysis.evaluate import evaluate_test
 from live.config.gauges import gauge_colours, outlines
@@ -38,6 +40,7 @@ from live.ui.rerun.messages import (
 )
 from live.ui.rerun.view import View, spawn_viewer
 from live.ui.rerun.wire import Kind, Parcel
+from live.words.language import told
 
 MAX_BYTES = 500e6
 """Of pictures and maps as drawn: the viewer keeps them all in memory."""
@@ -122,7 +125,7 @@ class _PlayedMessages:
             for message in playback_messages(self._run, self._rows):
                 yield message
                 done += message.kind is Kind.FIELD
-                self._screen.status(f"instant {done} of {len(self._rows)}")
+                self._screen.status(Message("instant {done} of {all}", done, len(self._rows)))
         except PhasedicError as error:
             self.trouble = str(error)
         self.all.set()
@@ -130,15 +133,25 @@ class _PlayedMessages:
 
 def _report_selection(shown: int, run: RunFolder, screen: Screen) -> None:
     if shown < run.strain.n:
-        screen.print(f"{shown} of {run.strain.n} instants are shown; --from, --to and --every choose others")
+        screen.print(
+            Message(
+                "{shown} of {n} instants are shown; --from, --to and --every choose others",
+                shown,
+                run.strain.n,
+            )
+        )
     if run.pictures is None and not run.notes:
-        screen.print("note: the pictures that were measured are not here any more; maps alone")
+        screen.print(
+            Message(
+                "note: {what}", Message("the pictures that were measured are not here any more; maps alone")
+            )
+        )
     for note in run.notes:
-        screen.print(f"note: {note}")
+        screen.print(Message("note: {what}", note))
 
 
 def _notify(screen: Screen, text: str, level: Level) -> None:
-    screen.print(text if level == "info" else f"{level}: {text}")
+    screen.print(text if level == "info" else about(Message("{what}", level), text))
 
 
 def _announce(view: View, screen: Screen) -> None:
@@ -146,9 +159,9 @@ def _announce(view: View, screen: Screen) -> None:
     if view.port is None:
         return
     if spawn_viewer(view.port, screen.print) is not None:
-        screen.print("the viewer opens in a window of its own; Ctrl-C here ends it")
+        screen.print(Message("the viewer opens in a window of its own; Ctrl-C here ends it"))
         return
-    screen.print("no viewer is opened here (no display); this shows it, Ctrl-C ends it:")
+    screen.print(Message("no viewer is opened here (no display); this shows it, Ctrl-C ends it:"))
     for line in view.instructions.splitlines():
         screen.print(f"  {line}")
 
@@ -281,10 +294,15 @@ def _status(run: RunFolder) -> str:
     figures = evaluate_test(run.curve, tensile_options(run.specimen))
     lines = figure_lines(figures, run.specimen, run.gauge_length_mm)
     lines += [
-        f"gauge **{name}** {Amount('strain', gauge.value[-1], gauge.sigma[-1])} at the end"
+        Message(
+            "gauge **{name}** {strain} at the end", name, Amount("strain", gauge.value[-1], gauge.sigma[-1])
+        )
         for name, gauge in run.gauges.items()
     ]
     lines += response_lines(run.strain)
     values = run.strain.values
-    head = f"**{run.title}**, {run.strain.n} instants, {values['n_valid'][-1]} of {values['n_zoi'][-1]} ZOIs at the end"
-    return "\n\n".join([head, *(line.strip() for line in lines)])
+    valid, zois = int(values["n_valid"][-1]), int(values["n_zoi"][-1])
+    head = Message(
+        "**{title}**, {n} instants, {valid} of {zois} ZOIs at the end", run.title, run.strain.n, valid, zois
+    )
+    return "\n\n".join(told(line).strip() for line in (head, *lines))

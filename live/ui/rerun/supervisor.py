@@ -29,6 +29,7 @@ from acquire.system import (
     send_within,
     start_with_socket,
 )
+from acquire.text import Message
 from live.pipeline.latency import OUTPUT
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox
@@ -86,7 +87,7 @@ class RenderProcess:
         try:
             self._pipe.send(message)
         except (BlockingIOError, TimeoutError):
-            raise Stuck(f"took nothing for {self._limit_s:.0f} s (stopped?)") from None
+            raise Stuck(Message("took nothing for {silent:.0f} s (stopped?)", self._limit_s)) from None
 
     def replies(self, seconds: float = 0.0) -> Iterator[Parcel]:
         """The messages received since the last call; waits at most ``seconds`` for one.
@@ -209,13 +210,13 @@ class Supervisor:
                 self._renderer.may_take(STUCK_S)
             before, self.served = self.served.port, replace(self._target, port=meta["port"], rrd=meta["rrd"])
             if before not in (None, meta["port"]):
-                self._notify(f"the view is now on port {meta['port']}", "warning")
+                self._notify(Message("the view is now on port {port}", meta["port"]), "warning")
             self._on_serving()
         elif message.kind is Kind.TROUBLE:
             self._notify(meta["text"], "warning")
             self.failed = meta["text"] if meta["lasting"] else self.failed
         elif message.kind is Kind.FULL:
-            self._cause = f"had grown to {meta['memory_MiB']} MiB"
+            self._cause = Message("had grown to {size} MiB", meta["memory_MiB"])
         elif message.kind is Kind.ENDED:
             self._is_done = True
 
@@ -258,16 +259,17 @@ class Supervisor:
         lived = time.monotonic() - self._started_t
         self._failures = 1 if self._is_up and lived > _STABLE_S else self._failures + 1
         if not self._is_up and self._failures >= MAX_STARTS:
-            self.failed = f"its process does not start ({_reason(code, error)})"
+            self.failed = Message("its process does not start ({why})", _reason(code, error))
             return
         self._restart_t = time.monotonic() + (
             0.0 if self._cause else min(2.0 ** (self._failures - 1), _MAX_DELAY_S)
         )
         if self._cause:
-            self._notify(f"the view's process {self._cause} and is restarted", "info")
+            self._notify(Message("the view's process {why} and is restarted{more}", self._cause, ""), "info")
         elif self._failures <= MAX_REPORTED:
-            last = "; further restarts are not reported" * (self._failures == MAX_REPORTED)
-            self._notify(f"the view's process {_reason(code, error)} and is restarted{last}", "warning")
+            more = Message("; further restarts are not reported") * (self._failures == MAX_REPORTED)
+            why = _reason(code, error)
+            self._notify(Message("the view's process {why} and is restarted{more}", why, more), "warning")
 
     def _finish(self, until: float) -> None:
         try:
@@ -278,17 +280,20 @@ class Supervisor:
                 renderer.may_take(max(TICK_S, until - time.monotonic()))
                 self._exchange(renderer, TICK_S)
         except (OSError, EOFError, WireError) as error:
-            self._cause = str(error) or "ended early"
+            self._cause = str(error) or Message("ended early")
         code = self._renderer.end(max(0.0, until - time.monotonic())) if self._renderer is not None else 0
         self.pid = None
         if not self._is_done and not self.failed:
-            why = self._cause or "did not finish in time and was ended"
-            self._notify(f"the view's process {why} ({code}); its file may lack the last seconds", "warning")
+            why = self._cause or Message("did not finish in time and was ended")
+            lacks = Message(
+                "the view's process {why} ({code}); its file may lack the last seconds", why, code
+            )
+            self._notify(lacks, "warning")
 
 
 def _reason(code: int, error: Exception) -> str:
     if isinstance(error, (Stuck, WireError)):
-        return str(error)
+        return Message("{why}", error.args[0])
     if code < 0:
-        return f"was ended by {signal.Signals(-code).name}"
-    return f"ended with {code}"
+        return Message("was ended by {name}", signal.Signals(-code).name)
+    return Message("ended with {code}", code)

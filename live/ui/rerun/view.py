@@ -22,20 +22,23 @@ import sys
 import tempfile
 import threading
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
+from acquire.text import Message
 from live.ui.rerun.messages import ViewSetup, ViewTarget, row_of
 from live.ui.rerun.outbox import MessageSource, Outbox, Pending
 from live.ui.rerun.supervisor import Notify, Supervisor
 from live.ui.rerun.wire import Kind
+from live.words.language import told
 
 if TYPE_CHECKING:
     from acquire.events import Event
     from acquire.frame import Frame
     from live.pipeline.measurement import Measurement
     from live.pipeline.snapshot import Snapshot
+    from live.pipeline.timed.response import Floats
 
 _log = logging.getLogger(__name__)
 
@@ -124,6 +127,10 @@ class View:
         """Set the large figures."""
         self._pending.figures = snapshot
 
+    def whole(self, maps: Mapping[str, Floats]) -> None:
+        """Set the maps of the whole test so far; none are left as they are."""
+        self._pending.whole = maps or self._pending.whole
+
     def close(self, seconds: float) -> None:
         """Draw what waits and close the file; a process that takes longer than ``seconds`` is killed with a warning."""
         self._supervisor.close(seconds)
@@ -167,11 +174,14 @@ class View:
         """How to watch now and later: one line for each way."""
         lines = []
         if self.port is not None:
-            lines.append(f"watch: {rerun_command()} --connect {url(self.port)}")
+            watch = f"{rerun_command()} --connect {url(self.port)}"
+            lines.append(told(Message("watch: {command}", watch)))
             if not has_display():
-                lines.append(f"watch from a machine with a display: {remote_access(self.port)}")
+                lines.append(
+                    told(Message("watch from a machine with a display: {how}", remote_access(self.port)))
+                )
         if self.rrd is not None:
-            lines.append(f"later: {rerun_command()} {self.rrd}")
+            lines.append(told(Message("later: {command}", f"{rerun_command()} {self.rrd}")))
         return "\n".join(lines)
 
 
@@ -227,11 +237,7 @@ def spawn_viewer(
     try:
         # A separate session: Ctrl-C in this terminal must not end the viewer.
         process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=words,
-            start_new_session=True,
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=words, start_new_session=True
         )
     except OSError as error:
         words.close()
@@ -260,7 +266,11 @@ def viewer_failure(words: str) -> str:
         (line.removeprefix("Error: ") for line in lines if line.startswith("Error: ")), "no reason given"
     )
     reason = _OS_ERROR.sub("", why)
-    return f"the viewer did not open ({reason}); on a Debian without desktop it needs: {VIEWER_PACKAGES}"
+    return Message(
+        "the viewer did not open ({reason}); on a Debian without desktop it needs: {packages}",
+        reason,
+        VIEWER_PACKAGES,
+    )
 
 
 def rerun_command() -> str:

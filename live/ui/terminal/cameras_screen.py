@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from acquire.text.message import about
-from live.config.cameras import BACK, FRONT
 from live.pipeline.screen import Screen
 from live.ui.terminal.status_line import cameras_line
 
@@ -42,9 +41,8 @@ class CamerasScreen:
 
         self._snapshots[name] = snapshot
         all_of = {one: state.snapshot(snapshot.t) for one, state in self._states.items()} or self._snapshots
-        both = newest(self._states[FRONT], self._states[BACK], snapshot.t) if FRONT in self._states else {}
-        values = {name: (one.mean, one.bending, one.sigma) for name, one in both.items()}
-        self.screen.status(cameras_line(all_of, values, self.screen.width, words))
+        both = newest(self._states, snapshot.t)
+        self.screen.status(cameras_line(all_of, both, self.screen.width, words))
 
 
 class _CameraScreen(Screen):

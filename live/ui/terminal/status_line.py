@@ -27,8 +27,6 @@ _MATTERS = 6
 _OF_CAMERA = ("skipped", "lost_frames")
 Item = tuple[int, str]
 """Rank and text; a line that is too long loses the items with the highest rank first."""
-SideValues = tuple[float, float, float]
-"""Mean of front and back, front minus mean, and the standard uncertainty of either."""
 
 
 def status_line(s: Snapshot, width: int, words: str = "") -> str:
@@ -37,7 +35,7 @@ def status_line(s: Snapshot, width: int, words: str = "") -> str:
 
 
 def cameras_line(
-    cameras: Mapping[str, Snapshot], both: Mapping[str, SideValues], width: int, words: str = ""
+    cameras: Mapping[str, Snapshot], both: Mapping[str, Sequence[float]], width: int, words: str = ""
 ) -> str:
     """The line of a test with several cameras: strains, of sides mean and bending, and what each camera does.
 
@@ -46,6 +44,7 @@ def cameras_line(
     cameras : mapping of str to Snapshot
         By name, the leading one first.
     both : mapping of str to (mean, bending, sigma)
+        Mean of front and back, front minus mean, and the standard uncertainty of either; more is not read.
     width : int
     words : str
     """
@@ -62,8 +61,8 @@ def _each(cameras: Mapping[str, Snapshot]) -> Iterator[Item]:
             yield 5, joined(" ", (name, text))
 
 
-def _both(both: Mapping[str, SideValues]) -> Iterator[Item]:
-    for number, (name, (mean, bending, sigma)) in enumerate(both.items()):
+def _both(both: Mapping[str, Sequence[float]]) -> Iterator[Item]:
+    for number, (name, (mean, bending, sigma, *_)) in enumerate(both.items()):
         text = Message(
             "{name} {mean}, bending {bending}", name, strain_text(mean, sigma), strain_text(bending, sigma)
         )

@@ -17,13 +17,17 @@ from live.pipeline.event_log import sentence
 from live.pipeline.history import History
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
-from live.results.figures import alignment_line, elastic_lines, figure_lines, tare_line
-from live.results.finished.answers import MeasuredAgain, missing_lines
-from live.results.finished.findings import NO_FORCE
+from live.results.figures import alignment_line, elastic_lines, figure_lines, film_line, tare_line
+from live.results.finished.answers import MeasuredAgain, checks_line, missing_lines
+from live.results.finished.findings import NO_FORCE, findings
 from live.results.finished.finished_test import FinishedTest
-from live.results.summary import belief_lines, file_lines, noise_line, summary_lines, valid_line, why_nothing
+from live.results.summary import file_lines, look_lines, noise_line, summary_lines, valid_line, why_nothing
 from live.ui.terminal.status_line import strain_text
 
+MOST = 12
+"""Lines of the summary."""
+Ranked = tuple[int, str]
+"""A line, and how soon it gives way where there are too many: 0 stays."""
 TURNED = math.radians(5)  # off the axis of the load, from which on the summary shows it
 
 
@@ -45,9 +49,21 @@ def print_summary(
     else:
         quoted = shlex.quote(str(folder))
         following = "" if with_report else Message("; next: phasedic report {folder}", quoted)
-        shown = [*brief_lines(run_state, test), *missing, *lines, _files(folder) + following]
+        ranked = [*_ranked(run_state, test), *((2, one) for one in missing)]
+        ranked += [(min(3 * k, 3), line) for k, line in enumerate(lines)]
+        shown = [*_most_needed(ranked), _files(folder) + following]
     for line in shown:
         screen.print(line)
+
+
+def _most_needed(ranked: Sequence[Ranked]) -> list[str]:
+    """The lines that fit, in their order; the others are counted in one, and stand in the report."""
+    room = MOST - 2  # a blank line before them, the files after them
+    if len(ranked) <= room:
+        return [line for _, line in ranked]
+    needed = sorted(range(len(ranked)), key=lambda k: (ranked[k][0], k))[: room - 1]
+    more = Message("{n} more remarks: report.html", len(ranked) - len(needed))
+    return [*(ranked[k][1] for k in sorted(needed)), more]
 
 
 def _again(run_state: RunState, folder: Path) -> MeasuredAgain:
@@ -58,18 +74,32 @@ def _again(run_state: RunState, folder: Path) -> MeasuredAgain:
 
 def brief_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     """What was measured, whether it can be believed, E, nu and strengths or why they are not known."""
+    return [line for _, line in _ranked(run_state, test)]
+
+
+def _ranked(run_state: RunState, test: FinishedTest) -> list[Ranked]:
     history = run_state.history
     if not history.has_values:
-        return [why_nothing(run_state)]
-    return [
-        valid_line(history),
-        *_at_end(history, test.axis.axis),
-        noise_line(history),
-        *belief_lines(test),
-        *_figures(run_state, test),
-        *test.cycles.lines(),
-        *_remarks(run_state, test),
-    ]
+        return [(0, why_nothing(run_state))]
+    at_end, found = _at_end(history, test.axis.axis), findings(test)
+    groups = (
+        (0, [valid_line(history), *at_end[:1]]),
+        (2, at_end[1:]),
+        (4, [noise_line(history)]),
+        (2, film_line(test.specimen)),
+        (0, [checks_line(found)]),
+        (1, look_lines(found)),
+        (0, _figures(run_state, test)),
+        (2, test.figures.notes if test.has_force else ()),
+        (0, test.cycles.lines()),
+        (2, test.response),
+        (2, _remarks(run_state, test)),
+    )
+    ranks: dict[str, int] = {}
+    for rank, lines in groups:
+        for line in lines:
+            ranks.setdefault(line, rank)  # a note may be why E is not known
+    return [(rank, line) for line, rank in ranks.items()]
 
 
 def _at_end(history: History, axis: str) -> list[str]:
@@ -92,7 +122,7 @@ def _at_end(history: History, axis: str) -> list[str]:
 def _figures(run_state: RunState, test: FinishedTest) -> list[str]:
     figures, specimen = test.figures, test.specimen
     if figures.E.known:
-        return [*elastic_lines(figures, specimen), *figures.notes]
+        return elastic_lines(figures, specimen)
     why = figures.E.why
     if not run_state.with_load:
         why = NO_FORCE
@@ -100,8 +130,7 @@ def _figures(run_state: RunState, test: FinishedTest) -> list[str]:
         last_t = run_state.history.time_steps[-1].t
         why = Message("no burst has a force: {why}", run_state.loads.why_none_at(last_t))
     strengths = figure_lines(figures, specimen)[:1] if test.has_force else []
-    notes = figures.notes if test.has_force else ()
-    return list(dict.fromkeys([Message("E is not known: {why}", why), *strengths, *notes]))
+    return [Message("E is not known: {why}", why), *strengths]
 
 
 def _remarks(run_state: RunState, test: FinishedTest) -> Iterator[str]:

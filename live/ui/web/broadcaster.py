@@ -33,7 +33,10 @@ def json_bytes(value: Any) -> bytes:
 
 
 class PageStream:
-    """The messages that wait for one page: one of each kind."""
+    """The messages that wait for one page: one of each kind.
+
+    A kind is a word that the page hears; a name after it, as in "run back", keeps the messages of a camera apart.
+    """
 
     def __init__(self) -> None:
         self._waiting: dict[str, bytes] = {}

@@ -39,12 +39,8 @@ class CamerasPanel:
         if now >= self._due:
             self._figures = side_figures(figures_of(self._states, self._specimen), self._specimen)
             self._due = max(now + FIGURES_S, self._now() + 10 * (self._now() - now))
-        strains = newest(self._states[FRONT], self._states[BACK], now) if FRONT in self._states else {}
         return {
-            "strains": [
-                {"name": name, "mean": one.mean, "bending": one.bending, "sigma": one.sigma}
-                for name, one in strains.items()
-            ],
+            "strains": [{"name": name, **one._asdict()} for name, one in newest(self._states, now).items()],
             "figures": self._figures,
             "cameras": [self._camera(side, now) for side in self._states],
         }
@@ -70,8 +66,7 @@ def figures_of(states: Mapping[str, RunState], specimen: SpecimenConfig) -> dict
     if FRONT not in states:
         return {name: evaluate(state.history, state.loads, specimen) for name, state in states.items()}
     front, back = (SideOfTest.of_state(states[side], specimen) for side in (FRONT, BACK))
-    sides = SidesOfTest.of(front, back, tensile_options(specimen))
-    return {"both": sides.both, FRONT: sides.front, BACK: sides.back}
+    return SidesOfTest.of(front, back, tensile_options(specimen)).figures
 
 
 def side_figures(found: Mapping[str, TensileFigures], specimen: SpecimenConfig) -> list[dict[str, str]]:

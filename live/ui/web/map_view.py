@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from acquire.text import Message
-from analysis.field import VALUES, Status
+from analysis.field import Status
 from live.config.gauges import complete_gauges, gauge_colours
 from live.config.loading import Config
 from live.pipeline.measurement import Measurement
+from live.pipeline.timed.response import shown_names
 from live.results.maps.colours import MICROSTRAIN, PERCENT
-from live.results.maps.field_maps import FIELD_MAPS, FieldMaps, Painted
+from live.results.maps.field_maps import FIELD_MAPS, NO_MAPS, FieldMaps, Floats, Painted
 from live.results.maps.painting import overlay_cells
+from live.results.maps.scale import ColourScale
 from live.ui.web.painting import as_jpeg, cells_box, cells_png, grey_levels, shrunk
 
 RANGES = ("automatic", "symmetric", "fixed")
@@ -31,7 +34,7 @@ class MapChoice:
     Attributes
     ----------
     name : str
-        One of ``FIELD_MAPS``.
+        One of ``map_choices``.
     span : "automatic", "symmetric" or "fixed"
         Over the values, symmetric about zero, or from ``-limit`` to ``limit`` (strains only).
     limit : float or None
@@ -52,12 +55,15 @@ class MapView:
     Attributes
     ----------
     choice : MapChoice
+    response : callable
+        Gives the response of the places so far.
     """
 
     def __init__(self, config: Config) -> None:
         self._config, self._axis = config, config.specimen.first_axis
+        self.response: Callable[[], Mapping[str, Floats]] = dict
         limit = config.view.strain_range
-        self._painted: tuple[Measurement, Painted, str] | None = None
+        self._painted: tuple[Measurement, Painted] | None = None
         self._take(MapChoice(f"e{self._axis * 2}", "automatic" if limit is None else "fixed", limit))
 
     def _take(self, choice: MapChoice) -> None:
@@ -67,9 +73,10 @@ class MapView:
 
     def choose(self, name: object, span: object, limit: object) -> str:
         """Show another map, or another range; the reason of a refusal, or empty."""
-        if name not in FIELD_MAPS:
+        known = map_choices(self._config)
+        if name not in known:
             return Message(
-                "there is no map {given}; there are {listed}", repr(str(name)[:40]), ", ".join(FIELD_MAPS)
+                "there is no map {given}; there are {listed}", repr(str(name)[:40]), ", ".join(known)
             )
         if span not in RANGES:
             return Message("the ranges of a map are {listed}", ", ".join(RANGES))
@@ -79,24 +86,24 @@ class MapView:
         self._take(MapChoice(str(name), str(span), float(limit) if given else None))  # type: ignore[arg-type]
         return ""
 
-    def draw(self, m: Measurement) -> tuple[bytes, dict[str, Any]]:
-        """The picture of ``m`` with its map, as JPEG, and its scale as the page shows it."""
+    def draw(self, m: Measurement, whole: str = "") -> tuple[bytes, dict[str, Any]]:
+        """The picture of ``m`` with its map, or one of the ``whole`` test, as JPEG, and its scale for the page."""
         picture, zoom = shrunk(m.burst.mean, m.burst.bits)
-        painted, shown = self._drawn(m)
+        painted, shown = self._drawn(m, MapChoice(whole, "automatic") if whole else self.choice)
         overlay_cells(picture, zoom, m.field.grid, painted.rgba, (m.time_step.u, m.time_step.v))
         return as_jpeg(picture), shown
 
     def layers(self, m: Measurement) -> tuple[bytes, bytes, dict[str, Any]]:
         """The picture of ``m`` as JPEG, its map as PNG to lay over it, and its scale as the page shows it."""
         grey, _ = grey_levels(m.burst.mean, m.burst.bits)
-        painted, shown = self._drawn(m)
+        painted, shown = self._drawn(m, self.choice)  # another may be chosen meanwhile
         place = cells_box(m.field.grid, (m.time_step.u, m.time_step.v))
         return as_jpeg(grey), cells_png(painted.rgba), shown | {"cells": place}
 
-    def _drawn(self, m: Measurement) -> tuple[Painted, dict[str, Any]]:
-        choice = self.choice  # another may be chosen meanwhile
-        painted = self._maps.paint(m.field, (choice.name,))[choice.name]
-        self._painted = m, painted, choice.name
+    def _drawn(self, m: Measurement, choice: MapChoice) -> tuple[Painted, dict[str, Any]]:
+        more = NO_MAPS if choice.name in FIELD_MAPS else self.response()
+        painted = self._maps.paint(m.field, (choice.name,), more)[choice.name]
+        self._painted = m, painted
         height, width = m.burst.mean.shape
         shown = {"of": choice.name, "range": choice.span, "width": width, "height": height}
         shapes = gauge_shapes(self._config) | plate_shapes(self._config)
@@ -106,7 +113,7 @@ class MapView:
         """Value, sigma and status of the ZOI that is shown at a place of the picture, px."""
         if self._painted is None:
             return {"value": None, "status": OUTSIDE}
-        m, painted, name = self._painted
+        m, painted = self._painted
         grid, moved = m.field.grid, np.nan_to_num([m.time_step.u, m.time_step.v])
         column, row = (
             int(np.argmin(np.abs(c - p))) for c, p in ((grid.x, x - moved[0]), (grid.y, y - moved[1]))
@@ -117,8 +124,9 @@ class MapView:
         status = Status(int(m.field.status[row, column]))
         if painted.values is None or not np.isfinite(painted.values[row, column]):
             return {"value": None, "status": status.text}
-        sigma = float(m.field.sigma(name)[row, column]) if name in VALUES else None
-        return {"value": float(painted.values[row, column]), "sigma": sigma, "status": status.text}
+        one = _factor(painted.scale)
+        sigma = None if painted.sigmas is None else float(painted.sigmas[row, column]) * one
+        return {"value": float(painted.values[row, column]) * one, "sigma": sigma, "status": status.text}
 
 
 def _scale_of(painted: Painted) -> dict[str, Any]:
@@ -127,14 +135,27 @@ def _scale_of(painted: Painted) -> dict[str, Any]:
     if scale is None or values is None:
         legend = [{"text": one.text, "count": one.count, "colour": f"rgb{one.rgb}"} for one in painted.legend]
         return {"legend": legend}
-    strain = scale.unit in (MICROSTRAIN.name, PERCENT.name)
-    factor = scale.factor if strain else 1.0
-    low, high = scale.low / factor, scale.high / factor
-    counts, _ = np.histogram(values[np.isfinite(values)], BARS, (low, high))
+    strain, one = _is_strain(scale), _factor(scale)
+    low, high = scale.low / scale.factor * one, scale.high / scale.factor * one
+    counts, _ = np.histogram(values[np.isfinite(values)] * one, BARS, (low, high))
     unit = "" if strain else scale.unit
     ramp = [f"#{bytes(row).hex()}" for row in scale.ramp(_RAMP)]
     colours = {"ramp": ramp, "diverging": scale.is_diverging}
     return {"low": low, "high": high, "strain": strain, "unit": unit, "histogram": counts.tolist()} | colours
+
+
+def _is_strain(scale: ColourScale) -> bool:
+    return scale.unit in (MICROSTRAIN.name, PERCENT.name)
+
+
+def _factor(scale: ColourScale | None) -> float:
+    """From the values of a map to those that the page gets: strains as they are, others in their unit."""
+    return 1.0 if scale is None or _is_strain(scale) else scale.factor
+
+
+def map_choices(config: Config) -> tuple[str, ...]:
+    """Names of the maps that a test can show while it goes on."""
+    return (*FIELD_MAPS, *shown_names(config.output.response))
 
 
 def plate_shapes(config: Config) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
 
+from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.text import Message
@@ -29,6 +30,9 @@ from live.pipeline.repeats import Repeats
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import BURST, FORCE, STRESS, ShownFigure, Snapshot, peak_force
 from live.pipeline.timed.figure import TimedFigure
+from live.pipeline.timed.response import shown_names
+from live.results.reader import whole_maps
+from live.results.run_folder import STRAIN
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.cameras_panel import CamerasPanel
 from live.ui.web.curve_history import CurveHistory
@@ -141,6 +145,7 @@ class PageConsumer(Consumer):
         if len(states) > 1:
             self._cameras = CamerasPanel(states, self._config.specimen, self._now)
         self._running, self._start_t = running, running.run_state.health.began_t
+        self.map.response = running.run_state.response.maps
         self._channels = ChannelValues(self._start_t, running.run_state.snapshot)
 
     def select_map(self, request: Mapping[str, Any]) -> str:
@@ -221,6 +226,7 @@ class PageConsumer(Consumer):
         if last is not None and last is not m:
             self.layers["last"], shown = self.map.draw(last)
             found["last"] = self._shown_after(last, shown, "&layer=last")
+        found |= self._response_after(m)
         self.picture, shown = self.map.draw(m)
         words = Message("at the end") if math.isnan(self._peak_N) else Message("at the highest force")
         return found | {
@@ -229,6 +235,21 @@ class PageConsumer(Consumer):
             "gauges": _gauges(m.time_step, {}, self._colours),
             "points": self.curve.position,
         }
+
+    def _response_after(self, m: Measurement) -> dict[str, Any]:
+        """The maps of the whole test that ``strain.h5`` has, over the picture of ``m``."""
+        names, found = shown_names(self._config.output.response), dict[str, Any]()
+        if self._running is None or not names:
+            return found
+        try:
+            maps = whole_maps(self._running.folder / STRAIN)
+        except DataError:  # which the end of the run has told
+            return found
+        self.map.response = lambda: maps
+        for name in (name for name in names if name in maps):
+            self.layers[name], shown = self.map.draw(m, name)
+            found[name] = self._shown_after(m, shown, f"&layer={name}")
+        return found | {"whole": [*found]}
 
     def _shown_after(self, m: Measurement, shown: dict[str, Any], layer: str = "") -> dict[str, Any]:
         address = f"/picture?side={self._side}&after={self._shown}{layer}"

@@ -12,13 +12,9 @@ from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.page_consumer import PageConsumer, RunningTest
 from live.ui.web.server import Response, json_response
 
-SHOWN = 2
-
 
 class PageConsumers:
     """The consumers of one run; none where there are no configurations.
-
-    The page shows the pictures of the first two cameras, and what each of all does.
 
     Parameters
     ----------
@@ -36,10 +32,12 @@ class PageConsumers:
     def __init__(
         self, broadcaster: Broadcaster, configs: Mapping[str, Config], pictures: Mapping[str, bytes]
     ) -> None:
-        self.by_name: dict[str, PageConsumer] = {}
-        for name, config in list(configs.items())[:SHOWN]:
-            kind, picture = "second" if self.by_name else "run", pictures.get(name, b"")
-            self.by_name[name] = PageConsumer(broadcaster, config, picture=picture, kind=kind, side=name)
+        self.by_name = {
+            name: PageConsumer(
+                broadcaster, config, picture=pictures.get(name, b""), kind=f"run {name}".strip(), side=name
+            )
+            for name, config in configs.items()
+        }
 
     @property
     def first(self) -> PageConsumer | None:
@@ -87,7 +85,7 @@ class PageConsumers:
             return b""
         consumer = self._of(query.get("side", ""))
         layer = query.get("layer", "")
-        return consumer.layers.get(layer, b"") if layer in ("map", "last") else consumer.picture
+        return consumer.layers.get(layer, b"") if layer != "picture" and layer else consumer.picture
 
     def select_map(self, request: Mapping[str, Any]) -> dict[str, Any]:
         """Show another map, on the pictures of all cameras."""

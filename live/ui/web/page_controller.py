@@ -23,16 +23,17 @@ from acquire.text import Message
 from acquire.text.printable import brief, printable
 from analysis.evaluate import GAUGE_KINDS
 from live.config.loading import Config
-from live.results.maps.field_maps import FIELD_MAPS
+from live.config.new_files import free_name
 from live.run.control import ONCE, Answer, Controls, carry_out, refusal
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
+from live.ui.web.map_view import map_choices
 from live.ui.web.page_consumer import PageConsumer, RunningTest
 from live.ui.web.page_consumers import PageConsumers
 from live.ui.web.painting import as_png
 from live.ui.web.run_result import peaks
 from live.ui.web.server import DEFAULT_PORT, REPORT_POLICY, PageServer, Response, jpeg_response
-from live.ui.web.setup.config_draft import ConfigDraft, next_name, second_draft
+from live.ui.web.setup.config_draft import ConfigDraft, drafts_of, next_name
 from live.ui.web.setup.draft_changes import CHANGES
 from live.ui.web.setup.drawn_region import DrawnRegion
 from live.ui.web.setup.setup_session import SetupSession
@@ -75,7 +76,7 @@ class PageController:
         self.stage = RUN if draft is None else SET_UP
         self.sessions: SetupSessions | None = None
         self.others: list[Config] = []
-        self._second_draft: ConfigDraft | None = None
+        self._drafts: Mapping[str, ConfigDraft] = {}
         self._drawn: Mapping[str, DrawnRegion] = {}
         self._broadcaster = Broadcaster()
         self._consumers = PageConsumers(self._broadcaster, {}, {})
@@ -88,6 +89,7 @@ class PageController:
         self._message = ""
         self._what: dict[str, Any] | None = None
         self._before: dict[str, Any] | None = None
+        self._maps: tuple[str, ...] = ()
         self.viewer: Callable[[int], Answer] = lambda port: refusal("there is no viewer here")
         gets = {
             "/points": lambda query: self._consumers.points(query),
@@ -141,8 +143,8 @@ class PageController:
         assert self.draft is not None
         if not self.draft.config.metadata.get("specimen"):
             self.draft.change_all({"metadata.specimen": self._free_name(FIRST)})
-        self._second_draft = self._second_draft or second_draft(self.draft)
-        with SetupSessions(self.draft, self._second_draft, self._broadcaster, self._drawn) as sessions:
+        self._drafts = self._drafts or drafts_of(self.draft)
+        with SetupSessions(self._drafts, self._broadcaster, self._drawn) as sessions:
             self.sessions = sessions
             self._enter(SET_UP, message)
             started = self._requests.get() == START
@@ -152,9 +154,8 @@ class PageController:
     def _to_run(self, sessions: SetupSessions) -> Config:
         config, *self.others = sessions.configs(Path(self._folder.name))
         wanted = self._folder_of(str(config.metadata["specimen"]))
-        tries = (wanted.with_name(f"{wanted.name}_{n}") for n in range(2, 10_000))
-        folder = next(one for one in tries if not one.exists()) if wanted.exists() else wanted
-        return replace(config, output=replace(config.output, dir=str(folder)))
+        name = free_name(wanted.name, lambda name: wanted.with_name(name).exists(), "_")
+        return replace(config, output=replace(config.output, dir=str(wanted.with_name(name))))
 
     def _folder_of(self, name: str) -> Path:
         """The folder for the files of a specimen."""
@@ -170,8 +171,9 @@ class PageController:
 
     def begin(self, configs: Mapping[str, Config]) -> Mapping[str, PageConsumer]:
         """Begin the stage of a run with these cameras, by name; the consumers of their data."""
-        what = _described(next(iter(configs.values())))
-        self._before, self._what = self._outline(what), what
+        config = next(iter(configs.values()))
+        what = _described(config)
+        self._before, self._what, self._maps = self._outline(what), what, map_choices(config)
         self._consumers, self._live = PageConsumers(self._broadcaster, configs, self._last_pictures), None
         self._enter(RUN, "")
         return self._consumers.by_name
@@ -233,6 +235,7 @@ class PageController:
             "n": self._stages,
             "words": self._message,
             "alone": self.draft is None,
+            "cameras": [*(self._consumers if self.sessions is None else self.sessions).by_name] or [""],
             "what": self._what,
             "before": self._before if self.stage == RUN else None,
         }
@@ -240,7 +243,7 @@ class PageController:
             {"kind": name, "label": one.label, "hint": one.hint, "gesture": one.gesture}
             for name, one in GAUGE_KINDS.items()
         ]
-        self._broadcaster.publish("stage", stage | {"components": FIELD_MAPS, "kinds": kinds})
+        self._broadcaster.publish("stage", stage | {"components": self._maps, "kinds": kinds})
 
     # -- requests of the page -----------------------------------------------------------------
 

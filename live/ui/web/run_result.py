@@ -87,14 +87,12 @@ def cameras_result(
 
 
 def peaks(consumers: Mapping[str, PageConsumer]) -> dict[str, Any]:
-    """The maps and gauges at the highest force: those of the first camera, and of another one by its name."""
-    if not consumers:
-        return {}
-    (name, first), *others = ((name, consumer.at_peak()) for name, consumer in consumers.items())
-    if not others:
-        return first
-    gauges = [{**gauge, "side": side} for side, one in ((name, first), *others) for gauge in one["gauges"]]
-    return {**first, "gauges": gauges, "side": name, "second": {**others[0][1], "side": others[0][0]}}
+    """The maps and gauges at the highest force: those of the first camera, and of each where there are several."""
+    found = [{**consumer.at_peak(), "side": name} for name, consumer in consumers.items()]
+    if len(found) < 2:
+        return found[0] if found else {}
+    gauges = [{**gauge, "side": one["side"]} for one in found for gauge in one["gauges"]]
+    return {**found[0], "gauges": gauges, "cameras": found}
 
 
 def _belief(figures: TensileFigures, specimen: SpecimenConfig, troubles: Sequence[str]) -> dict[str, Any]:
@@ -106,13 +104,7 @@ def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str
     first = {row.name for row in headline(figures, stresses=specimen.area_m2 is not None)}
     found = [_figure(row) | {"head": row.name in first} for row in _rows(figures, specimen)]
     if figures.E.known and figures.elastic_strain:
-        found.append(
-            {
-                "name": Message("strain of E and nu"),
-                "text": figures.elastic_strain,
-                "words": True,
-            }
-        )
+        found.append({"name": Message("strain of E and nu"), "text": figures.elastic_strain, "words": True})
     if figures.E.known:
         found.append(_interval_of_e(figures))
     return found + [{"name": Message("of the test"), "text": note, "words": True} for note in figures.notes]
@@ -144,7 +136,7 @@ def _lines(
     """The lines and marks of the report's curve, in SI units."""
     history, loads = run_state.history, run_state.loads
     axial, transverse = history.along(specimen.axis)
-    load = history.forces(loads) / (specimen.area_m2 or 1.0)
+    load = specimen.load(history.forces(loads))
     if not np.isfinite(load).any():
         return
     curve = EvaluatedCurve(

@@ -349,7 +349,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._head(200, "text/event-stream", PAGE_POLICY, None)
             while (messages := subscriber.take(HEARTBEAT_S)) is not None:
                 for kind, message in messages.items():
-                    self.wfile.write(b"event: %s\ndata: %s\n\n" % (kind.encode(), message))
+                    self.wfile.write(b"event: %s\ndata: %s\n\n" % (kind.partition(" ")[0].encode(), message))
                 self.wfile.flush()
         finally:
             broadcaster.remove(subscriber)

@@ -16,6 +16,7 @@ from acquire.events import Event, EventKind
 from acquire.record_mode import RecordMode
 from acquire.session import Session, layout
 from acquire.session.layout import event_rows
+from acquire.text import Message
 from tests.acquire.session.fixtures import frame, sample, writer
 
 
@@ -122,3 +123,14 @@ def test_a_long_event_goes_on_in_rows_that_begin_with_a_plus() -> None:
     assert [row[:1] for row in rows.tolist()] == [b"{", b"+", b"+"]
     whole = json.loads(b"".join((rows[0], *(row[1:] for row in rows[1:]))))
     assert (whole["time_s"], whole["monotonic_s"], whole["text"]) == (6.0, 10.0, "y" * 1200)
+    assert "message" not in whole
+
+
+def test_an_event_comes_back_as_the_message_that_it_was(path: Path) -> None:
+    text = Message("no picture for {waited:.1f} s; still waiting", 2.0)
+    with writer(path) as session:
+        session.write_event(Event(1001.0, EventKind.DEVICE, "camera", text, "warning"))
+    with Session.open(path) as back:
+        (event,) = back.events()
+    assert event.text == str(text) and isinstance(event.text, Message)
+    assert (event.text.template, event.text.values) == (text.template, text.values)

@@ -66,6 +66,17 @@ def test_each_page_is_shown_under_the_names_of_messages(capsys: pytest.CaptureFi
         assert capsys.readouterr().out == (ROOT / "docs" / "optics.md").read_text() + "\n"
 
 
+def test_a_section_is_shown_up_to_the_next_heading(capsys: pytest.CaptureFixture[str]) -> None:
+    assert phasedic(["docs", "docs/load-cells.md#forces-from-a-file"]) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith("## Forces from a file\n") and "--load-column" in shown and "## Tare" not in shown
+    assert phasedic(["docs", "guide#set-up"]) == 0
+    shown = capsys.readouterr().out
+    assert "### Scale\n" in shown and not shown.rstrip().endswith("## Check")
+    assert phasedic(["docs", "method#13-errata-of-the-printed-paper"]) == 0
+    assert capsys.readouterr().out.startswith("## 13. Errata")
+
+
 def test_pages_are_listed_and_an_unknown_one_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert phasedic(["docs"]) == 0
     assert "troubleshooting            Troubleshooting\n" in capsys.readouterr().out

@@ -77,7 +77,7 @@ OTHERS = {
     "specimen": {
         "axis": "auto", "standard": "iso6892", "test": "auto", "modulus_between": (0.0005, 0.0025), "zero": "raw",
     },
-    "output": {"dir": None, "report": False},
+    "output": {"dir": None, "response": None, "report": False},
 }  # fmt: skip
 
 
@@ -125,7 +125,8 @@ def test_some_options_are_switches_and_some_are_for_experts() -> None:
     assert {name for name, one in found.items() if not one.expert} == {
         "camera", "back", "beside", "load", "load-unit", "load-column", "load-decimal", "load-sign",
         "roi", "zoi", "step", "burst", "mask", "gauges", "strain", "scale",
-        "no-record", "armed", "orders", "strain-out", "no-view", "axis", "out", "seconds", "report",
+        "no-record", "armed", "orders", "strain-out", "no-view", "axis", "out", "seconds", "response",
+        "report",
     }  # fmt: skip
     keys = {name: key for name, (key, _) in options().items()}
     assert (keys["no-record"], keys["lag"], keys["bending"]) == (

@@ -182,3 +182,30 @@ def test_any_text_is_refused_in_words_or_has_rising_times(parts: list[str]) -> N
         assert str(refused).startswith("forces.csv: ")
     else:
         assert found.times is None or bool((np.diff(found.times) > 0).all())
+
+
+def test_a_force_beyond_sense_is_refused() -> None:
+    with pytest.raises(DataError, match=r"a force of 1e\+15 N is beyond sense; give --load-unit"):
+        read("time [s];Force [N]\n0;1\n1;1e15\n")
+
+
+@pytest.mark.parametrize(
+    "heading",
+    [
+        "时间(s),试验力(kN)",
+        "Czas [s],Siła [kN]",
+        "시간(s),하중(kN)",
+        "Tempo (s),Força (kN)",
+        "Tijd [s],Kracht [kN]",
+    ],
+)
+def test_headings_of_other_languages_are_understood(heading: str) -> None:
+    found = read(f"{heading}\n0,1\n1,3\n")
+    assert found.times is not None
+    assert found.times.tolist() == [0, 1]
+    assert found.forces.tolist() == [1000, 3000]
+
+
+def test_a_stress_in_another_language_is_no_force() -> None:
+    with pytest.raises(DataError, match="no force"):
+        read("时间(s),应力(MPa)\n0,1\n1,3\n")

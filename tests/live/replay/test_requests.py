@@ -158,9 +158,10 @@ def test_a_part_is_cut_as_configured(shots: Path, tmp_path: Path) -> None:
         "[camera]\ncrop = [10, 10, 120, 100]\n[view]\nenabled = false\nrrd = false\n"
     )
     request = ReplayRequest(
-        str(shots), False, None, None, None, tmp_path / "a.toml",
+        str(shots),
+        tmp_path / "a.toml",
         {"measure.zoi": 48, "measure.step": 24, "output.dir": str(tmp_path / "out")},
-    )  # fmt: skip
+    )
     assert replay(request, TerminalScreen(quiet=True), threading.Event()).exit_code == 0
     with Strain.open(tmp_path / "out" / "strain.h5") as strain:
         assert strain.grid.x[-1] < 120

@@ -94,9 +94,7 @@ def source(
         start_monotonic=START, start_utc="now", camera=CAMERA,
     )  # fmt: skip
     given = {"overrides": {}, "as_measured": False} | asked
-    request = ReplayRequest(
-        "session.h5", given.pop("as_measured"), None, None, None, None, given.pop("overrides")
-    )
+    request = ReplayRequest("session.h5", None, given.pop("overrides"))
     found = session_source(session, replace(request, **given), load_config(None, settings or {}), PATH)
     return found, store.asked
 

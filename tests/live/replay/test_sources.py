@@ -30,7 +30,7 @@ from live.replay.study import NO_WINDOW, StudySetting, _found, _largest, _loaded
 from tests.live.fakes import frame
 from tests.live.made_up import START, make_measurement
 
-REQUEST = ReplayRequest("session.h5", False, None, None, None, None, {})
+REQUEST = ReplayRequest("session.h5", None, {})
 
 
 def part(low: float | None, high: float | None) -> Window:

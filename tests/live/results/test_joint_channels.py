@@ -97,7 +97,7 @@ def test_two_cameras_that_stall_together_leave_no_value() -> None:
     assert joint.lost == "" and joint.read(START)["mean_axial"] == pytest.approx(STRAIN)
     now[0] = START + 3.0
     assert (joint.read(START), joint.lost) == ({}, "the front gives no strains")
-    assert newest(states["front"], states["back"], now[0]) == {}
+    assert newest(states, now[0]) == {}
     for state in states.values():
         state.health.paused = True
     assert (joint.read(START), joint.lost) == ({}, "")

@@ -16,9 +16,9 @@ from acquire.errors import ConfigError, DataError
 from analysis.field import Status, StrainField
 from analysis.field.grid import ZoiGrid
 from live.cli import main
-from live.config.loading import from_dict
-from live.config.sections import SpecimenConfig
+from live.config.loading import Config, from_dict
 from live.pipeline.measurement import Measurement
+from live.pipeline.timed.response import ResponseWatch, leaves_name, slope_name
 from live.results import Results, ResultsInfo, Strain
 from live.results.__main__ import main as probed
 from live.results.finished.finished_test import FinishedTest
@@ -195,6 +195,37 @@ def test_amplification_needs_no_load(tmp_path: Path, loads: bool) -> None:
         assert response_title(strain, "eyy") == ""
 
 
+@pytest.mark.parametrize("channel", ["stress", "mean", "time"])
+def test_a_test_that_goes_on_has_the_lines_so_far(channel: str) -> None:
+    watch, grid = ResponseWatch(), make_grid()
+    watch.channel, watch.area_m2 = channel, AREA_M2
+    assert not watch.maps()
+    upper, knee = np.indices(grid.shape)[0] < 2, 120e6 if channel == "stress" else np.inf
+    means = []
+    for k, strain in enumerate(STRAINS):
+        extra = np.where(upper, np.maximum(E_PA * strain - knee, 0) / 15e9, 0.0)
+        burst, field = make_measurement(k, strain).burst, field_of(grid, k, strain, extra)
+        m = Measurement.of(k, burst, field, E_PA * strain * AREA_M2)
+        means.append(m.time_step.eyy)
+        for _ in range(1 if channel == "time" else 2):
+            watch.add(m, "y")  # over a load, a burst that is no higher than those before does not count
+    maps, name = watch.maps(), slope_name(channel)
+    of = {"stress": E_PA * STRAINS, "mean": means, "time": 0.1 * np.arange(len(STRAINS))}
+    truth = amplified(grid) * np.polyfit(of[channel], STRAINS, 1)[0]
+    seen = np.isfinite(maps[name])
+    assert seen.sum() == grid.n_active
+    seen[LOST] = channel != "time"  # its line is of another part of a course that bends
+    off = ((maps[name] - truth) / maps[f"sigma_{name}"])[seen]
+    assert np.abs(off).max() < 4.5 and np.sqrt(np.mean(off**2)) == pytest.approx(1, abs=0.35)
+    gone = np.isfinite(maps.get(leaves_name(channel), np.full(grid.shape, np.nan)))
+    if channel == "stress":
+        assert np.nanmean(maps["chi2"]) == pytest.approx(1, abs=0.1)
+        assert gone[upper & grid.active].sum() >= 12 and not gone[~upper].any()
+        assert maps["leaves_at_stress"][gone] == pytest.approx(120e6, abs=6e6)
+    else:
+        assert not gone.any()
+
+
 @pytest.mark.parametrize(
     ("channel", "words"),
     [("stress", "all together ± 0.58 %"), ("mean", " % of the distance from 1; chi2")],
@@ -296,14 +327,15 @@ def test_the_child_that_probes_reads_it_too(stressed: Path) -> None:
 def test_a_channel_that_will_not_be_is_refused(
     channel: str, area: float | None, forces: bool, words: str
 ) -> None:
-    config = from_dict(
-        {"specimen": {"area_mm2": area}, "gauges": {"web": {"kind": "zoi", "at": [1, 2]}}}, {}, "made up"
-    )
-    assert isinstance(config.specimen, SpecimenConfig)
+    plain = {"specimen": {"area_mm2": area}, "gauges": {"web": {"kind": "zoi", "at": [1, 2]}}}
+
+    def over(name: str | None) -> Config:
+        return from_dict(plain | {"output": {"response": name} if name else {}}, {}, "made up")
+
     with pytest.raises(ConfigError, match=words):
-        check_channel(channel, config, forces=forces)
-    for known in ("", "mean", "time", "web"):
-        check_channel(known, config, forces=forces)
+        check_channel(over(channel), forces=forces)
+    for known in (None, "mean", "time", "web"):
+        check_channel(over(known), forces=forces)
 
 
 @pytest.mark.parametrize("kind", ["csv", "npz", "mat", "vtk", "png"])

@@ -65,7 +65,7 @@ def test_the_curve_of_the_mean_has_means_and_the_stress_of_the_front() -> None:
 
     front, back = side(1e-3, 3e-5, 7e7), side(3e-3, 4e-5, 9e7)
     sides = SidesOfTest.of(front, back, TensileOptions())
-    assert sides.back.Rm.value == sides.both.Rm.value == sides.front.Rm.value == pytest.approx(7e7 * t[-1])
+    assert [one.Rm.value for one in sides.figures.values()] == pytest.approx([7e7 * t[-1]] * 3)
     found = sides.curve
     assert found.transverse is not None and found.narrowing is not None and found.lens is not None
     np.testing.assert_allclose(found.strain, 2e-3 * t)
@@ -86,7 +86,7 @@ def test_the_newest_values_are_those_of_the_newest_instant_of_both(monkeypatch: 
     front, back = (
         cast(RunState, SimpleNamespace(last=k, health=healthy, snapshot=lambda _: made)) for k in (6, 4)
     )
-    mean, bending, _, at = newest(front, back)[AXIAL]
+    mean, bending, _, at = newest({"front": front, "back": back})[AXIAL]
     assert at == 4.0
     assert mean == pytest.approx(4e-3 * (6 + 4) / 2) and bending == pytest.approx(4e-3 * (6 - 4) / 2)
 
@@ -120,9 +120,9 @@ def test_the_mean_has_neither_bending_nor_motion(tmp_path: Path, monkeypatch: py
         rest = values - share * truth
         assert np.mean(np.abs(rest) < 3 * axial.sigma) > 0.95
         assert abs(np.mean(rest)) < 1e-6
-    assert abs(sides.front.E.value / E - 1) > 0.025
-    assert sides.both.E.value == pytest.approx(E, rel=1e-3)
-    assert sides.both.E.low < E < sides.both.E.high
+    assert abs(sides.figures["front"].E.value / E - 1) > 0.025
+    assert sides.figures["both"].E.value == pytest.approx(E, rel=1e-3)
+    assert sides.figures["both"].E.low < E < sides.figures["both"].E.high
 
 
 @pytest.mark.slow

@@ -16,8 +16,9 @@ import pytest
 
 from acquire.errors import DataError
 from analysis.evaluate import Curve, GaugeValue, TwoSides
+from live.config.sections import SpecimenConfig
 from live.pipeline.run_state import RunState
-from live.results.report.cameras import _strains, _stress_strain, report_of_fields, report_of_sides
+from live.results.report.cameras import _strains, _stress_strain, report_of_cameras
 from live.results.run_folder import open_run
 from live.results.sides import folder as clocks
 from live.results.sides.channels import JointChannels
@@ -112,7 +113,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_report_of_both_sides(folder: Path) -> None:
     with open_run(folder / "front") as front, open_run(folder / "back") as back:
-        made = report_of_sides(front, back, {"front": "front/report.html"})
+        made = report_of_cameras({"front": front, "back": back}, {"front": "front/report.html"})
         sides = SidesOfTest.of_folders(front, back)
         lines = list(sides.figure_lines(stresses=True))
     stress, mean, bending = made.figures
@@ -141,7 +142,7 @@ def test_the_report_of_both_sides(folder: Path) -> None:
 
 def test_the_report_of_two_fields(folder: Path) -> None:
     with open_run(folder / "front") as one, open_run(folder / "back") as other:
-        made = report_of_fields({"first": one, "second": other}, {"second": "second/report.html"})
+        made = report_of_cameras({"first": one, "second": other}, {"second": "second/report.html"})
     (plot,) = made.figures
     assert [(line.label, line.colour) for line in plot.curves] == [("first", 0), ("second", 1)]
     assert [line.y[-1] for line in plot.curves] == pytest.approx(
@@ -177,7 +178,7 @@ def state_of(values: list[tuple[float, float]], **more: Any) -> RunState:
 
 def test_gauges_of_a_running_test_are_put_together() -> None:
     states = {"front": state_of([(1e-3, 1e-3), (2e-3, 5e-3)]), "back": state_of([(1e-3, 1e-3), (1e-3, 3e-3)])}
-    found = newest(states["front"], states["back"])
+    found = newest(states)
     assert found["wide"].mean == pytest.approx(4e-3) and found["wide"].bending == pytest.approx(1e-3)
     # Noise of both, and what one of them may be turned by 0.1 degree.
     assert found["wide"].sigma == pytest.approx(
@@ -203,7 +204,7 @@ def test_a_gauge_named_axial_has_both_names() -> None:
     joint.attach(states, live=True)
     shown = joint.read(START)
     assert shown["mean_axial"] == shown["mean_gauge_axial"] == pytest.approx(7e-3)
-    side = SideOfTest.of_state(states["front"], SimpleNamespace(area_m2=None))  # type: ignore[arg-type]
+    side = SideOfTest.of_state(states["front"], SpecimenConfig())
     assert side.courses["wide"].value.tolist() == pytest.approx([1e-3, 5e-3])
     assert side.courses["wide"].sigma.tolist() == pytest.approx([1e-6, 1e-6])
     assert side.courses["wide"].t.tolist() == pytest.approx([START, START + 0.1])

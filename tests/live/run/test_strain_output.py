@@ -75,11 +75,11 @@ def test_a_value_has_eight_digits() -> None:
     assert line == "0.0012345679,-1234.5678"
 
 
-def test_the_channels_without_a_choice_are_those_of_the_guide() -> None:
-    guide = (Path(__file__).parents[3] / "docs" / "guide.md").read_text(encoding="utf-8")
+def test_the_channels_without_a_choice_are_those_of_the_page() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "control.md").read_text(encoding="utf-8")
     listed = ", ".join(f"`{name}`" for name in DEFAULT_CHANNELS)
     assert "strain_rate" in DEFAULT_CHANNELS
-    assert f"{listed} and all gauges" in " ".join(guide.split())
+    assert f"{listed} and all gauges" in " ".join(page.split())
 
 
 def test_the_strain_rate_is_the_slope_of_the_last_second() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,8 +20,9 @@ from analysis.evaluate import REGION, GaugeSet
 from analysis.quality.specimen import Specimen
 from live.cli import main
 from live.config.gauges import gauges_for
-from live.config.loading import load_config
+from live.config.loading import Config, load_config
 from live.results import Strain
+from live.setup.check.sample import take
 from live.setup.devices import open_rig
 from live.setup.placement import auto_gauges, with_auto_gauges
 from live.setup.region import FirstLook, Region, _mean_and_noise, _within, first_look, located_on, region_of
@@ -126,19 +128,23 @@ def test_warnings_of_the_camera_are_printed(monkeypatch: pytest.MonkeyPatch) -> 
         on_event(Event(0.0, EventKind.LOST, "camera", "opened", "info"))
         return open_rig(address, load, on_event, **how)
 
-    monkeypatch.setattr("live.setup.region.open_rig", troubled)
+    monkeypatch.setattr("live.setup.frames.open_rig", troubled)
     messages: list[str] = []
     first = first_look(load_config(None, {"camera.address": SIM}), messages.append)
     assert messages == ["no picture for 2.0 s; still waiting"]
     assert first.size == (320, 320)
 
 
-def test_a_camera_that_stays_silent_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run waits for it; a first look, which nobody's test hangs on, ends and names what to look at."""
-    monkeypatch.setattr("live.setup.region.SILENCE_S", 0.2)
-    silent = "sim:hole?fps=20&width=320&height=320&hole=40&faults=disconnect@0*600"
-    with pytest.raises(DeviceError, match=r"no whole picture came in 0\.2 s; look at its cable"):
-        first_look(load_config(None, {"camera.address": silent}), [].append)
+@pytest.mark.parametrize("fault", ["disconnect@0*600", "damage@0*600"])
+@pytest.mark.parametrize("look", [lambda config: first_look(config, [].append), take])
+def test_a_camera_without_whole_pictures_is_given_up(
+    monkeypatch: pytest.MonkeyPatch, look: Callable[[Config], object], fault: str
+) -> None:
+    """A run waits for it; a look before a test, which nobody's test hangs on, ends and names what to look at."""
+    monkeypatch.setattr("live.setup.frames.SILENCE_S", 0.3)
+    silent = f"sim:hole?fps=20&width=320&height=320&hole=40&faults={fault}"
+    with pytest.raises(DeviceError, match=r"no whole picture came in 0\.3 s; look at its cable"):
+        look(load_config(None, {"camera.address": silent}))
 
 
 @pytest.mark.parametrize(

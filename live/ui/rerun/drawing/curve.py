@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
 from live.results.maps.colours import nice_above, number, ticks, unit_for
 from live.ui.rerun.drawing.layout import CURVE_WIDTH
 from live.ui.rerun.drawing.shapes import DIM, GREY, ORANGE, polylines, text_labels
 from live.ui.rerun.messages import ViewSetup
+from live.words.language import told
 
 MAX_POINTS = 800
 """Of the curve, thinned; the newest point is always drawn."""
@@ -144,7 +146,8 @@ class CurveDrawing:
         # rerun draws a label below its position: a little higher puts it on the line.
         positions = [*([xk, 1.03] for xk in x), *([-0.13, yk - 0.05] for yk in y)]
         labels = [number(v * across.factor) for v in across.ticks] + [number(v * up.factor) for v in up.ticks]
-        quantity = "stress" if self._setup.area_m2 else "load"
-        names = [f"axial strain ({across.unit})", f"{quantity} ({up.unit})"]
+        load, stress = Message("load ({unit})", up.unit), Message("stress ({unit})", up.unit)
+        upward = stress if self._setup.area_m2 else load
+        names = [told(Message("axial strain ({unit})", across.unit)), told(upward)]
         titles = [[CURVE_WIDTH / 2, 1.15], [0.0, -0.2]]
         self._log_change("curve/ticks", text_labels([*positions, *titles], [*labels, *names]))

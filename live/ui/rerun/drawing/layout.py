@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from acquire.text import Message
 from live.ui.rerun.drawing.large_figures import HEIGHT, WIDTH
 from live.ui.rerun.drawing.shapes import BACKGROUND
 from live.ui.rerun.messages import MAPS, ViewSetup
+from live.words.language import told
 
 BAR_GAP, BAR_WIDTH, BAR_LABEL, BAR_END = 0.03, 0.035, 0.16, 0.275
 """Colour bar, right of the picture: its left edge, width, middle and right end of its labels.
@@ -24,7 +26,8 @@ LETTER = 0.028
 CURVE_WIDTH = 1.6
 """Width of the curve's rectangle; its height is 1."""
 
-_TITLES = {"e1": "e1 (largest)", "e2": "e2 (smallest)"}
+_CAMERA = Message("Camera")
+_TITLES = {"e1": Message("e1 (largest)"), "e2": Message("e2 (smallest)")}
 
 _WIDE = 2.2
 """Pictures wider than so many heights are placed one above the other."""
@@ -58,9 +61,7 @@ def blueprint(setup: ViewSetup) -> Any:
             row_shares=_rows(setup),
         ),
         rrb.TimePanel(
-            state="collapsed",
-            timeline="time",
-            play_state="paused" if setup.finished else "following",
+            state="collapsed", timeline="time", play_state="paused" if setup.finished else "following"
         ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="expanded" if setup.finished else "collapsed"),
@@ -79,7 +80,7 @@ def _large_figures() -> Any:
 
     bounds = rrb.VisualBounds2D(x_range=[0, WIDTH], y_range=[0, HEIGHT])
     return rrb.Spatial2DView(
-        origin="/figures", name="Now", visual_bounds=bounds, background=[*BACKGROUND, 255]
+        origin="/figures", name=told(Message("Now")), visual_bounds=bounds, background=[*BACKGROUND, 255]
     )
 
 
@@ -101,15 +102,13 @@ def _below(setup: ViewSetup) -> Any:
     import rerun.blueprint as rrb
 
     plots = [_strains(setup), *([_load()] if setup.with_load else [])]
-    status = rrb.TextDocumentView(origin="/status", name="Status")
+    status = rrb.TextDocumentView(origin="/status", name=told(Message("Status")))
     shares = [4, 3, 3, 4] if setup.with_load else [6, 3, 4]
     return rrb.Horizontal(*plots, status, _events(), column_shares=shares)
 
 
 def _camera(setup: ViewSetup) -> Any:
-    return _picture_view(
-        setup, "Camera", ["/camera/**", "/zoi/**", "/specimen/zoi/**", "/specimen/gauges/**"]
-    )
+    return _picture_view(setup, _CAMERA, ["/camera/**", "/zoi/**", "/specimen/zoi/**", "/specimen/gauges/**"])
 
 
 def _map(setup: ViewSetup, name: str) -> Any:
@@ -128,19 +127,19 @@ def _picture_view(setup: ViewSetup, name: str, contents: list[str]) -> Any:
 
     w, h = setup.width, setup.height
     margin, unit = 0.02 * max(w, h), bar_unit(setup)
-    if name == "Camera":
+    if name == _CAMERA:
         # Space for a line of text above.
         x_range, y_range = [-margin, w + margin], [-0.1 * unit, h + margin]
     else:
         x_range, y_range = [-margin, w + BAR_END * unit], [-margin, h + margin]
     bounds = rrb.VisualBounds2D(x_range=x_range, y_range=y_range)
     return rrb.Spatial2DView(
-        origin="/", contents=contents, name=name, visual_bounds=bounds, background=[*BACKGROUND, 255]
+        origin="/", contents=contents, name=told(name), visual_bounds=bounds, background=[*BACKGROUND, 255]
     )
 
 
 def _strain() -> Any:
-    return _plot("/strain", "Mean strain ± sigma, µm/m", legend=True)
+    return _plot("/strain", Message("Mean strain ± sigma, µm/m"), legend=True)
 
 
 def _strains(setup: ViewSetup) -> Any:
@@ -149,12 +148,12 @@ def _strains(setup: ViewSetup) -> Any:
 
     if not setup.gauges:
         return _strain()
-    gauges = _plot("/gauges", "Gauges ± sigma, µm/m", legend=True)
+    gauges = _plot("/gauges", Message("Gauges ± sigma, µm/m"), legend=True)
     return rrb.Tabs(gauges, _strain(), active_tab=0)
 
 
 def _load() -> Any:
-    return _plot("/load", "Load, N", legend=False)
+    return _plot("/load", Message("Load, N"), legend=False)
 
 
 def _plot(origin: str, name: str, *, legend: bool) -> Any:
@@ -165,7 +164,7 @@ def _plot(origin: str, name: str, *, legend: bool) -> Any:
     whole = rr.TimeRange(rr.TimeRangeBoundary.infinite(), rr.TimeRangeBoundary.infinite())
     return rrb.TimeSeriesView(
         origin=origin,
-        name=name,
+        name=told(name),
         axis_x=rrb.TimeAxis(view_range=whole),
         plot_legend=rrb.PlotLegend("LeftTop", visible=legend),
     )
@@ -177,14 +176,14 @@ def _events() -> Any:
     # The time column of rerun is too narrow to be read; the text begins with the time instead.
     hidden = rrb.encodings.TimelineColumn("time", visible=False)
     columns = rrb.TextLogColumns(timeline_columns=[hidden], text_log_columns=["LogLevel", "Body"])
-    return rrb.TextLogView(origin="/events", name="Events", columns=columns)
+    return rrb.TextLogView(origin="/events", name=told(Message("Events")), columns=columns)
 
 
 def _curve(setup: ViewSetup) -> Any:
     import rerun.blueprint as rrb
 
-    quantity = "Stress" if setup.area_m2 else "Load"
+    title = Message("Stress – strain") if setup.area_m2 else Message("Load – strain")
     bounds = rrb.VisualBounds2D(x_range=[-0.3, CURVE_WIDTH + 0.17], y_range=[-0.25, 1.3])
     return rrb.Spatial2DView(
-        origin="/curve", name=f"{quantity} – strain", visual_bounds=bounds, background=[*BACKGROUND, 255]
+        origin="/curve", name=told(title), visual_bounds=bounds, background=[*BACKGROUND, 255]
     )

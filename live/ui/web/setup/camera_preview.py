@@ -16,7 +16,7 @@ from acquire.frame import CameraInfo, Frame
 from acquire.system import lower_priority
 from acquire.text.printable import brief, printable
 from live.pipeline.latency import OUTPUT
-from live.setup.devices import at_rest, open_rig
+from live.setup.frames import camera_of
 from live.ui.web.setup.config_draft import ConfigDraft
 
 log = logging.getLogger(__name__)
@@ -170,15 +170,14 @@ class CameraPreview:
         config = self._draft.config.camera
         if not config.address:
             raise DataError("no camera is chosen: choose one under Camera")
-        rig = open_rig(at_rest(config.address), "none:", self._on_event, crop=config.crop)
-        try:
-            self._camera_opened(rig.camera)
-            asked.put(None)
-            with rig.camera:
-                self._drain(rig.camera)
-        finally:
-            self._camera = None
-            rig.close()
+        with camera_of(config.address, self._on_event, crop=config.crop) as camera:
+            try:
+                self._camera_opened(camera)
+                asked.put(None)
+                with camera:
+                    self._drain(camera)
+            finally:
+                self._camera = None
 
     def _camera_opened(self, camera: Camera) -> None:
         with self._lock:

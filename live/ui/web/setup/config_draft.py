@@ -18,6 +18,7 @@ from acquire.text import Message
 from live.config.cameras import camera_configs, other_cameras
 from live.config.gauges import GaugeTable
 from live.config.loading import Config, from_dict, load_config, settings_in
+from live.config.new_files import free_name
 from live.config.rig_file import write_rig
 
 CHANGEABLE = frozenset(
@@ -124,8 +125,8 @@ class ConfigDraft:
     def _write_mask(self, mask: NDArray[np.bool_]) -> Path:
         """Write a new file each time: a rig file kept as .bak refers to the old one."""
         stem = self.path.resolve().with_suffix("")
-        tries = (stem.with_name(f"{stem.name}-mask-{n}.png") for n in range(1, 10_000))
-        path = next(one for one in tries if not one.exists())
+        name = free_name(f"{stem.name}-mask", lambda name: stem.with_name(f"{name}.png").exists())
+        path = stem.with_name(f"{name}.png")
         try:
             write_picture(path, mask.astype(np.uint8) * 255)
         except DataError as error:
@@ -133,25 +134,23 @@ class ConfigDraft:
         return path
 
 
-def second_draft(first: ConfigDraft) -> ConfigDraft | None:
-    """That of a second camera, with a rig file of its own; None where there is one camera.
+def drafts_of(first: ConfigDraft) -> dict[str, ConfigDraft]:
+    """Those of all cameras by name, ``first`` the first; each further one has a rig file of its own.
 
     Raises
     ------
     ConfigError
-        There are more than two; the rig file of the second cannot be read.
+        As of ``camera_configs``.
     """
-    given = other_cameras(first.config)
-    if len(given) > 1:
-        raise ConfigError(
-            "the page sets up one camera beside the first; phasedic run --page takes all of them"
-        )
-    if not given:
-        return None
-    (address,) = given
-    name, own = list(camera_configs(first.config, first.overrides).items())[1]
-    if address.lower().endswith(".toml"):
-        return ConfigDraft(own, Path(address), {})
+    leading, *further = camera_configs(first.config, first.overrides).items()
+    others = zip(further, other_cameras(first.config), strict=True)
+    return {leading[0]: first, **{name: _draft(first, name, own, given) for (name, own), given in others}}
+
+
+def _draft(first: ConfigDraft, name: str, own: Config, given: str) -> ConfigDraft:
+    """That of a further camera, ``given`` by its rig file or its address."""
+    if given.lower().endswith(".toml"):
+        return ConfigDraft(own, Path(given), {})
     values, usual = own.as_dict(), Config().as_dict()
     taken = {
         f"{section}.{key}": value
@@ -160,7 +159,7 @@ def second_draft(first: ConfigDraft) -> ConfigDraft | None:
         if value != usual[section].get(key)
     }
     path = first.path.with_stem(f"{first.path.stem}-{name}")
-    return ConfigDraft(own, path, {"camera.address": address, **taken})
+    return ConfigDraft(own, path, {"camera.address": given, **taken})
 
 
 def next_name(name: str) -> str:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Container, Mapping
-from itertools import count
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from acquire.bounds import NotAllowed, as_number
 from acquire.errors import ConfigError
 from acquire.text import Message
 from analysis.evaluate import GAUGE_KINDS
+from live.config.new_files import free_name
 from live.setup.scale import Board, from_points
 from live.ui.web.setup.drawn_region import are_points
 from live.ui.web.setup.setup_session import OVERLAYS, SetupSession
@@ -147,7 +147,7 @@ def gauge(session: SetupSession, request: Request) -> None:
     if "points" in request:
         kind = request.get("kind", before.get("kind"))
         table = before | {"kind": kind, **_parameters_at(kind, request["points"])}
-        name = name or _free_name(GAUGE_KINDS[kind].default_name, gauges)
+        name = name or free_name(GAUGE_KINDS[kind].default_name, gauges.__contains__, "")
     if not isinstance(name, str) or not isinstance(table, dict | None):
         raise ConfigError("a gauge has a name and a table")
     if table is not None and "colour" in before:
@@ -166,12 +166,6 @@ def _parameters_at(kind: object, points: object) -> dict[str, Any]:
     if not are_points(points, 1, MAX_GAUGE_POINTS):
         raise ConfigError("a gauge has 1 to {MAX_GAUGE_POINTS} points, x and y in px", MAX_GAUGE_POINTS)
     return GAUGE_KINDS[kind].from_handles([(float(x), float(y)) for x, y in points])
-
-
-def _free_name(usual: str, taken: Container[str]) -> str:
-    """The first of axial, axial2 ... that is free."""
-    names = (usual if n == 1 else f"{usual}{n}" for n in count(1))
-    return next(name for name in names if name not in taken)
 
 
 def place(session: SetupSession, request: Request) -> None:

@@ -49,7 +49,7 @@ class SetupSession:
     side : str
         The name of the camera; empty where there is only one.
     first : SetupSession, optional
-        That of the first of two cameras, which has the load cell and the specimen.
+        That of the first camera of several, which has the load cell and the specimen.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class SetupSession:
     def refresh(self) -> None:
         """Send the state to the pages."""
         with self._lock:
-            self._broadcaster.publish("setup" if self._first is None else "second", self.state())
+            self._broadcaster.publish(f"setup {self.side}".strip(), self.state())
 
     @property
     def shared(self) -> ConfigDraft:

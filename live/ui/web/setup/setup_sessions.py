@@ -1,4 +1,4 @@
-"""The set-up of all cameras of a test: one, or two that are checked, saved and started together."""
+"""The set-up of all cameras of a test, which are checked, saved and started together."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
-from live.config.cameras import BACK, names_of
+from live.config.cameras import BACK
 from live.config.loading import Config
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.setup.config_draft import ConfigDraft
@@ -19,9 +19,8 @@ class SetupSessions:
 
     Parameters
     ----------
-    draft : ConfigDraft
-    second : ConfigDraft or None
-        Of a second camera.
+    drafts : mapping of str to ConfigDraft
+        Of each camera by its name, the first one first.
     broadcaster : Broadcaster
     drawn : mapping of str to DrawnRegion
         The regions of the last specimen, by the names of the cameras; "" of a single one.
@@ -33,17 +32,13 @@ class SetupSessions:
     """
 
     def __init__(
-        self,
-        draft: ConfigDraft,
-        second: ConfigDraft | None,
-        broadcaster: Broadcaster,
-        drawn: Mapping[str, DrawnRegion],
+        self, drafts: Mapping[str, ConfigDraft], broadcaster: Broadcaster, drawn: Mapping[str, DrawnRegion]
     ) -> None:
-        name, other = ("", "") if second is None else names_of(draft.config)
+        (name, draft), *others = drafts.items()
         self.first = SetupSession(draft, broadcaster, drawn.get(name), name)
         self.by_name = {name: self.first}
-        if second is not None:
-            self.by_name[other] = SetupSession(second, broadcaster, drawn.get(other), other, self.first)
+        for name, draft in others:
+            self.by_name[name] = SetupSession(draft, broadcaster, drawn.get(name), name, self.first)
         self._open = ExitStack()
 
     def __enter__(self) -> SetupSessions:
@@ -77,12 +72,15 @@ class SetupSessions:
             session.check.begin()
 
     def save(self) -> None:
-        """Write each rig file, that of the second first; raises ConfigError where one cannot be written."""
-        for name, session in reversed(self.by_name.items()):
+        """Write each rig file, that of the first last; raises ConfigError where one cannot be written."""
+        paths = []
+        for session in list(self.by_name.values())[1:]:
             session.region.save()
-            if session is not self.first:
-                key = "camera.back" if name == BACK else "camera.beside"
-                self.first.draft.change_all({key: str(session.draft.path)})
+            paths.append(str(session.draft.path))
+        if paths:
+            further = {"camera.back": paths[0]} if BACK in self.by_name else {"camera.beside": paths}
+            self.first.draft.change_all(further)
+        self.first.region.save()
 
     def ready(self, folder: Path) -> list[Config]:
         """The configuration of each camera for a test; raises DataError or ConfigError where one cannot begin."""

@@ -82,9 +82,10 @@ function showFold(name, list, make, words) {
 
 // The map at the highest force or in the last picture, of the camera that is chosen.
 function showMaps() {
-  const sides = result.second ? [result, result.second] : [result], side = sides[chosen.side] ?? result;
+  const sides = result.cameras ?? [result], side = sides[chosen.side] ?? result;
   choices($("peakside"), sides.length > 1 ? sides.map((one, k) => [k, t(one.side)]) : [], chosen.side, (k) => { chosen.side = k; });
-  const times = [["peak", result.atpeak], ["last", "last picture"]].filter(([name, words]) => side[name] && words);
+  const whole = (side.whole ?? []).map((name) => [name, name]);
+  const times = [["peak", side.atpeak], ["last", "last picture"], ...whole].filter(([name, words]) => side[name] && words);
   if (!side[chosen.time]) chosen.time = "peak";
   choices($("peaktime"), times.length > 1 ? times.map(([name, words]) => [name, t(words)]) : [], chosen.time, (name) => { chosen.time = name; });
   const shown = side[chosen.time], shot = $("peakmap").closest(".shot");
@@ -93,19 +94,29 @@ function showMaps() {
   if (!$("peakmap").src.endsWith(shown.picture)) $("peakmap").src = shown.picture;
   setRatio(shot, shown.width, shown.height);
   drawGauges($("peakgauges"), shown.gauges, shown.width, shown.height);
-  const words = chosen.time === "peak" ? t(side.atpeak) : t("last picture"), at = shown.s == null ? "" : `${time(shown.s)}, `;
+  const words = t(times.find(([name]) => name === chosen.time)[1]), at = whole.some(([name]) => name === chosen.time) || shown.s == null ? "" : `${time(shown.s)}, `;
   put($("peakwords"), `${at}${side.side ? `${t(side.side)}, ` : ""}${words}`);
   showLegend($("peaklegend"), shown);
 }
 
+// A few stand side by side, more in a list.
 function choices(box, list, now, choose) {
+  const isLong = list.length > 3, take = (value) => { choose(value); showMaps(); };
   box.hidden = !list.length;
-  fill(box, list, ([value, words]) => {
+  box.className = isLong ? "box" : "segments";
+  fill(box, isLong ? [list] : list, isLong ? listed : ([value, words]) => {
     const button = el("button", { type: "button", class: "button" }, el("span", { text: words }));
-    button.addEventListener("click", () => { choose(value); showMaps(); });
+    button.addEventListener("click", () => take(value));
     return button;
   });
-  list.forEach(([value], k) => box.children[k].setAttribute("aria-pressed", String(value === now)));
+  if (isLong) box.firstChild.value = now;
+  else list.forEach(([value], k) => box.children[k].setAttribute("aria-pressed", String(value === now)));
+
+  function listed(all) {
+    const select = el("select", { "aria-label": t("Time of the map") }, ...all.map(([value, words]) => el("option", { value, text: words })));
+    select.addEventListener("change", () => take(select.value));
+    return select;
+  }
 }
 
 // The report opens in a window of its own, or the page shows why there is none.

@@ -5,7 +5,7 @@ import { ask, pause } from "./press.js";
 import { isExpert, language, setExpert, setLanguage, t } from "./words.js";
 import { themeChanged } from "./curves.js";
 import { fixed } from "./numbers.js";
-import { beginRun, linkLost, showRun, showSecond } from "./run.js";
+import { beginRun, linkLost, showRun } from "./run.js";
 import { beginSetup, openStep, sectionOf, showSetup } from "./setup.js";
 import { setupKeys } from "./drawing.js";
 import { showAfter } from "./after.js";
@@ -37,7 +37,6 @@ const handlers = {
   },
   setup: (value) => { if (stage.stage === "setup") showSetup(value); },
   run: (value) => { if (stage.stage === "run") showRun(value); },
-  second: (value) => { if (stage.stage === "run") showSecond(value); else if (stage.stage === "setup") showSetup(value, true); },
   after: showAfter,
   beat() {},
   gone() {

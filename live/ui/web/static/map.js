@@ -1,9 +1,9 @@
 // The picture of a running test with its map over it: opacity, colours, range, the value under the pointer.
-import { $, el, post, put } from "./base.js";
+import { $, el, fill, post, put } from "./base.js";
 import { drawGauges, moved, position, showCross, zoomable } from "./draw.js";
 import { numberField } from "./fields.js";
 import { factorOf, setRatio, showLegend, unitOf } from "./legend.js";
-import { fixed, strainText, strainUnit } from "./numbers.js";
+import { fixed, strainText, strainUnit, withSigma } from "./numbers.js";
 import { t } from "./words.js";
 
 const READ_MS = 150, OPACITY = 74;
@@ -18,9 +18,7 @@ export function beginMap(stage) {
   picture = pointed = null;
   reset();
   put($("readout"), "");
-  if (!$("component").children.length) {
-    for (const name of stage.components) $("component").append(el("option", { value: name, t: name }));
-  }
+  fill($("component"), stage.components, (name) => el("option", { value: name, t: name }));
   load({ n: 1 });
 }
 
@@ -96,7 +94,7 @@ async function read(x, y) {
   } catch { return; } // no link: the page says so
   if (!cross && !pointed) return;
   const place = `x ${fixed(x)}, y ${fixed(y)} px`;
-  put($("readout"), found.value == null ? `${place}: ${t(found.status)}` : `${place}: ${picture.strain ? strainText(found.value, found.sigma) : `${fixed(found.value, 4)} ${unitOf(picture)}`}`);
+  put($("readout"), found.value == null ? `${place}: ${t(found.status)}` : `${place}: ${picture.strain ? strainText(found.value, found.sigma) : `${withSigma(found.value, found.sigma, { factor: 1, digits: 4 }).filter(Boolean).join(" ± ")} ${unitOf(picture)}`}`);
 }
 for (const kind of ["pointerdown", "pointermove"]) svg.addEventListener(kind, (event) => { pointed = position(svg, event); read(...pointed); });
 svg.addEventListener("pointerleave", (event) => { if (event.pointerType !== "touch") { pointed = null; put($("readout"), ""); } }); // a touch stays read

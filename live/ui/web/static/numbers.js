@@ -1,6 +1,6 @@
 // Numbers for a person, by the rules of acquire/text/quantity.py; one table of cases holds both. The operator chooses
 // the unit of the strains of a test; what has none is told in the one for its size.
-const DASH = "–", GAP = "\u202f", MINUS = "−", LIVE_DIGITS = 5, MOST_DECIMALS = 6, COMMA = ["de", "fr"];
+const DASH = "–", GAP = "\u202f", MINUS = "−", LIVE_DIGITS = 5, MOST_DECIMALS = 6, WHOLE = 1e15, COMMA = ["de", "fr"];
 // Name, size in SI, magnitude from which on it is taken, decimals of a value without an uncertainty.
 const UNITS = {
   "": [["", 1, 0, 3]],
@@ -29,7 +29,8 @@ export const decimalMark = () => (COMMA.includes(document.documentElement.lang) 
 export function fixed(value, decimals = 0) {
   if (!Number.isFinite(value)) return DASH;
   const size = Math.abs(value), step = 10 ** -decimals;
-  const [whole, part] = (decimals < 0 ? Math.round(size / step) * step : size).toFixed(Math.max(decimals, 0)).split(".");
+  const shown = decimals < 0 ? Math.round(size / step) * step : size;
+  const [whole, part] = (size < WHOLE ? shown.toFixed(Math.max(decimals, 0)) : size.toExponential(3)).split(".");
   const text = whole.replace(/\B(?=(\d{3})+$)/g, GAP) + (part ? decimalMark() + part : "");
   return value < 0 && /[1-9]/.test(text) ? MINUS + text : text;
 }

@@ -4,7 +4,7 @@ import { clearCurves, showAges, updateCurves } from "./curves.js";
 import { key, putIcon } from "./icons.js";
 import { beginMap, showMap } from "./map.js";
 import { chooseStrainUnit, fixed, powered, quantityText, short, strainText, strainUnit, time, unitOf, withSigma } from "./numbers.js";
-import { beginViews, noteFailed, received } from "./views.js";
+import { beginViews, cameras, noteFailed, received } from "./views.js";
 import { nameOfRegion, setAlong, t } from "./words.js";
 
 const WORDS = {
@@ -14,7 +14,7 @@ const WORDS = {
 const DIGITS = 6; // of live figures, a sign, point or space counting half: so many are mostly needed
 const RECORDING = { on: "REC", off: "NOT RECORDING" };
 const LABELLED = { force: "Force", stress: "Stress", axial: "Strain along the load" };
-let state = null, stage = {}, firstEnded = false, secondGoesOn = false, silentS = 0, digits = DIGITS;
+let state = null, stage = {}, goOn = {}, sides = null, silentS = 0, digits = DIGITS;
 
 $("strainunit").value = strainUnit().name;
 $("strainunit").addEventListener("change", (event) => { chooseStrainUnit(event.target.value); event.target.blur(); });
@@ -22,22 +22,27 @@ for (const kind of ["unit", "language"]) addEventListener(kind, () => { if (stat
 
 export function beginRun(value) {
   stage = value;
-  secondGoesOn = false;
+  goOn = {};
   setAlong(value.what?.along);
   regrow();
   clearCurves(value);
   beginMap(value);
-  beginViews("run", (one) => { if (one.picture) showMap(one.picture, one.side); });
-  showRun({ state: "opening", elapsed_s: 0, events: [], troubles: [], figures: {}, gauges: [], recording: null });
+  beginViews("run", value.cameras, (one) => { if (one.picture) showMap(one.picture, one.side); });
+  show({ state: "opening", elapsed_s: 0, events: [], troubles: [], figures: {}, gauges: [], recording: null });
 }
 
+// The curves are of the first camera, the figures of the first one that goes on: without it there is no mean.
 export function showRun(value) {
-  firstEnded = value.state === "ended";
-  if (firstEnded && secondGoesOn) state = value;
-  else show(value);
-  noteFailed(value.sides?.cameras);
-  showMapOf(value, false);
-  if (value.points) updateCurves(value.points);
+  const [first] = cameras(), leads = value.side === first;
+  goOn[value.side] = value.state !== "ended";
+  if (leads) {
+    ({ sides } = value);
+    noteFailed(sides?.cameras);
+    if (value.points) updateCurves(value.points);
+  }
+  if (value.side === (cameras().find((one) => goOn[one]) ?? first)) show(leads ? value : { ...value, sides: sides && { ...sides, strains: [] } });
+  const large = received("run", value);
+  if (large?.picture) showMap(large.picture, large.side);
 }
 
 // Without a link all figures are old, and their ages run on.
@@ -159,7 +164,7 @@ function showGauges(value) {
   });
 }
 
-// Two cameras: mean and bending, the figures so far, and each camera.
+// Several cameras: of sides mean and bending, the figures so far, and each camera.
 function showSides(sides) {
   const rows = [];
   for (const one of sides?.strains ?? []) {
@@ -172,18 +177,6 @@ function showSides(sides) {
   for (const one of sides?.figures ?? []) rows.push([`${one.name}, ${t(one.side)}`, one.text]);
   $("sides").hidden = !rows.length;
   fill($("sides"), rows, ([name, text]) => el("li", {}, el("span", { class: "name", text: name }), el("b", { class: "num", text })));
-}
-
-// The other one of two cameras has its card, and its map where it is chosen; the figures too once the first has ended.
-export function showSecond(value) {
-  secondGoesOn = value.state !== "ended";
-  if (firstEnded && secondGoesOn) show({ ...value, sides: state.sides && { ...state.sides, strains: [] } });
-  showMapOf(value, true);
-}
-
-function showMapOf(value, isSecond) {
-  const shown = received("run", value, isSecond);
-  if (shown?.picture) showMap(shown.picture, shown.side);
 }
 
 // -- the state bar -------------------------------------------------------------------------------------

@@ -64,12 +64,12 @@ export function beginSetup(stage) {
   shownPicture = edition = -1;
   beginDrawing(stage);
   for (const button of $("kinds").children) { button.classList.add("button"); button.prepend(icon(ICONS[button.dataset.tool] ?? "gauge")); }
-  beginViews("setup", (value) => { busy = false; shownPicture = edition = -1; forgetDrawing(); showSetup(value); });
+  beginViews("setup", stage.cameras, (value) => { busy = false; shownPicture = edition = -1; forgetDrawing(); showSetup(value); });
 }
 
-export function showSetup(state, isSecond) {
-  const value = received("setup", state, isSecond), both = all("setup");
-  showStart(both.length ? both : [state]);
+export function showSetup(state) {
+  const value = received("setup", state), every = all("setup");
+  showStart(every.length ? every : [state]);
   if (!value) return;
   put($("trouble"), t(value.trouble || value.doubt));
   put($("busy"), t(value.busy));

@@ -1,10 +1,13 @@
-// Two cameras: a card for each, with its picture and what it does. The chosen one is shown large.
-import { $, el, put } from "./base.js";
+// Several cameras: a card for each, with its picture and what it does. The chosen one is shown large.
+import { $, el, fill, put } from "./base.js";
 import { fixed, strainText } from "./numbers.js";
 import { t } from "./words.js";
 
 const latest = { setup: {}, run: {} }, failed = new Set();
-let redraw = () => {};
+let redraw = () => {}, names = [""];
+
+// Their names, the first one first.
+export const cameras = () => names;
 
 export const chosen = () => document.body.dataset.side ?? "";
 
@@ -13,25 +16,26 @@ export function noteFailed(cameras) {
   for (const one of cameras ?? []) if (one.failed) failed.add(one.side);
 }
 
-// Keeps what came of one camera, the first one first; the one to be shown large, or null where that is another.
-export function received(stage, value, isSecond) {
+// Keeps what came of one camera; the one to be shown large, or null where that is another.
+export function received(stage, value) {
   if (!value.side) { showCards(stage); return value; }
-  if (isSecond && !all(stage).length) return null;
+  if (!names.includes(value.side)) return null; // of a test before
   latest[stage][value.side] = value;
-  if (!(chosen() in latest[stage])) document.body.dataset.side = value.side;
+  if (!names.includes(chosen())) [document.body.dataset.side] = names;
   showCards(stage);
   return value.side === chosen() ? value : null;
 }
 
-export function beginViews(stage, again) {
-  redraw = again;
+export function beginViews(stage, every = [""], again) {
+  [redraw, names] = [again, every];
   latest[stage] = {};
   failed.clear();
-  $(`${stage}views`).replaceChildren();
-  if (stage === "run") delete document.body.dataset.side;
+  fill($(`${stage}views`), [], card);
+  if (stage === "run" || !names.includes(chosen())) delete document.body.dataset.side;
+  showCards(stage);
 }
 
-export const all = (stage) => Object.values(latest[stage]);
+export const all = (stage) => names.filter((one) => one in latest[stage]).map((one) => latest[stage][one]);
 
 function choose(stage, side) {
   document.body.dataset.side = side;
@@ -40,12 +44,11 @@ function choose(stage, side) {
 }
 
 function showCards(stage) {
-  const box = $(`${stage}views`), known = latest[stage];
-  box.hidden = Object.keys(known).length < 2;
-  document.body.classList.toggle("two", !box.hidden);
+  const box = $(`${stage}views`), known = all(stage);
+  box.hidden = known.length < 2;
   if (box.hidden) return;
-  for (const side of Object.keys(known)) if (!box.querySelector(`[data-view="${side}"]`)) box.append(card(stage, side));
-  for (const button of box.querySelectorAll("[data-view]")) showCard(button, stage, known[button.dataset.view]);
+  fill(box, known.map((one) => one.side), (side) => card(stage, side));
+  known.forEach((one, i) => showCard(box.children[i], stage, one));
 }
 
 function card(stage, side) {

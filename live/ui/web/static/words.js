@@ -30,6 +30,9 @@ const WORDS = {
   eyy: "Strain along the load", exx: "Strain across the load", exy: "Shear strain",
   e1: "Largest principal strain", e2: "Smallest principal strain", u: "Displacement to the right", v: "Displacement downwards",
   sigma: "Uncertainty of a point", residual: "Misfit of a point", status: "State of the points",
+  amplification: "Amplification of the strain", compliance: "Strain over stress", rate: "Strain rate of the whole test",
+  chi2: "Misfit of the line", leaves_at_stress: "Line ends at this stress",
+  leaves_at_strain: "Line ends at this strain",
 };
 export const isExpert = () => localStorage.getItem("expert") === "1";
 

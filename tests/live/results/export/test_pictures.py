@@ -13,8 +13,8 @@ import pytest
 from acquire.errors import ConfigError, DataError
 from analysis.field.strain_field import StrainField
 from live.cli import main
+from live.config.new_files import new_file
 from live.results.export import films
-from live.results.export.atomic_file import new_file
 from live.results.export.formats import FORMATS, ExportRequest, export
 from live.results.export.job import ExportJob, ExportOptions, chosen_rows
 from live.results.maps.painting import Levels, Painter

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from acquire.errors import DataError
+from acquire.text import Message
 from analysis.evaluate import Figure, GaugeValue
 from live.cli import main
 from live.config.loading import load_config
@@ -136,6 +137,19 @@ def test_the_report_of_a_run_that_was_killed_writes_it(tmp_path: Path) -> None:
     before = (folder / FILE).read_bytes()
     assert main(["report", str(folder)]) == 0
     assert (folder / FILE).read_bytes() == before
+
+
+def test_what_a_replay_said_beside_the_figures_stands_in_its_report(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = make_run(tmp_path / "run", PULLED, session=False)
+    remarks = (Message("joined of {chunks} chunks", 3), "forces.csv: <two> columns")
+    FiguresFile.of(made_test(), {}, 0, remarks=remarks).write(folder)
+    monkeypatch.setenv("LC_ALL", "de_DE.UTF-8")
+    assert main(["report", str(folder)]) == 0
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "<p>aus 3 Stücken zusammengefügt</p>" in page
+    assert "<p>forces.csv: &lt;two&gt; columns</p>" in page
 
 
 def test_a_report_without_a_recording_has_the_lag_that_the_replay_found(tmp_path: Path) -> None:

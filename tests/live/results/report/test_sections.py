@@ -208,7 +208,7 @@ def test_the_reporting_table_has_what_was_measured_with(run: RunFolder) -> None:
     found = plain(reporting_table(PracticeValues(run, None, None, {}, None)))
     for words in (
         "|Subset shape function|quadratic (12 parameters)|", "|Subset size (ZOI)|32 px, uniform weight|",
-        "|Step size|16 px|", "spectrum; dark and flat frame|", "|Frames averaged|8; reference 8|",
+        "|Step size|16 px|", "spectrum; dark frame; flat frame|", "|Frames averaged|8; reference 8|",
         "|Virtual strain gauge size|32 px, one ZOI|", "|Strain formulation|small|", "|Field of view|30 mm|",
         "|Exposure time|8 ms|", "|Image resolution|not recorded|", "|DIC software|phasedic 0.1.0, phase-DIC|",
         "|Camera|not recorded (phasedic run --meta camera=...)|", "|Strain noise floor|not recorded|",

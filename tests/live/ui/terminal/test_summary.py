@@ -11,11 +11,14 @@ from pathlib import Path
 
 import pytest
 
+from acquire.events import EventKind
 from acquire.load_sample import LoadSample
 from live.config.sections import SpecimenConfig
+from live.pipeline.consumer import ConsumerReport
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
+from live.results.finished.answers import MeasuredAgain, missing_lines
 from live.results.summary import summary_lines
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.terminal.summary import brief_lines, print_summary, trouble_lines
@@ -141,6 +144,43 @@ def test_the_end_is_that_of_the_last_burst() -> None:
     back = without_values(whole, 1, 2)
     found_again = brief_lines(back, finished(back))
     assert in_ascii(found_again[1]).startswith("strain along y at the end: 3000.0 +- ")
+
+
+def all_wrong() -> RunState:
+    """A film that is pressed, with wrong signs, lost frames and bursts, dead outputs; torn at the end."""
+    specimen = SpecimenConfig(film_error_percent=10.0)
+    state = without_values(run_of([-e for e in PULLED[:60]], SpecimenConfig(axis="y")), 58, 59)
+    whole = RunState.new(0.5, specimen=specimen)
+    for step in state.history.time_steps:
+        whole.add(replace(step, exx=2 * step.exx, exy=step.eyy / 3))
+    for k, step in enumerate(state.history.time_steps):
+        force = abs(force_of(step.eyy)) if k < 50 else math.nan
+        whole.loads.append(LoadSample(step.t + 0.35, force))
+    whole.loads.close()
+    whole.frame_counts.add(grabbed=600, recorded=470, measured=300, skipped=90, lost=30)
+    for k in range(3):
+        whole.event_log.emit(EventKind.DEVICE, "camera", f"frame {k} is damaged", "warning")
+        whole.event_log.emit(EventKind.ALARM, "alarm", f"alarm {k} is on", "error")
+    return whole
+
+
+def test_where_everything_goes_wrong_a_dozen_lines_say_the_most_and_count_the_rest(tmp_path: Path) -> None:
+    state, screen = all_wrong(), Said()
+    reports = [ConsumerReport(f"output {k}", failed="a full disk") for k in range(4)]
+    (tmp_path / "session.h5").write_bytes(b"x")
+    test, troubles = finished(state, reference_N=500.0), [*trouble_lines(state, reports)]
+    print_summary(screen, state, test, tmp_path, troubles)
+    again = MeasuredAgain.of(tmp_path, 5.0, 90)
+    every = [*brief_lines(state, test), *missing_lines(test, again), *troubles]
+    looks = [line for line in every if line.startswith("look: ")]
+    assert len(every) >= 16 and len(looks) == 3
+    assert len(screen.lines) == 12
+    assert screen.lines[-2] == f"{len(every) - 9} more remarks: report.html"
+    shown = screen.lines[1:-2]
+    assert len(shown) == 9 and [line for line in every if line in shown] == shown
+    assert {*every[:2], *looks, troubles[0]} <= {*shown}
+    assert any(line.startswith("E is not known: ") for line in shown)
+    assert not any(line.startswith(("noise: ", "  output")) for line in shown)
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

@@ -13,9 +13,8 @@ import cv2
 import numpy as np
 import pytest
 
-from acquire.errors import DataError, DeviceError
+from acquire.errors import EXIT_INTERRUPTED, LOSS, DataError, DeviceError
 from live.commands import page as page_command
-from live.commands.exit_codes import EXIT_INTERRUPTED, LOSS
 from live.commands.run import finish
 from live.config.loading import load_config
 from live.pipeline.screen import Screen
@@ -275,8 +274,8 @@ def test_two_cameras_are_put_together_at_the_end(
         assert not named["with_report"], "there is one report, of all cameras"
         screen.print("a summary")
 
-    monkeypatch.setattr("live.commands.run.put_together", put)
-    monkeypatch.setattr("live.commands.run.print_summary", summary)
+    monkeypatch.setattr("live.commands.finishing.put_together", put)
+    monkeypatch.setattr("live.commands.finishing.print_summary", summary)
     monkeypatch.setattr("live.commands.run.trouble_lines", lambda *_, **named: [])
     monkeypatch.setattr(
         "live.commands.report.write_report", lambda folder, screen: screen.print(f"report {folder}")

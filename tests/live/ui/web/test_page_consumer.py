@@ -273,6 +273,25 @@ def test_a_map_that_is_chosen_while_another_is_drawn_is_the_next_one(config: Con
     assert view.layers(m)[2]["of"] == "status"
 
 
+def test_a_map_of_the_whole_test_has_its_value_with_sigma_and_unit() -> None:
+    """And nothing before there is one."""
+    config, m = load_config(None, {"specimen.area_mm2": 40.0, "output.response": "stress"}), measurement()
+    view, grid = MapView(config), m.field.grid
+    assert "compliance" in MapView(load_config(None, {})).choose("compliance", "automatic", None)
+    assert view.choose("compliance", "automatic", None) == ""
+    x, y = (float(c[2]) + moved for c, moved in ((grid.x, m.time_step.u), (grid.y, m.time_step.v)))
+    assert view.layers(m)[2]["of"] == "compliance" and view.value_at(x, y)["value"] is None
+    of_place = 14e-12 + 1e-13 * np.indices(grid.shape)[1]
+    view.response = lambda: {"compliance": of_place, "sigma_compliance": np.full(grid.shape, 2.5e-13)}
+    shown = view.layers(m)[2]
+    assert (shown["unit"], shown["strain"]) == ("µm/m/MPa", False) and sum(shown["histogram"]) == grid.shape[
+        0
+    ] * grid.shape[1]
+    assert 13 < shown["low"] <= 14 and 14.6 <= shown["high"] < 16
+    read = view.value_at(x, y)
+    assert (read["value"], read["sigma"]) == (pytest.approx(14.2), pytest.approx(0.25))
+
+
 def test_a_recording_shows_figures_of_one_instant(config: Config) -> None:
     """Its load samples come far ahead of its pictures: the newest force is of another instant."""
     broadcaster, run = Broadcaster(), Run(config)

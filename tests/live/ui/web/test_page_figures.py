@@ -74,7 +74,9 @@ def check_machine(page: Page) -> None:
     assert "matters" in page.page.get_attribute("#strip > span:has-text('lost')", "class")
     assert page.page.locator("#strip .matters").count() == 1, "quiet until it counts"
     shown = page.page.inner_text("#strip")
-    assert "44 ms" in shown and "16 h" in shown
+    assert "44 ms" in shown and "16 h" in shown and "cycle" not in shown
+    show_run(page, cycle=1234.0)
+    assert page.page.inner_text("#strip > span:has-text('cycle')") == "1\u202f234 cycle"
 
 
 def read_out(page: Page, curve: str) -> list[str]:
@@ -120,6 +122,50 @@ def check_maps(page: Page) -> None:
             assert [float(bars.nth(k).get_attribute("height")) for k in (0, 23)] == [0, 10]
 
 
+def check_maps_of_the_whole_test(page: Page) -> None:
+    names = ["compliance", "leaves_at_stress"]
+    slope, leaves = (
+        MAP | {"picture": f"/picture?after=1&layer={name}", "s": 85.0, "of": name, "strain": False, **more}
+        for name, more in zip(
+            names,
+            ({"unit": "µm/m/MPa", "low": 13.9, "high": 14.7}, {"unit": "MPa", "low": 110.0, "high": 140.0}),
+            strict=True,
+        )
+    )
+    stage = STAGE | {"components": ["eyy", *names]}
+    show_run(page, stage, picture=slope | {"of": "compliance"})
+    assert page.page.locator("#component option").count() == 3
+    assert page.page.input_value("#component") == "compliance"
+    page.page.route(
+        "**/value?*", lambda route: route.fulfill(json={"value": 14.2, "sigma": 0.25, "status": ""})
+    )
+    page.page.hover("#gaugemap")
+    page.until(lambda: "14.2 ± 0.3 µm/m/MPa" in page.text("readout"), "the value with its sigma")
+    show_after(
+        page,
+        last=MAP | {"picture": "/picture?after=1", "s": 88.0},
+        whole=names,
+        compliance=slope,
+        leaves_at_stress=leaves,
+    )
+    listed = page.page.locator("#peaktime select")
+    assert listed.locator("option").count() == 4
+    for name, title, ends in (
+        ("compliance", "Strain over stress, µm/m/MPa", (13.9, 14.7)),
+        ("leaves_at_stress", "Line ends at this stress, MPa", (110.0, 140.0)),
+    ):
+        listed.select_option(name)
+        assert page.page.text_content("#peaklegend .title") == title
+        low, _, high = marks(page, "peaklegend")
+        assert near(low, ends[0]) and near(high, ends[1])
+        assert page.page.get_attribute("#peakmap", "src").endswith(f"layer={name}")
+        assert page.text("peakwords") == title.split(", ")[0], "of no instant"
+    listed.select_option("peak")
+    assert "01:25" in page.text("peakwords")
+    unit_of_strains(page, "%")
+    assert near(marks(page, "peaklegend")[0], 18.5)
+
+
 def check_setup(page: Page) -> None:
     show_setup(page)
     assert near(number(page.text("setupforce")), -12.3) and quantity(page.text("forcenoise")[2:]) == 0.5
@@ -153,7 +199,9 @@ def check_after(page: Page) -> None:
     assert near(number(strain) * 1e-2, 19.988e-2) and near(quantity(stress), 267.84e6)
 
 
-CHECKS = [check_tiles, check_machine, check_curves, check_maps, check_setup, check_after]
+CHECKS = [
+    check_tiles, check_machine, check_curves, check_maps, check_maps_of_the_whole_test, check_setup, check_after,
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("check", CHECKS)
@@ -173,6 +221,9 @@ FAULTS = {
     "VSG in mm multiplied": ("check.js", r"one\.vsg / mm", "one.vsg * mm", check_setup),
     "the uncertainty of the scale": (
         "drawing.js", r"s\.sigma \* s\.px_per_mm", "s.sigma / s.px_per_mm", check_setup,
+    ),
+    "the uncertainty of a slope": (
+        "map.js", r"withSigma\(found\.value, found\.sigma", "withSigma(found.value, 0", check_maps_of_the_whole_test,
     ),
     "the label of another fact": ("run.js", r"firstChild, text", "firstChild, shown[0][1]", check_machine),
     "force ten times too large": ("numbers.js", r'\["N", 1,', '["N", 0.1,', check_tiles),
@@ -290,11 +341,59 @@ def test_figures_in_other_languages(browser: Any, locale: str, wanted: str) -> N
         assert page.page.evaluate("() => [...untranslated]") == []
 
 
+def test_three_cameras_in_a_test(browser: Any) -> None:
+    """A card of each, the map of the chosen one, and the figures of the first that goes on."""
+    names = ["first", "second", "third"]
+    sides = {"strains": [], "figures": [{"side": "third", "name": "E", "text": "70.0 GPa"}], "cameras": [
+        {"side": side, "failed": False, "valid": 900 + k, "zois": 1000, "skipped": 4, "lost": k}
+        for k, side in enumerate(names)]}  # fmt: skip
+
+    def measured(k: int, **more: Any) -> dict[str, Any]:
+        axial = figure((k + 1) * 1e-3, 2e-6)
+        figures = {"force": figure(8035.3, 0.9), "stress": figure(267.84e6, 3e4), "axial": axial}
+        axial = {"name": "eyy", "value": (k + 1) * 1e-3, "sigma": 2e-6, "assumed": ""}
+        return run_state(side=names[k], figures=figures, axial=axial, valid=900 + k, zois=1000, **more)
+
+    with opened(browser) as page:
+        unit_of_strains(page, "µm/m")
+        show(page, "run", "beginRun", STAGE | {"cameras": names})
+        for k in (2, 0, 1):
+            more = {"picture": MAP | {"low": 0.1 * (k + 1), "high": 0.1 * (k + 2), "n": 5 + k}}
+            show(page, "run", "showRun", measured(k, sides=sides if k == 0 else None, **more))
+        cards = page.page.locator("#runviews [data-view]")
+        found = [text.partition("±")[0].split("\n") for text in cards.all_inner_texts()]
+        assert [name for name, _ in found] == names
+        assert [number(value) for _, value in found] == [1000, 2000, 3000]
+        assert page.page.locator("#runviews [aria-pressed=true]").get_attribute("data-view") == "first"
+        assert tile(page, "axial") == pytest.approx(1e-3) and "first" in page.text("axialof")
+        unit_of_strains(page, "%")
+        assert marks(page, "maplegend")[0] == pytest.approx(10.0)
+        page.page.click("#runviews [data-view=third]")
+        assert marks(page, "maplegend")[0] == pytest.approx(30.0)
+        assert "side=third" in page.page.get_attribute("#map", "src")
+        rows = page.page.locator("#sides li").all_text_contents()
+        assert [number(row.split("lost")[1]) for row in rows[:3]] == [0, 1, 2] and "E, third70.0 GPa" in rows
+        show(page, "run", "showRun", measured(0, sides=sides) | {"state": "ended"})
+        show(page, "run", "showRun", measured(2))
+        assert "first" in page.text("axialof"), "the second has not said yet that it goes on"
+        show(page, "run", "showRun", measured(1))
+        assert tile(page, "axial") == pytest.approx(2e-3) and "second" in page.text("axialof")
+        show(page, "run", "showRun", measured(1) | {"state": "ended"})
+        show(page, "run", "showRun", measured(2))
+        assert tile(page, "axial") == pytest.approx(3e-3) and "third" in page.text("axialof")
+        show(page, "run", "beginRun", STAGE | {"cameras": ["front", "back"]})
+        show(page, "run", "showRun", measured(2))
+        assert cards.count() == 0, "a camera of the test before"
+
+
 def test_two_cameras_after_a_test(browser: Any) -> None:
     peak = MAP | {"picture": "/picture?side=back&after=1", "low": 0.1, "s": 85.0}
-    second = {"side": "back", "atpeak": "at the highest force", "peak": peak}
+    sides = [
+        {"side": side, "atpeak": "at the highest force", "peak": one}
+        for side, one in (("front", MAP), ("back", peak))
+    ]
     with opened(browser) as page:
-        show_after(page, side="front", second=second)
+        show_after(page, cameras=sides)
         unit_of_strains(page, "%")
         assert marks(page, "peaklegend")[0] == pytest.approx(18.5)
         page.page.click("#peakside button:nth-child(2)")

@@ -185,19 +185,18 @@ def test_the_map_after_the_test(forces: tuple[float, float], strain: float, word
     assert found["peak"]["picture"] == "/picture?side=front&after=1"
 
 
-def test_the_map_of_one_camera_or_of_two() -> None:
+def test_the_map_of_one_camera_or_of_several() -> None:
     config = load_config(None, {})
-    sides = {name: PageConsumer(Broadcaster(), config, side=name) for name in ("front", "back")}
+    sides = {name: PageConsumer(Broadcaster(), config, side=name) for name in ("first", "second", "third")}
     for name, consumer in sides.items():
         consumer.matched(pictured(gauges={f"of {name}": GaugeValue(1e-3, 1e-6)}))
-    assert peaks({}) == {} and "second" not in peaks({"": sides["front"]})
+    assert peaks({}) == {} and "cameras" not in peaks({"": sides["first"]})
     found = peaks(sides)
     assert [(one["name"], one["side"]) for one in found["gauges"]] == [
-        ("of front", "front"),
-        ("of back", "back"),
-    ]
-    assert (found["side"], found["second"]["side"]) == ("front", "back")
-    assert "side=back" in found["second"]["peak"]["picture"]
+        ("of first", "first"), ("of second", "second"), ("of third", "third"),
+    ]  # fmt: skip
+    assert [one["side"] for one in found["cameras"]] == ["first", "second", "third"]
+    assert [f"side={one['side']}&" in one["peak"]["picture"] for one in found["cameras"]] == [True] * 3
 
 
 def test_the_map_moves_with_the_specimen() -> None:

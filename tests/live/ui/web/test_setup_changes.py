@@ -20,7 +20,7 @@ from live.config.loading import load_config
 from live.setup.pictures import read_mask
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.map_view import gauge_shapes
-from live.ui.web.setup.config_draft import second_draft
+from live.ui.web.setup.config_draft import drafts_of
 from live.ui.web.setup.draft_changes import CHANGES
 from live.ui.web.setup.drawn_region import DrawnRegion
 from live.ui.web.setup.setup_session import SetupSession
@@ -36,15 +36,15 @@ INFO = CameraInfo("sim:", "sim", 256, 192, 12, True, "host")
 
 
 def test_a_second_camera_has_a_draft_of_its_own(tmp_path: Path) -> None:
-    assert second_draft(draft_of(tmp_path)) is None
+    assert list(drafts_of(draft_of(tmp_path))) == [""]
     text = '[camera]\naddress = "sim:a"\nback = "sim:b"\n[measure]\nzoi = 40\n[specimen]\nwidth_mm = 9.0\n'
-    found = second_draft(draft_of(tmp_path, text))
-    assert found is not None and found.path == tmp_path / "rig-back.toml"
+    first, found = drafts_of(draft_of(tmp_path, text)).values()
+    assert first.path == tmp_path / "rig.toml" and found.path == tmp_path / "rig-back.toml"
     assert found.config.camera.address == "sim:b" and found.config.measure.zoi == 40
     assert found.changes == {"camera.address": "sim:b", "measure.zoi": 40}
     (tmp_path / "b.toml").write_text('[camera]\naddress = "sim:c"\n[measure]\nzoi = 48\n')
-    found = second_draft(draft_of(tmp_path, text.replace("sim:b", f"{tmp_path}/b.toml")))
-    assert found is not None and found.path == tmp_path / "b.toml" and found.changes == {}
+    found = drafts_of(draft_of(tmp_path, text.replace("sim:b", f"{tmp_path}/b.toml")))["back"]
+    assert found.path == tmp_path / "b.toml" and found.changes == {}
     assert (found.config.camera.address, found.config.measure.zoi) == ("sim:c", 48)
 
 
@@ -52,7 +52,7 @@ def test_a_second_camera_has_a_draft_of_its_own(tmp_path: Path) -> None:
 def both(tmp_path: Path) -> Iterator[SetupSessions]:
     text = '[camera]\naddress = "sim:a"\nback = "sim:b"\n'
     draft = draft_of(tmp_path, text)
-    sessions = SetupSessions(draft, second_draft(draft), Broadcaster(), {})
+    sessions = SetupSessions(drafts_of(draft), Broadcaster(), {})
     yield sessions
     for session in sessions.by_name.values():
         session._folder.cleanup()
@@ -85,6 +85,22 @@ def test_all_cameras_are_checked(both: SetupSessions, monkeypatch: pytest.Monkey
         monkeypatch.setattr(session.check, "begin", lambda name=name: begun.append(name))
     both.check()
     assert begun == ["front", "back"]
+
+
+def test_the_rig_file_of_the_first_names_those_of_all_others(tmp_path: Path) -> None:
+    draft = draft_of(tmp_path, '[camera]\naddress = "sim:a"\nbeside = ["sim:b", "sim:c"]\n')
+    sessions = SetupSessions(drafts_of(draft), Broadcaster(), {})
+    for session in sessions.by_name.values():
+        session._folder.cleanup()
+    CHANGES["set"](sessions.of("third"), {"key": "measure.zoi", "value": 48})
+    sessions.save()
+    own = tmp_path / "rig-second.toml", tmp_path / "rig-third.toml"
+    assert load_config(tmp_path / "rig.toml", {}).camera.beside == tuple(map(str, own))
+    second, third = (load_config(path, {}) for path in own)
+    assert (second.camera.address, second.measure.zoi) == ("sim:b", 64)
+    assert (third.camera.address, third.measure.zoi) == ("sim:c", 48)
+    again = drafts_of(draft_of(tmp_path, (tmp_path / "rig.toml").read_text()))
+    assert [one.path for one in again.values()] == [draft.path, *own]
 
 
 def test_another_load_cell_has_no_zero_yet(both: SetupSessions) -> None:

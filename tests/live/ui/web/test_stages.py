@@ -399,6 +399,38 @@ def test_the_front_fails_and_the_back_goes_on(browser: Any, tmp_path: Path) -> N
         program.kill()
 
 
+def test_three_cameras_from_the_set_up_to_the_maps(browser: Any, tmp_path: Path) -> None:
+    camera, names = CAMERA.format(seconds=60), ["first", "second", "third"]
+    others = [word for seed in (3, 5) for word in ("--beside", f"{camera}&seed={seed}")]
+    program = Program(tmp_path, "page", "--camera", camera, *others, "--load", "sim:", *OPTIONS)
+    try:
+        page = another(browser, program.address)
+        page.until(lambda: page.page.locator("#setupviews [data-view]").count() == 3, "a card of each")
+        page.page.click("#setupviews [data-view=third]")
+        page.until(lambda: "rig-third.toml" in page.text("file"), "the third is set up")
+        picture, card = (page.page.locator(one).bounding_box() for one in ("#frame", "#setupviews"))
+        assert picture["y"] + picture["height"] <= card["y"], "the cards are below the picture"
+        started(page)
+        for name in names:
+            page.until(
+                lambda name=name: bool(page.page.locator(f"#runviews img[src*='side={name}']").count()), name
+            )
+        page.page.click("#runviews [data-view=third]")
+        page.until(lambda: "side=third" in (page.page.get_attribute("#map", "src") or ""), "the third map")
+        page.until(lambda: page.page.locator("#sides li").count() >= 3, "what each does")
+        page.until(lambda: "Rm, third" in page.text("sides"), "a figure of the third")
+        page.press("q")
+        page.confirm()
+        page.until(lambda: page.stage() == "after", "the result")
+        page.page.click("#peakside button:nth-child(3)")
+        page.until(lambda: "side=third" in page.page.get_attribute("#peakmap", "src"), "the third map")
+        assert not page.errors and page.page.evaluate("() => [...untranslated]") == []
+    finally:
+        program.kill()
+    assert {path.parent.name for path in tmp_path.glob("runs/*/*/strain.h5")} == {*names}
+    assert "Traceback" not in (tmp_path / "err.txt").read_text()
+
+
 def test_front_and_back_of_a_test_with_two_cameras(browser: Any, tmp_path: Path) -> None:
     camera = f"{CAMERA.format(seconds=60)}&bending=5&stand_off_mm=500&settle_mm=0.1"
     cameras = ["--camera", camera, "--back", f"{camera}&side=back&seed=3"]

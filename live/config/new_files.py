@@ -1,13 +1,21 @@
-"""Files and folders that appear complete or not at all, and never replace others."""
+"""Files and folders that appear complete or not at all; names that are free."""
 
 from __future__ import annotations
 
 import contextlib
+import itertools
+import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from acquire.errors import ConfigError, DataError
+
+
+def free_name(wanted: str, is_taken: Callable[[str], bool], mark: str = "-") -> str:
+    """``wanted``, or where it is taken the first of ``wanted-2``, ``wanted-3`` ... that is not."""
+    names = itertools.chain([wanted], (f"{wanted}{mark}{n}" for n in itertools.count(2)))
+    return next(name for name in names if not is_taken(name))
 
 
 def check_free(*paths: Path) -> None:
@@ -41,19 +49,28 @@ def new_folder(path: Path) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def _atomic(path: Path) -> Iterator[Path]:
-    # The suffix decides the format of a film, so it must stay the last.
-    part = path.with_name(f"{path.stem}.part{path.suffix}")
-    check_free(path, part)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+def replaced_file(path: Path) -> Iterator[Path]:
+    """The same for a file that may be there, and is replaced; several processes may do so at once."""
+    with _atomic(path, f".{os.getpid()}", replaces=True) as part:
         yield part
-        check_free(path)
-        part.rename(path)
+
+
+@contextlib.contextmanager
+def _atomic(path: Path, mark: str = "", *, replaces: bool = False) -> Iterator[Path]:
+    # The suffix decides the format of a film, so it must stay the last.
+    part = path.with_name(f"{path.stem}{mark}.part{path.suffix}")
+    given = () if replaces else (path,)
+    check_free(*given, part)
+    try:
+        if not replaces:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        yield part
+        check_free(*given)
+        (part.replace if replaces else part.rename)(path)
     except OSError as error:
         _remove(part)
         raise DataError(
-            "{path}: cannot be written ({why}); make room or choose another --out",
+            "{path}: cannot be written ({why}); make room or choose another place",
             path,
             error.strerror or error,
         ) from error

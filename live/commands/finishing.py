@@ -1,0 +1,71 @@
+"""The end of a test, measured live or replayed: summaries, front and back put together, report, exit code."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+from acquire.errors import EXIT_WORDS, LOSS, PhasedicError
+from acquire.text import Message
+from live.commands.sides import TABLE, put_together
+from live.config.cameras import BACK, FRONT
+from live.config.loading import Config
+from live.pipeline.run_state import RunState
+from live.pipeline.screen import Screen
+from live.results.finished.finished_test import FinishedTest
+from live.ui.terminal.cameras_screen import CamerasScreen
+from live.ui.terminal.summary import print_summary
+
+
+class EndedCamera(Protocol):
+    """What is printed of a camera: of its run or of its replay."""
+
+    @property
+    def run_state(self) -> RunState: ...
+
+    @property
+    def test(self) -> FinishedTest: ...
+
+    @property
+    def folder(self) -> Path: ...
+
+    @property
+    def config(self) -> Config: ...
+
+
+def finish_test(
+    cameras: Mapping[str, EndedCamera],
+    lines: Mapping[str, Sequence[str]],
+    folder: Path,
+    code: int,
+    screen: Screen,
+    *,
+    verbose: bool = False,
+) -> int:
+    """Print the summary of each camera with its ``lines``, and what is of all; the exit code, which was ``code``.
+
+    A report is made where that is configured: one, of all cameras.
+    """
+    every, several = CamerasScreen(screen), len(cameras) > 1
+    report = next(iter(cameras.values())).config.output.report
+    for name, one in cameras.items():
+        own, alone = every.of(name), report and not several
+        print_summary(
+            own, one.run_state, one.test, one.folder, lines[name], verbose=verbose, with_report=alone
+        )
+    if several:
+        screen.print()
+    if FRONT in cameras:
+        try:
+            put_together(folder / FRONT, folder / BACK, folder / TABLE, screen)
+        except PhasedicError as error:
+            screen.print(Message("warning: front and back were not put together: {why}", error))
+            code = code or LOSS
+    if report:
+        from live.commands.report import write_report
+
+        write_report(folder, screen)
+    if code in EXIT_WORDS:
+        screen.print(Message("exit code {code}: {words}", code, EXIT_WORDS[code]))
+    return code
