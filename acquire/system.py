@@ -13,6 +13,7 @@ import select
 import signal
 import socket
 import stat
+import struct
 import subprocess
 import sys
 import tempfile
@@ -130,12 +131,13 @@ def inherited_socket() -> socket.socket:
     return ours
 
 
-def send_some(connection: socket.socket, pieces: Sequence[memoryview]) -> int:
-    """Send as much of ``pieces`` as fits now; the bytes sent. Raises BlockingIOError where nothing does."""
+def send_within(connection: socket.socket, seconds: float) -> None:
+    """Let a blocking send raise BlockingIOError (TimeoutError on Windows) where nothing is taken for so long."""
     if sys.platform == "win32":
-        return connection.send(pieces[0])
+        limit = struct.pack("I", round(seconds * 1e3))
     else:
-        return connection.sendmsg(pieces[:16])
+        limit = struct.pack("ll", int(seconds), round(seconds % 1 * 1e6))
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
 
 
 def wait_until_closed(connection: socket.socket) -> None:

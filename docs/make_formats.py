@@ -28,6 +28,7 @@ from acquire.session import SessionInfo, SessionWriter
 from acquire.settings import settings_of
 from analysis import Roi, ZoiGrid
 from analysis.field import Status
+from live.config.figures import FIGURES
 from live.results.finished.cycles import COLUMNS as CYCLES
 from live.results.quantities import quantity_of
 from live.results.row import ResultsInfo
@@ -113,6 +114,16 @@ def means() -> str:
     return table(("column", "unit", "meaning"), ((f"`{n}`", q.unit, q.words) for n, q in quantities))
 
 
+def channels() -> str:
+    """The channels of alarms and strain output."""
+    rows = (
+        (f"`{one.name}`", one.unit, one.words or quantity_of(one.name).words)
+        for one in FIGURES
+        if one.channel
+    )
+    return table(("channel", "unit", "meaning"), rows)
+
+
 def cycles() -> str:
     """The columns of cycles.csv."""
     return table(("column", "unit", "meaning"), ((f"`{name}`", *about) for name, about in CYCLES.items()))
@@ -178,11 +189,12 @@ def _text(value: object) -> str:
 
 TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
     "session": session_layout, "flags": flags, "maps": strain_maps, "means": means, "status": statuses,
-    "response": response, "cycles": cycles,
+    "response": response, "cycles": cycles, "channels": channels,
     **{name or "v4l2": partial(camera_settings, name) for name, _ in CAMERAS.settings()},
 })  # fmt: skip
 PAGES = tuple(
-    DOCS / f"{name}.md" for name in ("session-format", "strain-format", "cameras", "machine-vision")
+    DOCS / f"{name}.md"
+    for name in ("session-format", "strain-format", "control", "cameras", "machine-vision")
 )
 _TABLE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)
 

@@ -9,13 +9,11 @@ where the test is killed.
 from __future__ import annotations
 
 import contextlib
-import select
 import signal
 import socket
 import subprocess
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -28,14 +26,14 @@ from acquire.system import (
     lower_priority,
     python_command,
     python_environment,
-    send_some,
+    send_within,
     start_with_socket,
 )
 from acquire.text import Message
 from live.pipeline.latency import OUTPUT
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox
-from live.ui.rerun.wire import Kind, Parcel, Reader, WireError, encoded
+from live.ui.rerun.wire import Kind, MessagePipe, Parcel, WireError
 
 TICK_S = 0.05
 STUCK_S, START_S = 15.0, 90.0
@@ -56,13 +54,11 @@ _KILLED_S = 5.0
 
 
 class RenderProcess:
-    """A process that draws, and the socket to it; only ``wait`` and ``end`` wait for it.
+    """A process that draws, and the pipe to it.
 
     Attributes
     ----------
     pid : int
-    progress_t : float, s
-        When it last received or sent something (``time.monotonic``).
     """
 
     def __init__(self) -> None:
@@ -71,63 +67,44 @@ class RenderProcess:
             self._process, ours = start_with_socket(python_command(_MODULE), _environment())
         with contextlib.suppress(OSError):
             ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BYTES)
-        ours.setblocking(False)
-        self._socket, self._reader = ours, Reader(ours)
-        self._pending: deque[memoryview] = deque()
-        self.pid, self.progress_t = self._process.pid, time.monotonic()
+        self._socket, self._pipe = ours, MessagePipe(ours)
+        self.pid = self._process.pid
+        self.may_take(START_S)
+
+    def may_take(self, seconds: float) -> None:
+        """Let it be stuck where it takes nothing of a message for so long."""
+        self._limit_s = seconds
+        send_within(self._socket, seconds)
 
     def send(self, message: Parcel) -> None:
-        """Queue ``message``."""
-        if not self._pending:
-            self.progress_t = time.monotonic()
-        self._pending.extend(encoded(message))
-
-    def flush(self) -> bool:
-        """Send as much as the socket takes now; whether nothing is left.
+        """Send ``message``, waiting while the process draws.
 
         Raises
         ------
         OSError
-            The process has ended.
+            The process has ended, or is ``Stuck``.
         """
-        while self._pending:
-            try:
-                sent = send_some(self._socket, list(self._pending))
-            except BlockingIOError:
-                return False
-            self.progress_t = time.monotonic()
-            self._discard(sent)
-        return True
+        try:
+            self._pipe.send(message)
+        except (BlockingIOError, TimeoutError):
+            raise Stuck(Message("took nothing for {silent:.0f} s (stopped?)", self._limit_s)) from None
 
-    def _discard(self, sent: int) -> None:
-        while sent:
-            piece = self._pending.popleft()
-            if sent < piece.nbytes:
-                self._pending.appendleft(piece[sent:])
-                return
-            sent -= piece.nbytes
-
-    def replies(self) -> Iterator[Parcel]:
-        """The messages received since the last call.
+    def replies(self, seconds: float = 0.0) -> Iterator[Parcel]:
+        """The messages received since the last call; waits at most ``seconds`` for one.
 
         Raises
         ------
         EOFError, OSError
             The process has ended.
         """
-        with contextlib.suppress(BlockingIOError):
-            while True:
-                message = self._reader.next()
-                self.progress_t = time.monotonic()
-                yield message
-
-    def wait(self, seconds: float, *, to_send: bool) -> None:
-        """Wait for a message (or for room to send), at most ``seconds``."""
-        select.select([self._socket], [self._socket] if to_send else [], [], seconds)
+        while self._pipe.ready(seconds):
+            yield self._pipe.next()
+            seconds = 0.0
 
     def end(self, seconds: float = 0.0) -> int:
         """Close the socket, wait ``seconds`` and kill the process after that; its exit code."""
         self._socket.close()
+        self._pipe.close()
         try:
             return self._process.wait(seconds)
         except subprocess.TimeoutExpired:
@@ -214,29 +191,23 @@ class Supervisor:
 
     def _step(self) -> None:
         renderer = self._renderer or self._start_process()
-        if renderer is None or self._exchange(renderer):
-            self._closing.wait(TICK_S)
-        else:
-            renderer.wait(TICK_S, to_send=True)
+        if renderer is not None:
+            self._exchange(renderer)
+        self._closing.wait(TICK_S)
 
-    def _exchange(self, renderer: RenderProcess) -> bool:
-        """Receive and send; whether everything was sent."""
-        for message in renderer.replies():
+    def _exchange(self, renderer: RenderProcess, seconds: float = 0.0) -> None:
+        """Receive, for which it waits at most ``seconds``, and send all that is due."""
+        for message in renderer.replies(seconds):
             self._handle(message)
-        while renderer.flush():
-            more = self._outbox.next(time.monotonic())
-            if more is None:
-                return True
+        while (more := self._outbox.next(time.monotonic())) is not None:
             renderer.send(more)
-        silent = time.monotonic() - renderer.progress_t
-        if silent > (STUCK_S if self._is_up else START_S):
-            raise Stuck(Message("took nothing for {silent:.0f} s (stopped?)", silent))
-        return False
 
     def _handle(self, message: Parcel) -> None:
         meta = message.meta
         if message.kind is Kind.SERVING:
             self._is_up = True
+            if self._renderer is not None:
+                self._renderer.may_take(STUCK_S)
             before, self.served = self.served.port, replace(self._target, port=meta["port"], rrd=meta["rrd"])
             if before not in (None, meta["port"]):
                 self._notify(Message("the view is now on port {port}", meta["port"]), "warning")
@@ -306,7 +277,8 @@ class Supervisor:
                 renderer = self._renderer or self._start_process()
                 if renderer is None:
                     return
-                renderer.wait(TICK_S, to_send=not self._exchange(renderer))
+                renderer.may_take(max(TICK_S, until - time.monotonic()))
+                self._exchange(renderer, TICK_S)
         except (OSError, EOFError, WireError) as error:
             self._cause = str(error) or Message("ended early")
         code = self._renderer.end(max(0.0, until - time.monotonic())) if self._renderer is not None else 0

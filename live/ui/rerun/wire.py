@@ -1,19 +1,19 @@
-"""Framed messages between a test and the process of its view, checked when they are read.
+"""Messages between a test and the process of its view, checked when they are read.
 
-A message is a header (magic, version, kind, two lengths; little endian), a JSON object, and the bytes
-of its arrays, each padded to 8. "arrays" in the object lists name, type and shape of each array. Nothing
-that is read is executed.
+A message is a JSON text (kind, content, and name, type and shape of each array), then the bytes of each array.
+``multiprocessing.connection`` frames them; it is given bytes alone, so that nothing that is read is executed.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import select
 import socket
-import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
+from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
@@ -21,13 +21,10 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 
-MAGIC, VERSION = b"pdvw", 1
 MAX_META_BYTES, MAX_BYTES = 2**23, 2**28
-"""Limits of one message; a larger one is refused."""
+"""Limits of one message, of its text and of its arrays; a larger one is refused."""
 
-_HEADER = struct.Struct("<4sHHIQ")
 _TYPES = ("|b1", "|u1", "<u2", "<f4", "<f8")
-_ALIGN = 8
 
 
 class Kind(IntEnum):
@@ -71,120 +68,85 @@ class Parcel:
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
 
-def encoded(message: Parcel) -> list[memoryview]:
-    """The bytes of ``message`` in pieces. The arrays are not copied; they must not change until they are sent.
-
-    Raises
-    ------
-    WireError
-        An array has another type.
-    """
-    arrays = {name: np.ascontiguousarray(array) for name, array in message.arrays.items()}
-    listed = [[name, array.dtype.str, array.shape] for name, array in arrays.items()]
-    if unknown := [kind for _, kind, _ in listed if kind not in _TYPES]:
-        raise WireError("arrays of {type} are not sent to the view", unknown[0])
-    meta = json.dumps({**message.meta, "arrays": listed}).encode()
-    meta += b" " * _padding(len(meta))
-    total = sum(array.nbytes + _padding(array.nbytes) for array in arrays.values())
-    pieces = [_HEADER.pack(MAGIC, VERSION, message.kind, len(meta), total) + meta]
-    views = [memoryview(pieces[0])]
-    for array in arrays.values():
-        views += [array.reshape(-1).view(np.uint8).data, memoryview(b"\0" * _padding(array.nbytes))]
-    return [view for view in views if view.nbytes]
-
-
-def _padding(length: int) -> int:
-    return -length % _ALIGN
-
-
-class Reader:
-    """Reads messages from a stream socket, blocking or not.
+class MessagePipe:
+    """Sends and reads messages through a stream socket; one thread may send while another reads.
 
     Parameters
     ----------
-    source : socket
+    connected : socket
+        Blocking. It stays that of the caller.
     """
 
-    def __init__(self, source: socket.socket) -> None:
-        self._source = source
-        self._head: tuple[Kind, int] | None = None
-        self._expect(_HEADER.size)
+    def __init__(self, connected: socket.socket) -> None:
+        self._connection = Connection(connected.dup().detach())
+
+    def close(self) -> None:
+        """Close it."""
+        self._connection.close()
+
+    def ready(self, seconds: float = 0.0) -> bool:
+        """Whether something can be read, also an end, within this time."""
+        return bool(select.select([self._connection], [], [], seconds)[0])
+
+    def send(self, message: Parcel) -> None:
+        """Send a message; its arrays are not copied.
+
+        Raises
+        ------
+        WireError
+            An array has another type.
+        OSError
+            The other side closed the socket, or takes nothing (``acquire.system.send_within``).
+        """
+        arrays = {name: np.ascontiguousarray(array) for name, array in message.arrays.items()}
+        listed = [[name, array.dtype.str, array.shape] for name, array in arrays.items()]
+        if unknown := [kind for _, kind, _ in listed if kind not in _TYPES]:
+            raise WireError("arrays of {type} are not sent to the view", unknown[0])
+        self._connection.send_bytes(json.dumps([message.kind, message.meta, listed]).encode())
+        for array in arrays.values():
+            self._connection.send_bytes(array.reshape(-1).view(np.uint8).data)
 
     def next(self) -> Parcel:
         """The next message.
 
         Raises
         ------
-        BlockingIOError
-            The message is not complete yet; what was received is kept.
-        EOFError
+        EOFError, OSError
             The other side closed the socket.
         WireError
             The data are not a message.
         """
-        if self._head is None:
-            self._fill()
-            kind, meta, total = _checked_header(bytes(self._buffer))
-            self._head = kind, meta
-            self._expect(meta + total)
-        self._fill()
-        (kind, meta), body = self._head, self._buffer
-        self._head = None
-        self._expect(_HEADER.size)
-        return _message(kind, body, meta)
+        text = self._read(MAX_META_BYTES)
+        try:
+            number, meta, arrays = json.loads(text)
+            listed = [(str(name), str(dtype), tuple(shape)) for name, dtype, shape in arrays]
+            kind, meta = Kind(number), dict(meta)
+        except (ValueError, TypeError, RecursionError) as error:
+            raise WireError("a message to or from the view is damaged: {error}", error) from error
+        for _, dtype, shape in listed:
+            if dtype not in _TYPES or any(type(n) is not int or n < 0 for n in shape):
+                raise WireError(
+                    "a message {kind} to the view has an array of {dtype} {shape}", kind.name, dtype, shape
+                )
+        if sum(_length(dtype, shape) for _, dtype, shape in listed) > MAX_BYTES:
+            raise WireError("a message {kind} is too long for the view", kind.name)
+        return Parcel(kind, meta, {name: self._array(kind, dtype, shape) for name, dtype, shape in listed})
 
-    def _expect(self, length: int) -> None:
-        self._buffer, self._got = bytearray(length), 0
-
-    def _fill(self) -> None:
-        while self._got < len(self._buffer):
-            received = self._source.recv_into(memoryview(self._buffer)[self._got :])
-            if not received:
-                raise EOFError
-            self._got += received
-
-
-def _checked_header(header: bytes) -> tuple[Kind, int, int]:
-    magic, version, number, meta, total = _HEADER.unpack(header)
-    if (magic, version) != (MAGIC, VERSION):
-        raise WireError(
-            "not a message of version {version} to or from the view: {bytes}", VERSION, repr(header[:6])
-        )
-    if meta > MAX_META_BYTES or total > MAX_BYTES:
-        raise WireError("a message of {meta} + {total} bytes is too long for the view", meta, total)
-    try:
-        return Kind(number), meta, total
-    except ValueError as error:
-        raise WireError("the view has no message {number}", number) from error
-
-
-def _message(kind: Kind, body: bytearray, length: int) -> Parcel:
-    try:
-        meta = json.loads(bytes(body[:length]))
-        listed = [(str(name), str(dtype), tuple(shape)) for name, dtype, shape in meta.pop("arrays")]
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise WireError(
-            "a message {kind} to or from the view is damaged: {error}", kind.name, error
-        ) from error
-    return Parcel(kind, meta, _arrays(kind, memoryview(body)[length:], listed))
-
-
-def _arrays(
-    kind: Kind, body: memoryview, listed: list[tuple[str, str, tuple[int, ...]]]
-) -> dict[str, NDArray[Any]]:
-    arrays, begin = {}, 0
-    for name, dtype, shape in listed:
-        if dtype not in _TYPES or any(type(n) is not int or n < 0 for n in shape):
-            raise WireError(
-                "a message {kind} to the view has an array of {dtype} {shape}", kind.name, dtype, shape
-            )
-        count, length = math.prod(shape), math.prod(shape) * np.dtype(dtype).itemsize
-        if begin + length > len(body):
+    def _array(self, kind: Kind, dtype: str, shape: tuple[int, ...]) -> NDArray[Any]:
+        length = _length(dtype, shape)
+        data = self._read(length)
+        if len(data) != length:
             raise WireError("a message {kind} to the view is shorter than its arrays", kind.name)
-        arrays[name] = (
-            np.frombuffer(body, dtype, count, begin).reshape(shape) if count else np.empty(shape, dtype)
-        )
-        begin += length + _padding(length)
-    if begin != len(body):
-        raise WireError("a message {kind} to the view is longer than its arrays", kind.name)
-    return arrays
+        return np.frombuffer(data, dtype).reshape(shape) if length else np.empty(shape, dtype)
+
+    def _read(self, most: int) -> bytes:
+        try:
+            return self._connection.recv_bytes(most)
+        except OSError as error:
+            if self._connection.readable:  # cut off: the other side has ended
+                raise
+            raise WireError("a message to or from the view has more than {most} bytes", most) from error
+
+
+def _length(dtype: str, shape: tuple[int, ...]) -> int:
+    return math.prod(shape) * np.dtype(dtype).itemsize

@@ -25,7 +25,7 @@ from live.ui.rerun.messages import (
     rows_of,
     setup_of,
 )
-from live.ui.rerun.wire import Kind, Parcel, Reader, encoded
+from live.ui.rerun.wire import Kind, MessagePipe, Parcel
 
 log = logging.getLogger(__name__)
 
@@ -41,14 +41,13 @@ _POLL_S = 2.0
 class ReplyChannel:
     """Sends messages to the test, from several threads."""
 
-    def __init__(self, parent: socket.socket) -> None:
-        self._parent, self._lock = parent, threading.Lock()
+    def __init__(self, pipe: MessagePipe) -> None:
+        self._pipe, self._lock = pipe, threading.Lock()
 
     def send(self, kind: Kind, **meta: Any) -> None:
         """Send a message; ignored where the test has ended."""
         with self._lock, contextlib.suppress(OSError):
-            for piece in encoded(Parcel(kind, meta)):
-                self._parent.sendall(piece)
+            self._pipe.send(Parcel(kind, meta))
 
     def notify(self, text: str) -> None:
         """Send a message for a person."""
@@ -58,16 +57,17 @@ class ReplyChannel:
 def main() -> int:
     """Draw until the test ends; the exit code."""
     parent = inherited_socket()
-    channel, reader = ReplyChannel(parent), Reader(parent)
+    pipe = MessagePipe(parent)
+    channel = ReplyChannel(pipe)
     end_with(parent)
     try:
-        setup, target = setup_of(reader.next())
+        setup, target = setup_of(pipe.next())
         sinks = _open(setup, target, channel)
         if not sinks:
             return 3
         # Only now: with a low priority a busy machine takes long to load rerun.
         lowest_priority()
-        _draw(reader, ViewScene(sinks, setup), channel, MAX_MIB + FINISHED_MIB * setup.finished)
+        _draw(pipe, ViewScene(sinks, setup), channel, MAX_MIB + FINISHED_MIB * setup.finished)
     except EOFError:
         return 1
     except Exception as error:
@@ -102,11 +102,11 @@ def _open(setup: ViewSetup, target: ViewTarget, channel: ReplyChannel) -> list[R
     return sinks
 
 
-def _draw(reader: Reader, scene: ViewScene, channel: ReplyChannel, max_MiB: float) -> None:
+def _draw(pipe: MessagePipe, scene: ViewScene, channel: ReplyChannel, max_MiB: float) -> None:
     scene.begin()
     checked_t = time.monotonic()
     try:
-        while (message := reader.next()).kind is not Kind.END:
+        while (message := pipe.next()).kind is not Kind.END:
             _show(scene, message)
             if time.monotonic() - checked_t > _POLL_S:
                 checked_t = time.monotonic()

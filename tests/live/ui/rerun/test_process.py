@@ -26,7 +26,7 @@ from live.ui.rerun.messages import (
     rows_message,
     setup_message,
 )
-from live.ui.rerun.wire import Kind, Parcel, Reader, encoded
+from live.ui.rerun.wire import Kind, MessagePipe, Parcel
 from tests.live.made_up import START, make_frame, make_grid, make_measurement
 from tests.live.made_up import figures as live_figures
 
@@ -198,29 +198,32 @@ def test_the_exit_code_of_the_process(
             raise error
 
     setup = setup_message(replace(SETUP, finished=True), ViewTarget(None, "v.rrd", "id"))
-    for piece in encoded(setup):
-        theirs.sendall(piece)
+    there = MessagePipe(theirs)
+    there.send(setup)
     for name, made in (("inherited_socket", lambda: ours), ("end_with", lambda parent: None), ("_draw", draw),
                        ("lowest_priority", lambda: None), ("_open", lambda *_: sinks)):  # fmt: skip
         monkeypatch.setattr(process, name, made)
     assert process.main() == code
     assert drawn == ([640 + 768] if sinks else [])
     if told:
-        assert [Reader(theirs).next().meta["text"]] == told
-    ours.close()
-    theirs.close()
+        assert [there.next().meta["text"]] == told
+    for one in (ours, theirs, there):
+        one.close()
 
 
 def test_answers_arrive_and_a_test_that_has_ended_is_ignored() -> None:
     ours, theirs = socket.socketpair()
-    channel = process.ReplyChannel(ours)
+    here, there = MessagePipe(ours), MessagePipe(theirs)
+    channel = process.ReplyChannel(here)
     channel.notify("a word")
-    answer = Reader(theirs).next()
+    answer = there.next()
     assert (answer.kind, dict(answer.meta)) == (Kind.TROUBLE, {"text": "a word", "lasting": False})
     theirs.close()
+    there.close()
     for _ in range(3):
         channel.notify("nobody hears it")
     ours.close()
+    here.close()
 
 
 def test_a_sink_takes_each_kind_at_its_rate() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
@@ -11,7 +12,7 @@ import pytest
 
 from live.ui.rerun import supervisor
 from live.ui.rerun.messages import ViewTarget
-from live.ui.rerun.supervisor import RenderProcess, Supervisor
+from live.ui.rerun.supervisor import RenderProcess, Stuck, Supervisor
 from live.ui.rerun.wire import Kind, Parcel
 from tests.clock import Clock
 
@@ -19,28 +20,24 @@ TARGET = ViewTarget(9876, "/a/view.rrd", "id")
 
 
 class Process:
-    """A process that answers what it is told to, and takes what comes while it is not ``stuck``."""
+    """A process that answers what it is told to, and takes what comes."""
 
     ends = 1
 
     def __init__(self, clock: Clock) -> None:
-        self.pid, self.progress_t, self.answers = 7, clock.now_s, list[Parcel]()
-        self.sent: list[Parcel] = []
-        self.gone = self.stuck = False
+        self.pid, self.answers, self.limits = 7, list[Parcel](), list[float]()
+        self.gone = False
 
-    def replies(self) -> Iterator[Parcel]:
+    def replies(self, seconds: float = 0.0) -> Iterator[Parcel]:
         if self.gone:
             raise EOFError
         answers, self.answers = self.answers, []
         yield from answers
 
-    def flush(self) -> bool:
-        return not self.stuck
+    def may_take(self, seconds: float) -> None:
+        self.limits.append(seconds)
 
-    def send(self, message: Parcel) -> None:
-        self.sent.append(message)
-
-    def wait(self, seconds: float, *, to_send: bool) -> None: ...
+    def send(self, message: Parcel) -> None: ...
 
     def end(self, seconds: float = 0.0) -> int:
         return self.ends
@@ -141,18 +138,22 @@ def test_one_that_never_starts_is_given_up(watched: Watched) -> None:
     assert watched.one.failed == "its process does not start (ended with 1)" and watched.one.starts == 5
 
 
-@pytest.mark.parametrize(("up", "limit"), [(False, 90.0), (True, 15.0)])
-def test_one_that_takes_nothing_is_replaced(watched: Watched, up: bool, limit: float) -> None:
-    watched.step(1000.0)
-    if up:
-        watched.step(0.0, serving())
-    watched.processes[-1].stuck = True
-    watched.step(limit - 0.1)
-    assert watched.told == []
-    watched.step(0.2)
-    assert watched.told == [
-        ("warning", f"the view's process took nothing for {limit:.0f} s (stopped?) and is restarted")
-    ]
+def test_one_that_takes_nothing_is_stuck_sooner_once_it_serves(watched: Watched) -> None:
+    watched.step()
+    watched.step(0.0, serving())
+    assert watched.processes[0].limits == [15.0], "a busy machine starts one slowly"
+
+
+def test_one_that_takes_nothing_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    ours, theirs = socket.socketpair()
+    monkeypatch.setattr(supervisor, "start_with_socket", lambda *_: (SimpleNamespace(pid=7), ours))
+    monkeypatch.setattr(supervisor, "START_S", 0.2)
+    process = RenderProcess()
+    with ours, theirs:
+        with pytest.raises(Stuck, match="took nothing for 0 s"):
+            while True:
+                process.send(Parcel(Kind.STATUS, {"markdown": "a" * 1000}))
+        process._pipe.close()
 
 
 def test_one_that_has_grown_is_restarted_at_once(watched: Watched) -> None:
@@ -190,14 +191,3 @@ def test_one_that_ends_early_may_lack_seconds(watched: Watched) -> None:
     watched.one._is_done, watched.one._cause = False, ""
     watched.one._finish(0.0)
     assert watched.told[0][1].startswith("the view's process did not finish in time and was ended (1)")
-
-
-def test_what_was_sent_in_part_goes_on_where_it_ended() -> None:
-    process: Any = RenderProcess.__new__(RenderProcess)
-    process._pending = supervisor.deque(memoryview(text) for text in (b"abc", b"defgh", b"ij"))
-    process._discard(5)
-    assert [bytes(piece) for piece in process._pending] == [b"fgh", b"ij"]
-    process._discard(3)
-    assert [bytes(piece) for piece in process._pending] == [b"ij"]
-    process._discard(2)
-    assert not process._pending

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import pickle
 import socket
 import struct
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
 from typing import Any
 
 import numpy as np
@@ -29,24 +32,32 @@ from live.ui.rerun.messages import (
     setup_message,
     setup_of,
 )
-from live.ui.rerun.wire import Kind, Parcel, Reader, WireError, encoded
+from live.ui.rerun.wire import MAX_META_BYTES, Kind, MessagePipe, Parcel, WireError
 from tests.live.made_up import START, make_frame, make_grid, make_measurement
 
 
-def passed(*pieces: bytes | memoryview) -> Parcel:
+@contextmanager
+def pipes() -> Iterator[tuple[MessagePipe, MessagePipe]]:
     ours, theirs = socket.socketpair()
-    with theirs, ThreadPoolExecutor() as other, ours:
-        other.submit(send, ours, b"".join(pieces))
-        return Reader(theirs).next()
+    both = MessagePipe(ours), MessagePipe(theirs)
+    with ours, theirs, closing(both[0]), closing(both[1]):
+        yield both
 
 
-def send(ours: socket.socket, data: bytes) -> None:
-    ours.sendall(data)
-    ours.shutdown(socket.SHUT_WR)
+def passed(*pieces: bytes) -> Parcel:
+    """What is read of these parts of a message, where nothing comes after them."""
+    with pipes() as (ours, theirs):
+        for piece in pieces:
+            ours._connection.send_bytes(piece)
+        return theirs.next()
 
 
 def sent_and_received(message: Parcel) -> Parcel:
-    return passed(*encoded(message))
+    with pipes() as (ours, theirs), ThreadPoolExecutor() as other:
+        sent = other.submit(ours.send, message)
+        received = theirs.next()
+        sent.result()
+        return received
 
 
 def test_a_setup() -> None:
@@ -87,53 +98,55 @@ def test_rows_and_events() -> None:
     assert events_of(sent_and_received(events_message([event]))) == [event]
 
 
-def test_it_is_received_in_pieces() -> None:
-    ours, theirs = socket.socketpair()
-    with ours, theirs:
-        theirs.setblocking(False)
-        reader = Reader(theirs)
-        message = rows_message(Kind.LOADS, [(1.0, 2.0)])
-        for byte in b"".join(encoded(message)):
-            with pytest.raises(BlockingIOError):
-                reader.next()
-            ours.sendall(bytes([byte]))
-        assert rows_of(reader.next()) == [(1.0, 2.0)]
-
-
-def framed(meta: bytes, body: bytes = b"", **how: Any) -> bytes:
-    how = {"magic": b"pdvw", "version": 1, "kind": Kind.LOADS, "meta": len(meta), "total": len(body), **how}
-    return struct.pack("<4sHHIQ", *how.values()) + meta + body
-
-
-def listing(*arrays: Any) -> bytes:
-    return json.dumps({"arrays": arrays}).encode()
+def text(*arrays: Any, kind: Any = Kind.LOADS, meta: Any = None) -> bytes:
+    return json.dumps([kind, {} if meta is None else meta, arrays]).encode()
 
 
 @pytest.mark.parametrize(
-    ("data", "message"),
+    ("pieces", "message"),
     [
-        (framed(b"{}", magic=b"RRF2"), "not a message"),
-        (framed(b"{}", version=2), "not a message of version 1"),
-        (framed(b"{}", kind=99), "has no message 99"),
-        (framed(b"{}", total=2**60), "too long"),
-        (framed(b"{}"), "damaged"),
-        (framed(b"\xff"), "damaged"),
-        (framed(b"[]"), "damaged"),
-        (framed(listing(["rows", "|O", [1]]), b"12345678"), "array of"),
-        (framed(listing(["rows", "<f8", [-1]]), b"12345678"), "array of"),
-        (framed(listing(["rows", "<f8", [2**40, 2**40]]), b"12345678"), "shorter"),
-        (framed(listing(["rows", "<f8", [1]]), b"1234567812345678"), "longer"),
+        ([b"{}"], "damaged"),
+        ([b"\xff"], "damaged"),
+        ([b"[" * 100_000], "damaged"),
+        ([pickle.dumps(Kind.LOADS)], "damaged"),
+        ([text(kind=99)], "damaged"),
+        ([text(meta=1)], "damaged"),
+        ([text(["rows", "|O", [1]]), b"12345678"], "array of"),
+        ([text(["rows", "<f8", [-1]]), b"12345678"], "array of"),
+        ([text(["rows", "<f8", [True]]), b"12345678"], "array of"),
+        ([text(["rows", "<f8", [2**40, 2**40]]), b"12345678"], "too long"),
+        ([text(*[["rows", "|u1", [2**27]]] * 3), b"12345678"], "too long"),
+        ([text(["rows", "<f8", [2]]), b"12345678"], "shorter"),
+        ([text(["rows", "<f8", [1]]), b"1234567812345678"], "more than 8 bytes"),
     ],
 )
-def test_what_is_no_message_is_refused(data: bytes, message: str) -> None:
+def test_what_is_no_message_is_refused(pieces: list[bytes], message: str) -> None:
     with pytest.raises(WireError, match=message):
-        passed(data)
+        passed(*pieces)
 
 
-@given(st.binary(max_size=200), st.sampled_from(list(Kind)))
-def test_any_bytes_are_a_message_or_refused(body: bytes, kind: Kind) -> None:
-    with pytest.raises((WireError, EOFError)):
-        passed(framed(body[:50], body[50:], kind=kind))
+@pytest.mark.parametrize("head", [struct.pack("!i", MAX_META_BYTES + 1), struct.pack("!iQ", -1, 2**60)])
+def test_what_announces_too_much_is_refused_unread(head: bytes) -> None:
+    ours, theirs = socket.socketpair()
+    with ours, theirs, closing(MessagePipe(theirs)) as pipe:
+        ours.sendall(head)
+        with pytest.raises(WireError, match="more than 8388608 bytes"):
+            pipe.next()
+
+
+@given(st.binary(max_size=200))
+def test_any_bytes_are_a_message_or_refused(body: bytes) -> None:
+    with pytest.raises(WireError):
+        passed(body)
+
+
+def test_a_message_that_ends_in_the_middle_is_an_end() -> None:
+    ours, theirs = socket.socketpair()
+    with theirs, closing(MessagePipe(theirs)) as pipe:
+        with ours:
+            ours.sendall(struct.pack("!i", 100) + b"[")
+        with pytest.raises(OSError, match="end of file"):
+            pipe.next()
 
 
 @pytest.mark.parametrize(
@@ -154,5 +167,5 @@ def test_a_message_with_something_else_in_it_is_refused(make: Any, message: Parc
 
 
 def test_arrays_of_other_types_are_not_sent() -> None:
-    with pytest.raises(WireError, match="<i8"):
-        encoded(Parcel(Kind.LOADS, {}, {"rows": np.zeros(3, np.int64)}))
+    with pipes() as (ours, _), pytest.raises(WireError, match="<i8"):
+        ours.send(Parcel(Kind.LOADS, {}, {"rows": np.zeros(3, np.int64)}))
