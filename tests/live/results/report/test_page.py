@@ -264,6 +264,18 @@ def test_thinning_keeps_the_spikes_and_the_gaps() -> None:
     assert len(heights) < 2 * MAX_POINTS
 
 
+def test_a_logarithmic_axis_keeps_its_first_decades() -> None:
+    cycles = np.arange(1.0, 200_001.0)
+    svg = draw(Plot("a", "a", "x", "y", (PlotLine("", np.log10(cycles), np.cos(cycles)),)))
+    path = re.search(r'class="curve c1 d1" d="([^"]+)"', svg)
+    assert path is not None
+    across = np.array([float(v) for v in re.findall(r"[ML]([\d.]+) ", path[1])])
+    assert len(across) < 2 * MAX_POINTS
+    decade = np.ptp(across) / np.log10(cycles[-1])
+    assert np.count_nonzero(across < across[0] + 1.01 * decade) >= 10, "all of the first ten"
+    assert np.count_nonzero(across < across[0] + 2.01 * decade) >= 90
+
+
 def test_words_are_escaped_once() -> None:
     assert safe("<&") == "&lt;&amp;"
     assert safe(safe("<")) == "&lt;"

@@ -51,6 +51,17 @@ def all_of(outbox: Outbox, now: float = 0.0) -> list[Parcel]:
     return found
 
 
+def test_maps_of_the_whole_test_go_once_and_again_to_a_process_that_is_started_anew() -> None:
+    outbox, pending = boxed()
+    maps = {"compliance": np.full((5, 7), 14e-12), "sigma_compliance": np.full((5, 7), 1e-13)}
+    pending.whole = maps
+    (sent,) = all_of(outbox)
+    assert sent.kind is Kind.WHOLE and not all_of(outbox)
+    np.testing.assert_array_equal(sent.arrays["compliance"], maps["compliance"])
+    outbox.begin(TARGET)
+    assert [one.kind for one in all_of(outbox)].count(Kind.WHOLE) == 1
+
+
 def test_small_things_go_first_and_each_once() -> None:
     outbox, pending = boxed()
     pending.picture, pending.field = make_frame(0, START), (START, make_field(make_grid(), 0.0))
