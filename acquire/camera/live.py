@@ -134,7 +134,7 @@ class LiveCamera(CameraBase):
         self._guard = threading.RLock()  # whoever closes must not take the buffers from under a reader
         self._driver: Driver | None = _opened(opener, address)
         self._name, self.info = self._driver.name, self._driver.info
-        self._counter, self._repeats = FrameCounter(self._driver.cycle), RepeatGuard()
+        self._counter, self._repeats = FrameCounter(self._driver.cycle), RepeatWatch()
         self._stall, self._t, self._late = StallWatch(self._report), float("-inf"), False
         self._stale, self._not_before = 0, float("-inf")
         self._lost, self._damaged, self._why_not = RateLimiter(), RateLimiter(), ""
@@ -359,7 +359,7 @@ def _opened_alike(opener: Opener, before: Driver) -> Driver:
     return driver
 
 
-class RepeatGuard:
+class RepeatWatch:
     """Finds a driver that hands out the same picture again and again.
 
     A sensor has noise: three pictures that agree in every bit are one picture.

@@ -22,7 +22,7 @@ from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.protocols.base import Reading
 from acquire.serial_line.clock import ArrivalRate, ArrivalTimes, in_milliseconds
 from acquire.serial_line.echo import Echo
-from acquire.serial_line.link import FloodGuard, Link, LinkContext, LoadWatch, Opener
+from acquire.serial_line.link import FloodWatch, Link, LinkContext, LoadWatch, Opener
 from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling
 from acquire.serial_line.settings import SerialSettings, describe, read_settings
@@ -79,7 +79,7 @@ class SerialCell(Closing):
         self._last_read = math.nan
         self._watch, self._flood = (
             LoadWatch(settings.timeout_s, self._report, clock()),
-            FloodGuard(self._report, clock()),
+            FloodWatch(self._report, clock()),
         )
         self._next_poll, self._polled = clock(), math.nan  # when the poll was sent whose answer is awaited
         self._taring_until = -math.inf

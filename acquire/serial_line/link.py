@@ -2,7 +2,7 @@
 
 Opening and closing a port may take as long as a network or a driver likes. Threads of their own do both, and are
 abandoned when they take too long. A peer that hangs up at once is tried more and more seldom, and reported once.
-``LoadWatch`` reports silence, its end, and lines that are no readings; ``FloodGuard`` more lines than can be read.
+``LoadWatch`` reports silence, its end, and lines that are no readings; ``FloodWatch`` more lines than can be read.
 """
 
 from __future__ import annotations
@@ -311,7 +311,7 @@ class LoadWatch:
         return Message("last good sample {force:.6g} N, {now:.1f} s ago", good.force, now - good.t)
 
 
-class FloodGuard:
+class FloodWatch:
     """When the port was last empty, and whether what it gave may have waited.
 
     Parameters

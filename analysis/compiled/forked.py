@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 
 
-class ForkGuard:
+class ForkCheck:
     """In which process the threads of the loops were started."""
 
     def __init__(self) -> None:
@@ -25,4 +25,4 @@ class ForkGuard:
             )
 
 
-FORK_GUARD = ForkGuard()
+FORK_CHECK = ForkCheck()

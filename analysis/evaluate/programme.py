@@ -36,7 +36,7 @@ _PRESSED = 0.2  # of the highest stress: compression that is no part of a tensil
 _TENSION = 0.2  # of the largest compression: less tension is a zero of the force that is off
 _GROWTH = 0.1  # of the depths of all unloadings: the strain of a cyclic test grows by less
 _LOADED = 0.05  # of the highest stress: the loading has begun
-_HELD_TIME, _HELD = (
+_HELD_TIME, HELD = (
     0.5,
     0.03,
 )  # share of the time from there on, and of the range, within which a value is held
@@ -173,7 +173,7 @@ def _hold(t: Floats, strain: Floats, stress: Floats) -> tuple[Kind, int] | None:
     top = float(stress.max())
     start = int(np.argmax(stress >= _LOADED * top))
     for kind, whole, others in (("relaxation", strain, stress), ("creep", stress, strain)):
-        tolerance = max(_HELD * float(np.ptp(whole)), _SURE * noise(whole))
+        tolerance = max(HELD * float(np.ptp(whole)), _SURE * noise(whole))
         end = _until(strain, stress, whole, tolerance, start)
         values, other = whole[:end], others[:end]
         off = np.flatnonzero(np.abs(values - float(np.median(values[-5:]))) > tolerance)

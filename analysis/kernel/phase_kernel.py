@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.compiled.forked import FORK_GUARD
+from analysis.compiled.forked import FORK_CHECK
 from analysis.field import PAIR_INDEX, Motion, StrainField, ZoiGrid, profile
 from analysis.follow.parts import coherent
 from analysis.follow.renewal import taken
@@ -88,7 +88,7 @@ class PhaseKernel:
     ) -> None:
         from analysis.picture.prefilter import room_for
 
-        FORK_GUARD.check()
+        FORK_CHECK.check()
         image = as_image(reference, "the reference")
         made = ReferencePicture.first(image, grid, settings or KernelSettings(), noise, clipped, least_noise)
         self.reference = replace(made, repetition=repetition(made))
@@ -181,7 +181,7 @@ class PhaseKernel:
         ValueError
             The image has another size than the reference or values that are not finite, or the start another grid.
         """
-        FORK_GUARD.check()
+        FORK_CHECK.check()
         reference = self.reference
         later = start is not None and not reference.cleaned  # when the image is filtered
         image = as_recorded(deformed, "the deformed image", any_values=later)
@@ -252,7 +252,7 @@ def check_machine(settings: KernelSettings, size: int) -> None:
     MachineError
         Motion or strain is out of limits. The message names what is wrong, and the libraries.
     """
-    FORK_GUARD.check()
+    FORK_CHECK.check()
     check(
         _measure_known,
         SelfTestCase(settings.window, settings.estimator, settings.order, settings.interpolant, size),

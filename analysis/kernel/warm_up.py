@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.forked import FORK_GUARD
+from analysis.compiled.forked import FORK_CHECK
 from analysis.field import Motion, Roi, Status, StrainField, ZoiGrid, profile
 from analysis.kernel.images import as_image
 from analysis.picture.splines import Box
@@ -215,7 +215,7 @@ def _rest() -> None:
 
     _gauges()
     image, grid = _small()
-    FORK_GUARD.check()
+    FORK_CHECK.check()
     # No PhaseKernel: its self-test would compile the iteration.
     reference = ReferencePicture.first(as_image(image, "the pattern"), grid, KernelSettings(), None, None)
     reference.searched(image)

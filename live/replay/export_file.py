@@ -130,7 +130,7 @@ class _Reader:
         if not self._unit:
             self._unit = "N"
             self._remarks.append(
-                "the force has no unit: taken as newtons; if it is another, give --load-unit kN"
+                Message("the force has no unit: taken as newtons; if it is another, give --load-unit kN")
             )
         newtons, seconds = newtons_of(self._unit), seconds_per(self._time_unit or "s")
         if newtons is None:
@@ -357,9 +357,9 @@ class _Reader:
         """What the times count from, with remarks on what was assumed and left out."""
         add = self._remarks.append
         if self._n_texts:
-            add(f"{counted(self._n_texts, 'line')} of text left out")
+            add(Message("{lines} of text left out", counted(self._n_texts, "line")))
         if self._n_unread or self._other:
-            add(f"{self._other}: its {counted(self._n_unread, 'row')} are not read")
+            add(Message("{table}: its {rows} are not read", self._other, counted(self._n_unread, "row")))
         if times is None:
             return ""
         if self._is_clock:
@@ -367,23 +367,21 @@ class _Reader:
         if times[0] > _UNIX_S:
             return "unix"
         if not self._time_unit and not self._table.is_ours:
-            add("the times have no unit: taken as seconds; if it is another, give --load-unit N,ms")
+            add(Message("the times have no unit: taken as seconds; if it is another, give --load-unit N,ms"))
         return ""
 
     def _taken(self, forces: Array, clock: str) -> str:
-        t = self._table
-        low, high = _shown(np.nanmin(forces)), _shown(np.nanmax(forces))
+        t, low, high = self._table, _shown(np.nanmin(forces)), _shown(np.nanmax(forces))
         plain = "h:min:s" if self._is_clock else self._time_unit or "s"
-        kind = (
-            ""
-            if t.by_name
-            else f" ({ {'clock': 'times of the day', 'unix': 'Unix times'}.get(clock, plain) })"
-        )
-        against = f" against {t.name(t.key)}{kind}" if t.key is not None else ""
-        return (
-            f"column {t.name(t.force)}, {self._unit}, {grouped(len(forces))} rows, {low} to {high} N{against};"
-            f" {t.form}, decimal {self._decimal}"
-        )
+        kind = {"clock": Message("times of the day"), "unix": Message("Unix times")}.get(clock, plain)
+        key = t.name(t.key) if t.key is not None else ""
+        with_kind = Message(" against {column} ({kind})", key, kind)
+        against = "" if t.key is None else Message(" against {column}", key) if t.by_name else with_kind
+        return Message(
+            "column {column}, {unit}, {n} rows, {low} to {high} N{against}; {form}, decimal {mark}",
+            t.name(t.force), self._unit, grouped(len(forces)), low, high, against, t.form,
+            Message("comma") if self._decimal == "comma" else Message("point"),
+        )  # fmt: skip
 
 
 def _shown(force: float) -> str:

@@ -13,6 +13,7 @@ from typing import BinaryIO
 
 from acquire.errors import DataError
 from acquire.text import Message
+from acquire.text.message import joined
 from acquire.text.printable import counted
 from live.config.sections import LoadConfig
 from live.replay.export_headings import (
@@ -26,7 +27,10 @@ from live.replay.export_headings import (
 from live.replay.export_numbers import EMPTY, NUMBERISH, is_value
 from live.replay.export_text import HEAD, Rows, encoding_of, lines_of, split_rows
 
-_SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", "  ": "blanks", " ": "blanks"}
+_SEPARATORS = {
+    "\t": Message("tabs"), ";": Message("semicolons"), "|": Message("bars"), ",": Message("commas"),
+    "  ": Message("blanks"), " ": Message("blanks"),
+}  # fmt: skip
 _BETWEEN = 5  # lines of text and blanks between a heading and its rows, at most
 _SHORT = {"file", "time", "time_s", "t", "force", "F"}
 """Our own headings; with them a force without a unit is in newtons."""
@@ -78,7 +82,7 @@ class Table:
     @property
     def form(self) -> str:
         """Encoding and separator for a person."""
-        return f"{self.encoding.upper().removesuffix('-SIG')}, {_SEPARATORS[self.separator]}"
+        return joined(", ", (self.encoding.upper().removesuffix("-SIG"), _SEPARATORS[self.separator]))
 
 
 def cell_of(row: Sequence[str], column: int | None) -> str:

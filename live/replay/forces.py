@@ -22,6 +22,7 @@ from acquire.files.picture import MAX_BYTES, check_regular
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from acquire.text import Message
+from acquire.text.message import about
 from acquire.text.printable import counted
 from live.config.sections import LoadConfig
 from live.replay.export_file import Export, read_export
@@ -86,7 +87,7 @@ class PlacedForces:
             return self
         log = self.log(load)
         known = sum(math.isfinite(log.force_at(t)) for t in times.tolist())
-        words = f"{known} of {len(times)} pictures have a force"
+        words = Message("{n} of {all} pictures have a force", known, len(times))
         if not known:
             start = float(times[0])
             own, theirs = (
@@ -101,7 +102,7 @@ class PlacedForces:
             )
         if known > (1 - _SHARE) * len(times):
             return dataclasses.replace(self, remarks=(words, *self.remarks))
-        return dataclasses.replace(self, doubts=(f"{where}: {words}", *self.doubts))
+        return dataclasses.replace(self, doubts=(about(where, words), *self.doubts))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,7 +152,7 @@ class ForceTable:
                 len(e.forces),
                 len(pictures),
             )
-        remark = "no times and no names: row k is taken as the force of picture k"
+        remark = Message("no times and no names: row k is taken as the force of picture k")
         return PlacedForces(np.array(list(pictures.values())), e.forces, True, (remark, *e.remarks))
 
     def _at_times(
@@ -170,7 +171,7 @@ class ForceTable:
         elif e.clock and not (e.clock == "unix" and first > _UNIX_S):
             origin = first - float(times[0])
             remarks = (
-                "the pictures have no such times: the first row is taken as the first picture",
+                Message("the pictures have no such times: the first row is taken as the first picture"),
                 *remarks,
             )
         return PlacedForces(times + origin, e.forces, False, remarks)
@@ -193,16 +194,20 @@ class ForceTable:
                 repr(names[0]),
                 repr(next(iter(pictures), "")),
             )
-        words = f"{len(lost)} of {len(names)} names are that of no picture: {', '.join(map(repr, lost[:3]))}"
+        some = ", ".join(map(repr, lost[:3]))
+        words = Message("{n} of {all} names are that of no picture: {some}", len(lost), len(names), some)
         forces = [known.get(name, known.get(Path(name).stem, math.nan)) for name in pictures]
-        below = (f"{counted(len(footer), 'line')} below the names left out: {footer[0]!r}",) if footer else ()
+        left = counted(len(footer), "line")
+        below = (
+            [Message("{lines} below the names left out: {first}", left, repr(footer[0]))] if footer else []
+        )
         doubtful = len(lost) >= _SHARE * len(names)
         return PlacedForces(
             np.array(list(pictures.values())),
             np.array(forces),
             True,
             (*((words,) if lost and not doubtful else ()), *below, *self.export.remarks),
-            (f"{self.path.name}: {words}",) if doubtful else (),
+            (about(self.path.name, words),) if doubtful else (),
         )
 
 

@@ -21,6 +21,7 @@ from acquire.files.order import masks
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
 from acquire.opencv.images import picture_names
+from acquire.text import Message
 from acquire.text.printable import counted
 from live.config.loading import Config
 from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Window
@@ -67,16 +68,17 @@ def reference_words(
     """The first line of a replay: the reference, the last picture (number ``last``) and how many there are."""
 
     def name(index: int) -> str:
-        return names[index] if names else f"frame {index + 1}"
+        return names[index] if names else Message("frame {n}", index + 1)
 
     first = name(reference.first_index)
     if request.reference is not None:
-        first = f"{Path(request.reference).name} (as given)"
+        first = Message("{name} (as given)", Path(request.reference).name)
     elif reference.last_index > reference.first_index:
-        first += f" to {name(reference.last_index)} (mean of {reference.n})"
+        first = Message("{first} to {last} (mean of {n})", first, name(reference.last_index), reference.n)
     if not count:
-        return f"reference {first}"
-    return f"reference {first}, last {name(count - 1 if last is None else last)}, {counted(count, 'picture')}"
+        return Message("reference {first}", first)
+    newest = name(count - 1 if last is None else last)
+    return Message("reference {first}, last {last}, {pictures}", first, newest, counted(count, "picture"))
 
 
 def with_reference(request: ReplayRequest) -> ReplayRequest:

@@ -25,6 +25,7 @@ from acquire.frame import Burst, Frame
 from acquire.hdf5 import FolderWatch
 from acquire.opencv.images import picture_times
 from acquire.text import Message
+from acquire.text.message import about, joined
 from acquire.text.printable import counted
 from acquire.text.quantity import Amount
 from live.config.loading import Config, load_config
@@ -138,7 +139,7 @@ def _with_forces(
     placed = table.placed(pictures, source.start, recorded=source.count is None)
     times = source.times if pictures is None else np.array([*pictures.values()])
     placed = placed.at_pictures(str(request.forces), config.load, times)
-    screen.print("; ".join([f"{request.forces.name}: {table.export.taken}", *placed.remarks]))
+    screen.print(joined("; ", (about(request.forces.name, table.export.taken), *placed.remarks)))
     return replace(source, samples=placed.samples(), loads=placed.log(config.load), doubts=placed.doubts)
 
 

@@ -124,7 +124,7 @@ def summary_lines(run_state: RunState, test: FinishedTest) -> list[str]:
     lines += sharpness_line(history.column("blur").tolist(), history.column("sigma_blur").tolist())
     found = findings(test)
     lines += [*latency_lines(history), *film_line(specimen), checks_line(found), *look_lines(found)]
-    figures = [*test.cycles.lines(), *test.response, *figure_lines(test.figures, specimen)]
+    figures = [*test.longer, *figure_lines(test.figures, specimen)]
     if figures:
         figures += tare_line(history, run_state.loads) + lag_line(history, run_state.loads, specimen)
     return lines + figures + alignment_line(history, specimen)

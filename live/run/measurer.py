@@ -145,10 +145,10 @@ def _or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-class SmearGuard:
+class SmearWatch:
     """Checks the motion during each measured burst; an event when smear begins and when it ends.
 
-    ReferenceMotion v during T multiplies the contrast at wave number k by |sinc(k v T / 2)|: negligible up to
+    A motion v during T multiplies the contrast at wave number k by |sinc(k v T / 2)|: negligible up to
     0.05 px. The motion is estimated with each burst (``acquire.burst.accumulate``).
 
     Parameters
@@ -266,7 +266,7 @@ class Measurer:
 
     def _measure(self, ready: PreparedKernel) -> None:
         event_log = self._run_state.event_log
-        guard = SmearGuard(event_log.record)
+        guard = SmearWatch(event_log.record)
         failures = BurstFailures(self._run_state, self._prepared.folder)
 
         def failed(number: int, item: Burst | NewReference, error: Exception) -> None:

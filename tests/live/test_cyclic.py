@@ -21,12 +21,19 @@ from live.config.sections import AlarmConfig
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import ActiveAlarms
+from live.results import Results, ResultsInfo
+from live.results.finished.creep import creep_figures
+from live.results.finished.finished_test import FinishedTest
+from live.results.report.report import ReportRequest, make_report
 from live.results.run_folder import open_run
 from live.run.alarms import Alarm, AlarmWatch, check_alarms
 from live.run.live_run import LiveRun
 from live.run.outcome import Outcome
 from live.setup.devices import at_rest
+from live.ui.terminal.screen import TerminalScreen
 from live.ui.web.run_result import run_result
+from tests.live.made_run import CONFIG, UTC_START
+from tests.live.made_up import CAMERA, START, make_grid, make_measurement
 from tests.live.test_end_to_end import live_run
 
 N, FALL, E = 8, 0.1, 70e9
@@ -168,3 +175,28 @@ def test_a_look_at_the_rig_begins_no_cycles() -> None:
 
     specimen = specimen_from(parse_address(at_rest(SIM)))
     assert specimen.duration_s == 3600 and not specimen.force(np.arange(0, 100, 0.1)).any()
+
+
+def test_a_held_force_has_its_creep_in_figures_and_report(tmp_path: Path) -> None:
+    rng, area = np.random.default_rng(0), 20e-6
+    info = ResultsInfo(START, UTC_START.isoformat(), CONFIG, {}, {}, CAMERA, "small", area)
+    with Results(tmp_path, make_grid(), info) as results:
+        for k in range(600):
+            held = max(0.1 * k - 5, 0.0)
+            stress = 1e8 * min(0.1 * k / 5, 1)
+            strain = stress / 70e9 + 1e-4 * np.log1p(held) + rng.normal(0, 3e-6)
+            results.add(make_measurement(k, strain, force=stress * area + rng.normal(0, 0.5)))
+    with open_run(tmp_path) as run:
+        test = FinishedTest.of_folder(run)
+        assert test.creep is not None
+        figures = {name: figure for name, figure, _ in creep_figures(test.creep)}
+        half, end = 27.5, 55.0
+        true = 1e-4 * np.log((end + 0.9) / (half + 0.9)) / (end - half)
+        assert figures["creep rate"].low < true < figures["creep rate"].high
+        assert figures["time to a strain of 0.0018"].value == pytest.approx(40.3, abs=1)
+        (line,) = test.longer
+        assert line.startswith("100 MPa held from 4.") and "µm/m/s" in line and "µm/m after" in line
+        html = make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html
+    part = html.partition("<h2>Creep</h2>")[2].partition("</section>")[0]
+    assert "<polyline" in part or "<path" in part
+    assert "mean strain rate" in part and "power of 10" in part

@@ -33,7 +33,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for kind in KINDS:
         camera = SIM.format(kind)
         words = ["run", "--camera", camera, "--load", "sim:", *MEASURE, *QUIET, "--out", str(folder / kind)]
-        assert main(words) == 0
+        assert main([*words, *(("--response", "stress") if kind == "halves" else ())]) == 0
     return folder
 
 
@@ -100,6 +100,16 @@ def test_two_halves_leave_one_after_the_other(run: RunFolder) -> None:
     assert np.isfinite(first).all() and np.isfinite(second).mean() > 0.9
     assert np.median(first) == pytest.approx(120, abs=4) and first.min() > 114
     assert np.nanmedian(second) == pytest.approx(160, abs=5) and np.nanmin(second) > 154
+
+
+def test_a_run_has_the_response_of_its_replay(recorded: Path, replayed: Path) -> None:
+    with open_run(recorded / "halves") as own, open_run(replayed / "halves") as again:
+        found, other = response_in(own), response_in(again)
+        assert found.names == other.names and found.instants == other.instants
+        for name in found.names:
+            np.testing.assert_allclose(found.map(name), other.map(name), rtol=1e-5, err_msg=name)
+    figures = json.loads((recorded / "halves" / "figures.json").read_text())["figures"]
+    assert "compliance of the places" in {one["name"] for one in figures}
 
 
 @pytest.mark.parametrize("run", ["hole"], indirect=True)

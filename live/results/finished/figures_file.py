@@ -19,6 +19,7 @@ from live.config.loading import Config
 from live.config.new_files import new_file
 from live.pipeline.run_state import RunState
 from live.results.figures import tensile_table
+from live.results.finished.creep import creep_figures
 from live.results.finished.findings import DataCheck, findings
 from live.results.finished.finished_test import FinishedTest
 from live.results.response.evaluate import response_of
@@ -165,7 +166,7 @@ def _figures(test: FinishedTest) -> Iterator[dict[str, Any]]:
             if _SI.get(row.unit) == "Pa":
                 yield _row(row.name, Figure.none(_NO_SECTION), "Pa")
     yield _row("lag", test.lag, "s")
-    for name, figure, unit in test.cycles.figures():
+    for name, figure, unit in (*test.cycles.figures(), *creep_figures(test.creep)):
         yield _row(name, figure, unit)
     for name, value in test.at_end.items():
         figure = Figure.about(value.value, value.sigma) if not value.reason else Figure.none(value.reason)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,10 +22,12 @@ from analysis.evaluate import (
     evaluate_test,
     find_lag,
 )
+from analysis.evaluate.creep import Creep
 from live.config.sections import SpecimenConfig
 from live.pipeline.measurement import AXIAL, TimeStep, mean_width
 from live.pipeline.run_state import RunState
 from live.results.figures import lag_of, tensile_options
+from live.results.finished.creep import creep_lines
 from live.results.finished.cycles import Cycles
 from live.results.run_folder import RunFolder
 
@@ -59,6 +61,8 @@ class FinishedTest:
         Strains of the region (``REGION``) and of the gauges (``gauge NAME``) in the last burst.
     cycles : Cycles
         None where the test is not cyclic.
+    creep : Creep or None
+        Where the force is held.
     response : tuple of str
         What was found of the response of the places, in words; empty where none was wanted.
     """
@@ -74,6 +78,7 @@ class FinishedTest:
     gauge: Mapping[str, Any] = field(default_factory=dict)
     at_end: Mapping[str, GaugeValue] = field(default_factory=dict)
     cycles: Cycles = field(default_factory=Cycles.none)
+    creep: Creep | None = None
     response: tuple[str, ...] = ()
 
     @classmethod
@@ -106,6 +111,7 @@ class FinishedTest:
             gauges.get(AXIAL, {}),
             strains_at_end(history.time_steps[-1]) if len(history.time_steps) else {},
             Cycles.of(curve, strain, width, Track(t - loads.lag_s, force), specimen.area_m2, start_t),
+            Creep.of(replace(curve, t=curve.t - start_t), specimen.test),
         )
 
     @classmethod
@@ -132,12 +138,19 @@ class FinishedTest:
             run.gauges[AXIAL].described if AXIAL in run.gauges else {},
             _stored_at_end(run),
             Cycles.of(run.curve, run.axial_strain, width, one_zero, run.specimen.area_m2),
+            Creep.of(run.curve, run.specimen.test),
         )
 
     @property
     def force(self) -> NDArray[np.float64]:
         """Force at each instant, (T,) N."""
         return self.curve.stress * (self.specimen.area_m2 or 1.0)
+
+    @property
+    def longer(self) -> list[str]:
+        """What a person reads of its cycles or its creep, and of the response of its places."""
+        creep = creep_lines(self.creep, stresses=self.specimen.area_m2 is not None)
+        return [*self.cycles.lines(), *creep, *self.response]
 
     @property
     def has_force(self) -> bool:

@@ -11,11 +11,20 @@ from analysis.evaluate import TensileFigures
 from live.config.cameras import BACK, FRONT
 from live.pipeline.measurement import AXIAL
 from live.results.figures import headline
-from live.results.report.curves import TIME, axial_label, force_unit, load_labels, strain_label, strain_unit
+from live.results.maps.colours import Unit
+from live.results.report.curves import (
+    TIME,
+    axial_label,
+    force_unit,
+    load_labels,
+    plots,
+    strain_label,
+    strain_unit,
+)
 from live.results.report.evaluation import EvaluatedCurve, intercept_of
 from live.results.report.page import Html, element, page, paragraph, section, table
-from live.results.report.report import Report, budget_table, plots
-from live.results.report.svg import COLOURS, Plot, PlotLine
+from live.results.report.report import Report, budget_table
+from live.results.report.svg import COLOURS, Array, Plot, PlotLine
 from live.results.run_folder import RunFolder
 from live.results.sides.together import SidesOfTest, at_end
 
@@ -70,10 +79,16 @@ def _of_sides(runs: Mapping[str, RunFolder], stresses: bool) -> _Parts:
     front = runs[FRONT]
     sides = SidesOfTest.of_folders(front, runs[BACK])
     budget = budget_table(front, _evaluated(sides, stresses), both_sides=True)
+    means = {name: (one.t, one.mean, one.sigma) for name, one in sides.courses.items()}
+    bending = {name: (one.t, one.bending, one.sigma) for name, one in sides.courses.items()}
     return (
         Message("{title}: front and back", front.title),
         Message("Test of {start}. {alike}", front.strain.start_utc, ALIKE),
-        (_stress_strain(sides, stresses), _over_time(sides, "mean"), _over_time(sides, "bending")),
+        (
+            _stress_strain(sides, stresses),
+            _over_time("mean-time", Message("Mean of front and back"), means),
+            _over_time("bending-time", Message("Front minus mean"), bending),
+        ),
         sides.figures,
         [
             section(Message("Strains at the end"), _strains(sides)),
@@ -86,20 +101,14 @@ def _of_fields(runs: Mapping[str, RunFolder], stresses: bool) -> _Parts:
     """Several fields of view, each with its own strains."""
     first = next(iter(runs.values()))
     curves = {name: EvaluatedCurve.of(run) for name, run in runs.items()}
-    e = strain_unit(*(curve.axial for curve in curves.values()))
-    lines = tuple(
-        PlotLine(
-            Message("{side}", name),
-            np.asarray(runs[name].strain.time_s, np.float64),
-            curve.axial * e.factor,
-            colour=k,
-        )
-        for k, (name, curve) in enumerate(curves.items())
-    )
+    axial: dict[str, tuple[Array, Array, None]] = {
+        Message("{side}", name): (np.asarray(runs[name].strain.time_s, np.float64), curve.axial, None)
+        for name, curve in curves.items()
+    }
     return (
         Message("{title}: {n} fields of view", first.title, len(runs)),
         Message("Test of {start}, with one load cell and one clock.", first.strain.start_utc),
-        (Plot("strain-time", Message("Strain along the load"), TIME, strain_label(e), lines),),
+        (_over_time("strain-time", Message("Strain along the load"), axial),),
         {name: curve.figures for name, curve in curves.items()},
         [
             section(Message("Budget of E, {name}", name), *budget_table(runs[name], curve))
@@ -123,33 +132,25 @@ def _strains(sides: SidesOfTest) -> Html:
     return table(heads, rows, (1, 2, 3))
 
 
-def _over_time(sides: SidesOfTest, part: str) -> Plot:
-    found = {name: getattr(one, part) for name, one in sides.courses.items()}
-    e = strain_unit(*found.values())
+def _over_time(name: str, title: str, courses: Mapping[str, tuple[Array, Array, Array | None]]) -> Plot:
+    """Strains over time by their labels: time, value, and sigma where it is shown, each (N,)."""
+    e = strain_unit(*(strain for _, strain, _ in courses.values()))
     lines = tuple(
-        PlotLine(
-            name, sides.courses[name].t, value * e.factor, sides.courses[name].sigma * e.factor, k % COLOURS
-        )
-        for k, (name, value) in enumerate(found.items())
+        PlotLine(label, t, strain * e.factor, None if sigma is None else sigma * e.factor, k % COLOURS)
+        for k, (label, (t, strain, sigma)) in enumerate(courses.items())
     )
-    title = Message("Mean of front and back") if part == "mean" else Message("Front minus mean")
-    return Plot(f"{part}-time", title, TIME, strain_label(e), lines)
+    return Plot(name, title, TIME, strain_label(e), lines)
 
 
 def _stress_strain(sides: SidesOfTest, stresses: bool) -> Plot:
     """The load over the axial strain of each side and of the mean, at the instants of the front."""
     axial, load = sides.courses[AXIAL], sides.curve.stress
-    name, factor = ("MPa", 1e-6) if stresses else _force(load)
+    unit = Unit("MPa", 1e-6) if stresses else force_unit(load)
     strains = {"mean": axial.mean, "front": axial.mean + axial.bending, "back": axial.mean - axial.bending}
     e = strain_unit(*strains.values())
     lines = tuple(
-        PlotLine(Message("{side}", side), strain * e.factor, load * factor, colour=k)
+        PlotLine(Message("{side}", side), strain * e.factor, load * unit.factor, colour=k)
         for k, (side, strain) in enumerate(strains.items())
     )
-    title, up = load_labels(name, stresses=stresses)
+    title, up = load_labels(unit.name, stresses=stresses)
     return Plot("stress-strain", title, axial_label(e), up, lines)
-
-
-def _force(load: np.ndarray) -> tuple[str, float]:
-    unit = force_unit(load)
-    return unit.name, unit.factor

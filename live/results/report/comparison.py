@@ -13,10 +13,10 @@ from acquire.errors import ConfigError, DataError
 from acquire.text import Message
 from analysis.evaluate import CONFIDENCE
 from live.results.figures import NOT_KNOWN, TensileRow, figure_text, headline
-from live.results.report.curves import axial_label, load_labels, load_unit, strain_unit
+from live.results.report.curves import axial_label, load_labels, load_unit, plots, strain_unit
 from live.results.report.evaluation import EvaluatedCurve
 from live.results.report.page import Html, element, joined, page, paragraph, safe, section, table
-from live.results.report.report import Report, plots
+from live.results.report.report import Report
 from live.results.report.svg import Plot, PlotLine
 from live.results.run_folder import RunFolder
 from live.words.language import told

@@ -10,11 +10,14 @@ from acquire.text import Message
 from acquire.text.message import joined
 from acquire.text.quantity import unit_of
 from analysis.evaluate import true_curve
+from analysis.evaluate.creep import Creep
 from live.config.figures import FIGURES
 from live.config.gauges import gauge_colours
 from live.results.maps.colours import Unit, unit_for
 from live.results.report.evaluation import EvaluatedCurve
-from live.results.report.svg import Array, Mark, Plot, PlotLine
+from live.results.report.page import Html, captioned, element
+from live.results.report.page import joined as joined_html
+from live.results.report.svg import Array, Mark, Plot, PlotLine, draw
 from live.results.run_folder import RunFolder
 
 _NAMES = ("exx", "eyy", "exy")
@@ -193,3 +196,19 @@ def time_range(run: RunFolder) -> tuple[float, float]:
     t = run.strain.time_s
     first, last = float(min(0.0, t[0])), float(t[-1])
     return (first, last) if last > first else (first, first + 1.0)
+
+
+def creep_plot(found: Creep) -> Plot:
+    """Strain over the logarithm of the time since the force is held."""
+    e, axis = strain_unit(found.strain), Message("time since the force is held, power of 10 of 1 s")
+    line = PlotLine("", np.log10(found.t), found.strain * e.factor)
+    return Plot("creep", Message("Strain of the hold"), axis, strain_label(e), (line,))
+
+
+def plots(figures: tuple[Plot, ...]) -> Html:
+    """Plots side by side, as many as the width allows."""
+    found = [
+        captioned(Html(draw(figure).replace("<svg ", '<svg class="plot" ', 1)), figure.title)
+        for figure in figures
+    ]
+    return element("div", joined_html(found), class_="plots")

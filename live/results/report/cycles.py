@@ -1,4 +1,4 @@
-"""The section of a cyclic test: the figures of its cycles against their number, on a logarithmic axis."""
+"""The sections of cyclic tests, figures of cycles against the logarithm of their number, and of a creep."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from acquire.text import Message
 from acquire.text.message import joined
 from acquire.text.quantity import Amount
 from live.results.finished.cycles import FILE, Cycles
-from live.results.report.curves import force_unit, strain_unit
-from live.results.report.page import Html, paragraph, table
+from live.results.finished.finished_test import FinishedTest
+from live.results.report.curves import creep_plot, force_unit, plots, strain_unit
+from live.results.report.page import Html, paragraph, section, table
+from live.results.report.page import joined as joined_html
 from live.results.report.svg import Plot, PlotLine
 
 _ROWS = 12  # of the table
@@ -19,6 +21,16 @@ _HEADS = (
     Message("cycle"), Message("peak, valley of the force"), Message("range of the strain"), Message("secant modulus"),
     Message("loop area"), Message("phase"),
 )  # fmt: skip
+
+
+def long_sections(test: FinishedTest) -> Html:
+    """The section of the cycles, or of the creep, of a test that has them."""
+    found, creep = [], test.creep
+    if test.cycles.any:
+        found.append(section(Message("Cycles"), plots(cycle_plots(test.cycles)), *cycle_table(test.cycles)))
+    if creep is not None and len(creep.t):
+        found.append(section(Message("Creep"), plots((creep_plot(creep),)), *map(paragraph, test.longer[:1])))
+    return joined_html(found)
 
 
 def cycle_plots(cycles: Cycles) -> tuple[Plot, ...]:

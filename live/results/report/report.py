@@ -33,7 +33,7 @@ from live.results.finished.figures_file import finished_in
 from live.results.finished.findings import NO_FORCE, doubts, findings
 from live.results.finished.finished_test import FinishedTest
 from live.results.report import curves, record
-from live.results.report.cycles import cycle_plots, cycle_table
+from live.results.report.cycles import long_sections
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
 from live.results.report.maps import MapPictures, map_pictures, maps, statuses, whole_maps
 from live.results.report.noise_floor import StillPhase, still_phase_of
@@ -41,7 +41,6 @@ from live.results.report.page import (
     Html,
     Shown,
     band,
-    captioned,
     element,
     facts,
     fold,
@@ -53,7 +52,7 @@ from live.results.report.page import (
     tiles,
 )
 from live.results.report.practice import PracticeValues, reporting_table
-from live.results.report.svg import Plot, draw
+from live.results.report.svg import Plot
 from live.results.row import LENS
 from live.results.run_folder import RunFolder
 from live.words.language import of_terminal, told
@@ -150,11 +149,11 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
     return [
         _head(run, content.curve, content.test),
         section(Message("Specimen and rig"), facts(_rig(run, pictures))),
-        section(Message("Curves"), plots(content.figures), _about_parts(run), _about_curves(content.curve)),
+        section(
+            Message("Curves"), curves.plots(content.figures), _about_parts(run), _about_curves(content.curve)
+        ),
         section(Message("Figures of the test"), *figure_table(run, content.curve)),
-        section(Message("Cycles"), plots(cycle_plots(content.test.cycles)), *cycle_table(content.test.cycles))
-        if content.test.cycles.any
-        else Html(""),
+        long_sections(content.test),
         section(Message("Budget of E"), *budget_table(run, content.curve)),
         section(Message("Virtual gauges"), record.gauges(run)),
         section(Message("Lag and latency"), record.times(run, content.test)),
@@ -283,15 +282,6 @@ def _rig(run: RunFolder, pictures: MapPictures) -> dict[str, object]:
         Amount("count", grid.n_active), grid.size, grid.step, grid.roi.text,
     )  # fmt: skip
     return found
-
-
-def plots(figures: tuple[Plot, ...]) -> Html:
-    """Plots side by side, as many as the width allows."""
-    found = [
-        captioned(Html(draw(figure).replace("<svg ", '<svg class="plot" ', 1)), figure.title)
-        for figure in figures
-    ]
-    return element("div", joined(found), class_="plots")
 
 
 def _about_parts(run: RunFolder) -> Html:

@@ -199,7 +199,7 @@ def _look(curve: PlotLine) -> str:
 
 
 def _line(curve: PlotLine, axes: _Axes) -> Iterator[str]:
-    chosen = _thinned(curve.y)
+    chosen = _thinned(curve.x, curve.y)
     x, y = axes.across(curve.x[chosen]), axes.down(curve.y[chosen])
     if curve.sigma is not None:
         low, high = (axes.down(curve.y[chosen] + side * curve.sigma[chosen]) for side in (-1, 1))
@@ -226,12 +226,14 @@ def _band(x: Array, low: Array, high: Array, colour: int) -> str:
     return f'<polygon class="band f{colour}" points="{" ".join(forth + back)}"/>' if forth else ""
 
 
-def _thinned(y: Array) -> NDArray[np.intp]:
-    """Indices that keep the extremes of each interval, so that no spike is lost."""
+def _thinned(x: Array, y: Array) -> NDArray[np.intp]:
+    """Indices that keep the extremes of each interval of ``x``, or of equal numbers where it goes back."""
     n = len(y)
     if n <= MAX_POINTS:
         return np.arange(n)
     edges = np.linspace(0, n, MAX_POINTS // 2 + 1).astype(int)
+    if np.all(np.diff(x) > 0):
+        edges = np.unique(np.append(np.searchsorted(x, np.linspace(x[0], x[-1], len(edges))), n))
     filled = np.nan_to_num(y, nan=0.0)
     found = {0, n - 1, *np.flatnonzero(~np.isfinite(y))[:MAX_POINTS].tolist()}
     for a, b in pairwise(edges):

@@ -91,8 +91,8 @@ def _ranked(run_state: RunState, test: FinishedTest) -> list[Ranked]:
         (1, look_lines(found)),
         (0, _figures(run_state, test)),
         (2, test.figures.notes if test.has_force else ()),
-        (0, test.cycles.lines()),
-        (2, test.response),
+        (0, test.longer[:1]),
+        (2, test.longer[1:]),
         (2, _remarks(run_state, test)),
     )
     ranks: dict[str, int] = {}

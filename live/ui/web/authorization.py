@@ -33,7 +33,7 @@ class HttpError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class RequestGuard:
+class RequestCheck:
     """Checks requests to ``http://127.0.0.1:port``.
 
     Attributes

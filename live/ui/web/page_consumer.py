@@ -84,10 +84,10 @@ class PageConsumer(Consumer):
     now : callable giving monotonic seconds
     picture : bytes
         Shown until there is one of the run, as JPEG.
-    kind : str
-        Of its messages.
     side : str
-        The name of the camera; empty where there is only one.
+        The name of the camera, which its messages carry; empty where there is only one.
+    cameras : int
+        How many share the time for drawing.
 
     Attributes
     ----------
@@ -109,10 +109,10 @@ class PageConsumer(Consumer):
         config: Config,
         now: Callable[[], float] = time.monotonic,
         picture: bytes = b"",
-        kind: str = "run",
         side: str = "",
+        cameras: int = 1,
     ) -> None:
-        self._kind, self._side = kind, side
+        self._kind, self._side, self._sharing = f"run {side}".strip(), side, cameras
         self._broadcaster, self._config, self._now = broadcaster, config, now
         self.map = MapView(config)
         names = list(config.gauges) or ["exx", "eyy", "exy"]
@@ -207,8 +207,9 @@ class PageConsumer(Consumer):
             self._broadcaster.publish(self._kind, self.state())
         if now >= self._due["picture"] and self._fresh and self._broadcaster.open_pages:
             self._draw()
-            # Drawing takes at most a fifth of the time, also with large pictures.
-            self._due["picture"] = max(now + PICTURE_S, self._now() + 4 * (self._now() - now))
+            # Drawing takes at most a fifth of the time, also with large pictures and of several cameras together.
+            rest = (5 * self._sharing - 1) * (self._now() - now)
+            self._due["picture"] = max(now + PICTURE_S, self._now() + rest)
         return STATE_S
 
     def end(self) -> str:

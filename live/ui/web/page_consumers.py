@@ -34,7 +34,7 @@ class PageConsumers:
     ) -> None:
         self.by_name = {
             name: PageConsumer(
-                broadcaster, config, picture=pictures.get(name, b""), kind=f"run {name}".strip(), side=name
+                broadcaster, config, picture=pictures.get(name, b""), side=name, cameras=len(configs)
             )
             for name, config in configs.items()
         }

@@ -17,6 +17,7 @@ from live.pipeline.event_log import sentence
 from live.pipeline.run_state import RunState
 from live.results.figures import TensileRow, beyond_scatter, headline, tensile_table
 from live.results.finished.belief import belief
+from live.results.finished.creep import creep_lines
 from live.results.finished.cycles import shown_figures
 from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
@@ -49,10 +50,14 @@ def run_result(run_state: RunState, test: FinishedTest, folder: Path, words: str
     troubles = doubts(findings(test)) if measured else []
     troubles += [sentence(event, log.names) for event in log.events("warning", "error")][-MAX_TROUBLES:]
     figures = test.figures if measured else None
+    lines = creep_lines(test.creep, stresses=specimen.area_m2 is not None)
+    creep = [{"name": Message("creep"), "text": line, "words": True} for line in lines]
     return {
         "folder": str(folder),
         "words": words,
-        "figures": [] if figures is None else [*_figures(figures, specimen), *shown_figures(test.cycles)],
+        "figures": []
+        if figures is None
+        else [*_figures(figures, specimen), *shown_figures(test.cycles), *creep],
         "belief": None if figures is None else _belief(figures, specimen, troubles),
         "lines": [] if figures is None else list(_lines(run_state, specimen, figures)),
         "ledger": run_state.frame_counts.line(),

@@ -1,6 +1,6 @@
 """The HTTP server of the page: the one of the standard library, on 127.0.0.1 alone, a thread for each request.
 
-A page sends few requests; the messages to it are server-sent events (``broadcaster``). ``guard`` checks every
+A page sends few requests; the messages to it are server-sent events (``broadcaster``). ``access`` checks every
 request before anything is done. Every response has a policy that limits what the browser may do with it.
 """
 
@@ -25,7 +25,7 @@ from acquire.errors import DeviceError
 from acquire.system import lower_priority
 from live.config.listen_address import listening_socket
 from live.pipeline.latency import OUTPUT
-from live.ui.web.authorization import HttpError, RequestGuard
+from live.ui.web.authorization import HttpError, RequestCheck
 from live.ui.web.broadcaster import Broadcaster, json_bytes
 from live.words.language import LANGUAGES, entries
 
@@ -130,7 +130,7 @@ class PageServer:
 
     Attributes
     ----------
-    guard : RequestGuard
+    access : RequestCheck
 
     Raises
     ------
@@ -148,7 +148,7 @@ class PageServer:
         self.broadcaster, self.gets, self.posts = broadcaster, gets, posts
         self._closed = threading.Event()
         self._server = _open_server(port)
-        self.guard = RequestGuard(self._server.server_address[1], secrets.token_urlsafe(24))
+        self.access = RequestCheck(self._server.server_address[1], secrets.token_urlsafe(24))
         self._server.page = self
         self._threads = [
             threading.Thread(target=self._server.serve_forever, args=(0.2,), name="page", daemon=True),
@@ -160,7 +160,7 @@ class PageServer:
     @property
     def address(self) -> str:
         """The address that a person opens in a browser."""
-        return self.guard.address
+        return self.access.address
 
     def close(self) -> None:
         """Disconnect all pages and release the port."""
@@ -274,7 +274,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _checked(self, step: Callable[[], None]) -> None:
         try:
-            self.server.page.guard.check_host(self.headers)
+            self.server.page.access.check_host(self.headers)
             step()
         except HttpError as refused:
             self._refuse(refused.reason, refused.status)
@@ -295,7 +295,7 @@ class _Handler(BaseHTTPRequestHandler):
         if parts.path == "/" and "token" in query:
             self._log_in(query["token"])
             return
-        page.guard.check_cookie(self.headers)
+        page.access.check_cookie(self.headers)
         if parts.path == "/events":
             self._events(page.broadcaster)
         elif parts.path in page.gets:
@@ -308,16 +308,16 @@ class _Handler(BaseHTTPRequestHandler):
 
         A page of its own does so: to a redirection of the file that opened it, no browser sends the cookie.
         """
-        guard = self.server.page.guard
-        if not guard.is_token(token):
+        access = self.server.page.access
+        if not access.is_token(token):
             raise HttpError(403, "a wrong token; open the address that phasedic has printed")
         forward = b'<link rel="icon" href="data:,"><meta http-equiv="refresh" content="0; url=/">'
-        self._send(Response(forward, _TYPES["html"]), cookie=guard.cookie)
+        self._send(Response(forward, _TYPES["html"]), cookie=access.cookie)
 
     def _post(self) -> None:
         page = self.server.page
-        length = page.guard.check_post(self.headers)
-        page.guard.check_cookie(self.headers)
+        length = page.access.check_post(self.headers)
+        page.access.check_cookie(self.headers)
         handler = page.posts.get(urlsplit(self.path).path)
         if handler is None:
             raise HttpError(404, "not found")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from acquire import opening_thread
-from acquire.camera.live import DeviceFault, Driver, LiveCamera, Picture, RepeatGuard
+from acquire.camera.live import DeviceFault, Driver, LiveCamera, Picture, RepeatWatch
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import Event
 from acquire.frame import CameraInfo, Frame
@@ -137,7 +137,7 @@ def test_a_picture_without_a_number_that_comes_again_is_damaged() -> None:
 
 
 def test_three_pictures_that_agree_in_every_bit_are_one() -> None:
-    guard, one, other = RepeatGuard(), np.zeros((2, 2), np.uint8), np.ones((2, 2), np.uint8)
+    guard, one, other = RepeatWatch(), np.zeros((2, 2), np.uint8), np.ones((2, 2), np.uint8)
     seen = [(guard.repeated(image.copy()), guard.just_found) for image in (one, one, one, one, other, other)]
     assert [repeated for repeated, _ in seen] == [False, False, True, True, False, False]
     assert [found for _, found in seen] == [False, False, True, False, False, False]

@@ -11,7 +11,7 @@ import pytest
 from acquire.errors import DeviceError
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.serial_line import link as link_module
-from acquire.serial_line.link import FloodGuard, Link, LinkContext, LoadWatch
+from acquire.serial_line.link import FloodWatch, Link, LinkContext, LoadWatch
 from acquire.serial_line.ports import LineSettings
 from tests.acquire.serial_line.fake_port import FakePort, FakeTime
 
@@ -73,7 +73,7 @@ def test_ten_bad_lines_in_a_row_are_told_once_until_a_good_one() -> None:
 
 def test_what_comes_behind_full_reads_is_late_and_is_skipped_after_a_quarter_of_a_second() -> None:
     told = Told()
-    guard = FloodGuard(told, 100.0)
+    guard = FloodWatch(told, 100.0)
     guard.read(True, 50, 100.04)
     assert not guard.late, "the port was empty 40 ms ago"
     guard.read(True, 70, 100.2)
@@ -99,7 +99,7 @@ def test_a_flood_that_comes_again_within_ten_seconds_is_not_told_again(
     again_after_s: float, times: int
 ) -> None:
     told = Told()
-    guard = FloodGuard(told, 0.0)
+    guard = FloodWatch(told, 0.0)
     for t in (1.0, 1.3 + again_after_s - 0.3):
         guard.read(True, 10, t)
         assert guard.too_late(t + 0.3)

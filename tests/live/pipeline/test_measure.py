@@ -27,7 +27,7 @@ from live.pipeline.history import SHORT, AxisFinder, History, curve_of
 from live.pipeline.measure import NewReference, Tracker, measure
 from live.pipeline.measurement import HOLD_S, ForceMatching, Measurement, TimeStep, ordered_mean
 from live.pipeline.reference import averaged, frame_noise, motion_between, prepare
-from live.run.measurer import SmearGuard
+from live.run.measurer import SmearWatch
 from tests.live.fakes import frame
 from tests.live.made_up import START, in_ascii, make_loads, make_measurement
 
@@ -190,7 +190,7 @@ def test_what_is_given_holds() -> None:
 
 def test_smear_is_told_when_it_begins_and_ends() -> None:
     told: list[Event] = []
-    guard = SmearGuard(told.append)
+    guard = SmearWatch(told.append)
     burst = burst_of([frame(0), frame(1)])
     for motion in (math.nan, 0.01, 0.2, 0.3, math.nan, 0.045, 0.06, 0.02, 0.01, 0.07):
         guard.check(dataclasses.replace(burst, motion_px=motion))

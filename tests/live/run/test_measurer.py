@@ -19,7 +19,7 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.reference import ReferenceMotion
 from live.pipeline.run_state import RunState
 from live.run import measurer
-from live.run.measurer import Measurer, ReferenceSelector, SmearGuard, _measured
+from live.run.measurer import Measurer, ReferenceSelector, SmearWatch, _measured
 from live.run.outcome import StopSignal
 from live.stream.stream import Stream
 from tests.live.made_up import START, make_measurement
@@ -220,13 +220,13 @@ def test_the_latency_is_judged_by_the_period_of_the_bursts(latency_s: float) -> 
 @pytest.mark.parametrize(("motion", "told"), [(0.0501, 1), (0.05, 0)])
 def test_smear_begins_beyond_a_twentieth_of_a_pixel(motion: float, told: int) -> None:
     events: list[Event] = []
-    SmearGuard(events.append).check(replace(make_measurement(0).burst, motion_px=motion))
+    SmearWatch(events.append).check(replace(make_measurement(0).burst, motion_px=motion))
     assert len(events) == told
 
 
 def test_smear_ends_below_four_fifths_of_the_limit() -> None:
     events: list[Event] = []
-    guard = SmearGuard(events.append, 1.0)
+    guard = SmearWatch(events.append, 1.0)
     for motion in (1.1, 0.8, 0.79):
         guard.check(replace(make_measurement(0).burst, motion_px=motion))
         assert len(events) == 1 + (motion < 0.8)

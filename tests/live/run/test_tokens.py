@@ -8,11 +8,11 @@ from email.message import Message
 import pytest
 
 from live.run.tcp_lines import Client
-from live.ui.web.authorization import HttpError, RequestGuard
+from live.ui.web.authorization import HttpError, RequestCheck
 
 TOKEN = "a-secret-word-of-some-length"
 WRONG = ("", "a", TOKEN[:-1], TOKEN + "a", TOKEN.upper(), TOKEN[1:], "b" + TOKEN[1:], f"{TOKEN} {TOKEN}")
-GUARD = RequestGuard(8080, TOKEN)
+GUARD = RequestCheck(8080, TOKEN)
 
 
 def headers(**given: str) -> Message:

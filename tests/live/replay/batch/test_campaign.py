@@ -16,7 +16,15 @@ import pytest
 from acquire.errors import ConfigError, DataError
 from live.pipeline.screen import Screen
 from live.replay.batch import campaign as module
-from live.replay.batch.campaign import CampaignRequest, _cell, _planned, _put, _task, as_csv, run_campaign
+from live.replay.batch.campaign import (
+    CampaignRequest,
+    _cell,
+    _planned,
+    _task,
+    as_csv,
+    run_campaign,
+    write_summary,
+)
 from live.replay.batch.keys import _pictures, _source, key_of
 from live.replay.batch.row import COLUMNS, BatchRow
 from live.replay.batch.scheduler import ChunkPlan
@@ -147,11 +155,12 @@ def test_a_table_is_written_whole_or_not_at_all(tmp_path: Path) -> None:
     path = tmp_path / "summary.csv"
     path.mkdir()
     (path / "inside").touch()
-    with pytest.raises(DataError, match="cannot be written"):
-        _put(path, b"new")
+    with pytest.raises(DataError, match=r"summary\.csv"):
+        write_summary([], tmp_path)
     assert list(tmp_path.iterdir()) == [path], "no part is left"
-    _put(tmp_path / "other.csv", b"new")
-    assert (tmp_path / "other.csv").read_bytes() == b"new"
+    (tmp_path / "other").mkdir()
+    written = write_summary([], tmp_path / "other")
+    assert written[0].read_bytes() == as_csv([])
 
 
 def test_no_cell_is_a_formula() -> None:

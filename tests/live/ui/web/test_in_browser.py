@@ -19,7 +19,7 @@ from live.config.loading import load_config
 from live.results.run_folder import open_run
 from live.setup.pictures import read_mask
 from live.ui.terminal.screen import TerminalScreen
-from live.ui.web.authorization import RequestGuard
+from live.ui.web.authorization import RequestCheck
 from live.ui.web.page_controller import PageController
 from tests.live.setup.test_scale import CHARUCO, seen
 from tests.live.ui.waiting import until
@@ -278,7 +278,7 @@ def test_another_site_gets_nothing(browser: Any, start: Callable[..., Program]) 
     page = opened(browser, program)
     page.until(lambda: page.stage() == "setup", "it is there")
     port = int(program.address.partition("/?")[0].rpartition(":")[2])
-    guard = RequestGuard(port, "x")
+    guard = RequestCheck(port, "x")
     context = page.page.context
     other = context.new_page()
     other.route("http://evil.example/", lambda route: route.fulfill(body="<p>", content_type="text/html"))

@@ -142,14 +142,35 @@ def test_states_and_pictures_are_sent_at_their_rates() -> None:
 
     broadcaster = Watching()
     broadcaster.open()
-    consumer, pictures = PageConsumer(broadcaster, config, lambda: now[0], kind="second"), []
+    consumer, pictures = PageConsumer(broadcaster, config, lambda: now[0], side="second"), []
     for k in range(100):
         now[0] = START + k / 100
         consumer.measurement(pictured())
         assert consumer.idle() == 0.1
         pictures.append(consumer._shown)
-    assert [kind for _, kind in published] == ["second"] * 10
+    assert [kind for _, kind in published] == ["run second"] * 10
     assert pictures[-1] == 4
+
+
+@pytest.mark.parametrize(("cameras", "rest_s"), [(1, 0.4), (3, 1.4)])
+def test_drawing_takes_a_fifth_of_the_time_whatever_the_number_of_cameras(
+    monkeypatch: pytest.MonkeyPatch, cameras: int, rest_s: float
+) -> None:
+    now, drawn, broadcaster = [START], list[float](), Broadcaster()
+    broadcaster.open()
+    consumer = PageConsumer(broadcaster, load_config(None, {}), lambda: now[0], cameras=cameras)
+
+    def draw() -> None:
+        now[0] += 0.1
+        drawn.append(now[0])
+
+    monkeypatch.setattr(consumer, "_draw", draw)
+    for _ in range(300):
+        consumer.measurement(pictured())
+        consumer.idle()
+        now[0] += 0.01
+    gaps = np.diff(drawn) - 0.1
+    assert len(gaps) and gaps == pytest.approx(rest_s, abs=0.02)
 
 
 def test_a_point_of_the_curves_is_si_and_counts_from_the_first() -> None:

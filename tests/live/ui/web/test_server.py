@@ -46,7 +46,7 @@ def fetch(
     body: Any = None,
 ) -> ReadResponse:
     """A request as the page sends it, except for ``headers``; a header of "" is left out."""
-    guard = page.guard
+    guard = page.access
     own = {"Host": guard.host, "Cookie": guard.cookie.partition(";")[0], "Sec-Fetch-Site": "same-origin"}
     if method == "POST":
         own |= {"Origin": guard.origin, "Content-Type": "application/json"}
@@ -70,17 +70,17 @@ def test_only_this_machine_can_connect(page: PageServer) -> None:
         "127.0.0.1"
     }
     for other in others:
-        with pytest.raises(OSError), socket.create_connection((other, page.guard.port), timeout=1):
+        with pytest.raises(OSError), socket.create_connection((other, page.access.port), timeout=1):
             pass
 
 
 def test_the_address_sets_the_cookie_and_hides_the_token(page: PageServer) -> None:
     """Also from the file that a browser opens, which is another site."""
     for site in ("none", "cross-site"):
-        answer = fetch(page, f"/?token={page.guard.token}", {"Cookie": "", "Sec-Fetch-Site": site})
+        answer = fetch(page, f"/?token={page.access.token}", {"Cookie": "", "Sec-Fetch-Site": site})
         assert answer.status == 200 and b'content="0; url=/"' in answer.body
     cookie = answer.headers["Set-Cookie"]
-    assert page.guard.token in cookie and "HttpOnly" in cookie and "SameSite=Strict" in cookie
+    assert page.access.token in cookie and "HttpOnly" in cookie and "SameSite=Strict" in cookie
 
 
 def test_a_response_forbids_other_sites(page: PageServer) -> None:
@@ -122,10 +122,10 @@ def test_a_command_is_accepted(page: PageServer) -> None:
     ],
 )
 def test_refused_gets(page: PageServer, status: int, path: str, headers: dict[str, str]) -> None:
-    known = {"token": page.guard.token, "port": page.guard.port}
+    known = {"token": page.access.token, "port": page.access.port}
     answer = fetch(page, path.format(**known), {key: value.format(**known) for key, value in headers.items()})
     assert answer.status == status
-    assert page.guard.token.encode() not in answer.body and page.guard.token not in str(answer.headers)
+    assert page.access.token.encode() not in answer.body and page.access.token not in str(answer.headers)
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_refused_gets(page: PageServer, status: int, path: str, headers: dict[st
     ],
 )
 def test_refused_posts(page: PageServer, status: int, headers: dict[str, str], body: bytes) -> None:
-    asked = {key: value.format(port=page.guard.port) for key, value in headers.items()}
+    asked = {key: value.format(port=page.access.port) for key, value in headers.items()}
     assert fetch(page, "/order", asked, method="POST", body=body).status == status
 
 
@@ -164,8 +164,8 @@ def test_no_preflight_is_answered(page: PageServer) -> None:
 
 
 def stream(page: PageServer) -> http.client.HTTPResponse:
-    connection = http.client.HTTPConnection("127.0.0.1", page.guard.port, timeout=LONG_S)
-    connection.request("GET", "/events", headers={"Cookie": page.guard.cookie.partition(";")[0]})
+    connection = http.client.HTTPConnection("127.0.0.1", page.access.port, timeout=LONG_S)
+    connection.request("GET", "/events", headers={"Cookie": page.access.cookie.partition(";")[0]})
     return connection.getresponse()
 
 
@@ -205,13 +205,13 @@ def test_a_frozen_page_delays_nothing() -> None:
 
 def connected(page: PageServer, text: bytes) -> socket.socket:
     """A connection that has sent this."""
-    opened = socket.create_connection(("127.0.0.1", page.guard.port), timeout=LONG_S)
+    opened = socket.create_connection(("127.0.0.1", page.access.port), timeout=LONG_S)
     opened.sendall(text)
     return opened
 
 
 def post_head(page: PageServer, length: int) -> bytes:
-    guard = page.guard
+    guard = page.access
     lines = [
         "POST /order HTTP/1.1",
         f"Host: {guard.host}",
