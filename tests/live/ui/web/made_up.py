@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -51,10 +52,11 @@ def figure(value: float | None, sigma: float | None = None, **more: Any) -> dict
     return found | more
 
 
-def facts(delay_s: float = 0.044, **counts: int) -> list[dict[str, Any]]:
+def facts(delay_s: float = 0.044, cycle: float = math.nan, **counts: int) -> list[dict[str, Any]]:
     """The small figures, as the program sends them."""
     now = made_figures(fps=10.0, disk=960 * 60.0, burst=1.0)
-    snapshot = Snapshot(0.0, figures=now, frames=COUNTS | counts, latency_p95_s=delay_s)
+    more: Any = {"frames": COUNTS | counts, "latency_p95_s": delay_s, "cycles": {"cycle": cycle}}
+    snapshot = Snapshot(0.0, figures=now, **more)
     return plain([fact(row) for row in snapshot.rows("page")])  # type: ignore[no-any-return]
 
 

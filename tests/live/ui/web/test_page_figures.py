@@ -64,18 +64,18 @@ def check_tiles(page: Page) -> None:
 
 def check_machine(page: Page) -> None:
     show_run(page)
-    facts = {
+    small = {
         text.split(" ", 1)[1]: text.split(" ", 1)[0]
         for text in page.page.locator("#strip > span").all_inner_texts()
         if not text.startswith(("44", "16"))
     }
-    assert facts["lost"] == "5", "what was not recorded is lost too"
-    assert (facts["frames/s"], facts["recorded"]) == ("10", "876")
+    assert small["lost"] == "5", "what was not recorded is lost too"
+    assert (small["frames/s"], small["recorded"]) == ("10", "876")
     assert "matters" in page.page.get_attribute("#strip > span:has-text('lost')", "class")
     assert page.page.locator("#strip .matters").count() == 1, "quiet until it counts"
     shown = page.page.inner_text("#strip")
     assert "44 ms" in shown and "16 h" in shown and "cycle" not in shown
-    show_run(page, cycle=1234.0)
+    show_run(page, facts=facts(cycle=1234.0))
     assert page.page.inner_text("#strip > span:has-text('cycle')") == "1\u202f234 cycle"
 
 
