@@ -24,7 +24,7 @@ PLAIN = ["Strain across the load", "Strain along the load", "Shear strain"]
 
 
 def test_codes_are_words_unless_the_expert_asks(browser: Any) -> None:
-    stage = STAGE | {"what": WHAT | {"along": "eyy"}}
+    stage = STAGE | {"what": WHAT | {"along": "eyy"}, "components": [*FIELD_MAPS]}
     axial = run_state()["axial"] | {"name": "eyy"}
     with opened(browser) as page:
         show_run(page, stage, axial=axial)
