@@ -22,6 +22,7 @@ from live.results.run_folder import RunFolder
 
 _NAMES = ("exx", "eyy", "exy")
 TIME = Message("time, s")
+_ROUNDING = 1e-9  # of a figure: changes below are none
 
 
 def load_unit(curve: EvaluatedCurve) -> Unit:
@@ -150,12 +151,12 @@ def others(run: RunFolder) -> list[Plot]:
     found = []
     for one in FIGURES:
         values = np.asarray(run.strain.values.get(one.name, math.nan), np.float64)
-        if not one.report or not np.isfinite(values).any() or np.nanmin(values) == np.nanmax(values):
+        if not one.report or not np.isfinite(values).any():
             continue
-        unit, sigma = (
-            unit_of(one.kind, float(np.nanmax(np.abs(values)))),
-            run.strain.values.get(f"sigma_{one.name}"),
-        )
+        largest = float(np.nanmax(np.abs(values)))
+        if np.nanmax(values) - np.nanmin(values) <= _ROUNDING * largest:
+            continue
+        unit, sigma = unit_of(one.kind, largest), run.strain.values.get(f"sigma_{one.name}")
         band = None if sigma is None else np.asarray(sigma, np.float64) / unit.one
         curve = PlotLine("", run.strain.time_s, values / unit.one, band)
         up = joined(", ", (one.said, unit.name or one.unit))
