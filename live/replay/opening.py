@@ -110,7 +110,7 @@ def open_source(request: ReplayRequest) -> Iterator[tuple[ReplaySource, Config]]
     request = with_reference(request)
     config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
     config = replace(config, load=replace(config.load, address="none:"))
-    with camera_of(config.camera.address, crop=config.camera.crop) as camera, camera:
+    with camera_of(config.camera.address, crop=config.camera.crop, resting=False) as camera, camera:
         yield picture_source(camera, request, config), config
 
 

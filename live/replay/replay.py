@@ -118,7 +118,7 @@ def _replay_pictures(
     )
     event_log = EventLog()
     into = _in_test_time(event_log)
-    with camera_of(config.camera.address, into, crop=config.camera.crop) as camera, camera:
+    with camera_of(config.camera.address, into, crop=config.camera.crop, resting=False) as camera, camera:
         found = picture_source(camera, request, config)
         screen.print(found.words)
         for warning in camera.info.warnings:

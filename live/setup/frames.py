@@ -19,13 +19,13 @@ SILENCE_S = 20.0
 
 @contextmanager
 def camera_of(
-    address: str, on_event: EventSink = ignore_event, *, crop: Crop | None = None
+    address: str, on_event: EventSink = ignore_event, *, crop: Crop | None = None, resting: bool = True
 ) -> Iterator[Camera]:
     """The camera of an address, opened, to be started by ``with``; closed at the end. Raises as ``open_rig``.
 
-    A simulated specimen stays at rest.
+    ``resting``: a simulated specimen is not pulled, and its pictures go on.
     """
-    rig = open_rig(at_rest(address), "none:", on_event, crop=crop)
+    rig = open_rig(at_rest(address) if resting else address, "none:", on_event, crop=crop)
     try:
         yield rig.camera
     finally:
