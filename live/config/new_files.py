@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import os
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from uuid import uuid4
 
 from acquire.errors import ConfigError, DataError
 
@@ -50,8 +50,8 @@ def new_folder(path: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def replaced_file(path: Path) -> Iterator[Path]:
-    """The same for a file that may be there, and is replaced; several processes may do so at once."""
-    with _atomic(path, f".{os.getpid()}", replaces=True) as part:
+    """The same for a file that may be there, and is replaced; several threads and processes may do so at once."""
+    with _atomic(path, f".{uuid4().hex[:8]}", replaces=True) as part:
         yield part
 
 
