@@ -36,10 +36,8 @@ _PRESSED = 0.2  # of the highest stress: compression that is no part of a tensil
 _TENSION = 0.2  # of the largest compression: less tension is a zero of the force that is off
 _GROWTH = 0.1  # of the depths of all unloadings: the strain of a cyclic test grows by less
 _LOADED = 0.05  # of the highest stress: the loading has begun
-_HELD_TIME, HELD = (
-    0.5,
-    0.03,
-)  # share of the time from there on, and of the range, within which a value is held
+_HELD_TIME, HELD = 0.5, 0.03
+"""Share of the time from there on, and of the range, within which a value is held."""
 _STILL_LOADED, _RELAXED = 0.2, 0.01  # of the highest stress: what a hold keeps, and loses
 _SLOW = 0.8  # of the strain rate of the loading: a creep is slower
 

@@ -13,9 +13,8 @@ from acquire.errors import ConfigError, DataError
 from acquire.text import Message
 
 TOP = Path(__file__).parents[2]
-_HEADING = re.compile(
-    r"^(?P<level>##+) (?P<title>.+)$", re.MULTILINE
-)  # one # begins a comment of a shell, too
+_HEADING = re.compile(r"^(?P<level>##+) (?P<title>.+)$", re.MULTILINE)
+"""Of a section; one # alone begins a comment of a shell, too."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

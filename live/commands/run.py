@@ -152,10 +152,8 @@ def finish(outcome: OutcomeOfTest, screen: Screen, *, verbose: bool = False) -> 
 
 def _lines(outcome: Outcome, *, verbose: bool) -> list[str]:
     """The frame counts, the losses, and how the recorded view is opened."""
-    lines, rrd = (
-        [*trouble_lines(outcome.run_state, outcome.outputs.reports, verbose=verbose)],
-        outcome.folder / "view.rrd",
-    )
+    lines = [*trouble_lines(outcome.run_state, outcome.outputs.reports, verbose=verbose)]
+    rrd = outcome.folder / "view.rrd"
     if verbose and rrd.exists():
         lines.append(Message("open the recorded view with: {command}", f"{rerun_command()} {rrd}"))
     return lines

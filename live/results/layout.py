@@ -15,9 +15,8 @@ PLAIN_MAPS = ("u", "v", *GRADIENTS, *STRAINS)
 MAPS = (*PLAIN_MAPS, *(f"sigma_{name}" for name in PLAIN_MAPS), "residual", "status", "iterations")
 ADDED_MAPS = BLUR  # that files of earlier versions do not have
 BYTES = {"status", "iterations"}  # maps of whole numbers; the others are float32
-WHOLE = {
-    figure.name for figure in FIGURES if figure.column and figure.kind == "count"
-}  # columns; the others are float64
+WHOLE = {figure.name for figure in FIGURES if figure.column and figure.kind == "count"}
+"""Columns of whole numbers; the others are float64."""
 ANY_COLUMN = Declared("number", (None,))  # of a gauge, or added by another version
 # The columns that every file of this version has, and those that it may have.
 REQUIRED = {*COLUMNS[: COLUMNS.index("latency_s")]}

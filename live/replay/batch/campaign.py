@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from acquire.errors import EXIT_INTERRUPTED, ConfigError, DataError, PhasedicError
+from acquire.errors import EXIT_INTERRUPTED, LOSS, ConfigError, DataError, PhasedicError
 from acquire.text import Message
 from acquire.text.printable import counted
 from live.config.loading import load_config
@@ -168,7 +168,7 @@ def run_campaign(wanted: CampaignRequest, screen: Screen, stopping: threading.Ev
         return Campaign(tuple(rows.values()), len(tasks), (), EXIT_INTERRUPTED)
     found = tuple(rows[test.name] for test in wanted.tests)
     files = write_summary(found, wanted.out)
-    code = 0 if all(row.is_well for row in found) else 5
+    code = 0 if all(row.is_well for row in found) else LOSS
     return Campaign(found, len(tasks), tuple(files), code)
 
 
