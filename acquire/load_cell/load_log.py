@@ -11,17 +11,18 @@ from __future__ import annotations
 
 import math
 import threading
-from array import array
-from bisect import bisect_left, bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquire.events import Event, EventKind
+from acquire.load_cell.readings import StoredReadings
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.text import Message
 
+PIECE = 1 << 16
+"""Readings that ``LoadLog.pieces`` gives at once."""
 _BEYOND = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD
 
 
@@ -40,8 +41,7 @@ class LoadLog:
 
     def __init__(self, max_gap_s: float = 0.25, lag_s: float = 0.0, *, by_name: bool = False) -> None:
         self._max_gap_s, self.lag_s, self.by_name = max_gap_s, lag_s, by_name
-        self._t = array("d")
-        self._force = array("d")
+        self._stored = StoredReadings()
         self._zeros: list[tuple[float, float]] = []
         self._latest: LoadSample | None = None
         self._telling: LoadSample | None = None
@@ -59,22 +59,21 @@ class LoadLog:
                 self._telling = sample
             if (stale and not none) or (none and LoadFlag.ERROR in sample.flags):
                 return
-            if stale and self._t:
-                self._add(self._t[-1], math.nan)
+            if stale and len(self._stored):
+                self._stored.append(self._stored.last_t, math.nan)
             self._add(sample.t, sample.force)
 
     def extend(self, times: NDArray[np.float64], forces: NDArray[np.float64]) -> None:
         """Add many samples at once, (N,) s and N; their times rise, and follow those before."""
         with self._lock:
-            self._t.frombytes(np.ascontiguousarray(times, np.float64).tobytes())
-            self._force.frombytes(np.ascontiguousarray(forces, np.float64).tobytes())
+            for t, force in zip(times.tolist(), forces.tolist(), strict=True):
+                self._stored.append(t, force)
             self._count += len(times)
             if len(times):
                 self._latest = LoadSample(float(times[-1]), float(forces[-1]))
 
     def _add(self, t: float, force: float) -> None:
-        self._t.append(max(t, self._t[-1]) if self._t else t)
-        self._force.append(force)
+        self._stored.append(max(t, self._stored.last_t) if len(self._stored) else t, force)
 
     def take_event(self, event: Event) -> None:
         """Note a tare with the amount by which forces fall (``step_N``); other events are ignored."""
@@ -96,7 +95,9 @@ class LoadLog:
     def covers(self, t: float) -> bool:
         """Whether waiting longer cannot change ``force_at(t)``."""
         with self._lock:
-            return self._closed or bool(self._t and self._t[-1] >= t + max(self.lag_s, 0.0))
+            if self._closed or not len(self._stored):
+                return self._closed
+            return self._stored.last_t >= t + max(self.lag_s, 0.0)
 
     def force_at(self, t: float) -> float:
         """The force at an instant, N.
@@ -126,26 +127,31 @@ class LoadLog:
 
     def _at(self, t: float) -> float:
         with self._lock:
-            after = bisect_left(self._t, t)
-            if after == len(self._t):
+            after = self._stored.before(t)
+            if after == len(self._stored):
                 return math.nan
-            if self._t[after] == t:
-                return self._force[after]
+            later, force = self._stored.at(after)
+            if later == t:
+                return force
             if after == 0:
                 return math.nan
-            return self._between(after - 1, after, t)
+            before, force_before = self._stored.at(after - 1)
+        gap = later - before
+        if gap > self._max_gap_s:
+            return math.nan
+        return force_before + (t - before) / gap * (force - force_before)
 
     def why_none_at(self, t: float) -> str:
         """Why ``force_at`` knows no force at ``t``, and what can be done."""
         with self._lock:
-            after = bisect_left(self._t, t + self.lag_s)
-            if after in (0, len(self._t)):
+            after = self._stored.before(t + self.lag_s)
+            if after in (0, len(self._stored)):
                 return (
                     Message("no reading of the load cell came before it")
                     if not after
                     else Message("no reading came after it")
                 )
-            gap = self._t[after] - self._t[after - 1]
+            gap = self._stored.at(after)[0] - self._stored.at(after - 1)[0]
         if gap <= self._max_gap_s:
             return Message("the readings beside it have no value (overload, tare, lines lost)")
         return Message(
@@ -155,21 +161,14 @@ class LoadLog:
             self._max_gap_s,
         )
 
-    def _between(self, before: int, after: int, t: float) -> float:
-        gap = self._t[after] - self._t[before]
-        if gap > self._max_gap_s:
-            return math.nan
-        part = (t - self._t[before]) / gap
-        return self._force[before] + part * (self._force[after] - self._force[before])
-
     def mean(self, t0: float, t1: float) -> tuple[float, int]:
         """The mean force of the samples with t0 <= t <= t1, N, and their number.
 
         NaN where there is none, or where one of them is NaN (an overload is not averaged away).
         """
         with self._lock:
-            chosen = self._force[bisect_left(self._t, t0) : bisect_right(self._t, t1)]
-        return (math.fsum(chosen) / len(chosen) if chosen else math.nan), len(chosen)
+            chosen = self._stored.part(self._stored.before(t0), self._stored.until(t1))[1]
+        return (math.fsum(chosen) / len(chosen) if len(chosen) else math.nan), len(chosen)
 
     @property
     def latest(self) -> LoadSample | None:
@@ -186,7 +185,7 @@ class LoadLog:
         return self._count
 
     def arrays(
-        self, first: int = 0, until: float = math.inf, zero_of: float | None = None
+        self, first: int = 0, until: float = math.inf, zero_of: float | None = None, most: int | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times (N,) in monotonic s and forces (N,) in N, as they are interpolated.
 
@@ -198,11 +197,22 @@ class LoadLog:
             Not later.
         zero_of : float, s, optional
             As if the zero of this time had held: a tare is no unloading.
+        most : int, optional
+            Not more than so many.
         """
         with self._lock:
-            chosen = slice(first, bisect_right(self._t, until))
-            t, force = np.array(self._t[chosen], float), np.array(self._force[chosen], float)
+            stop = len(self._stored) if until == math.inf else self._stored.until(until)
+            t, force = self._stored.part(first, stop if most is None else min(first + most, stop))
             if zero_of is not None:
                 for since, step in self._zeros:
                     force += step * ((t >= since).astype(float) - (zero_of >= since))
         return t, force
+
+    def pieces(
+        self, zero_of: float | None = None
+    ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """The same by the piece, none of which is empty: a day of readings is larger than memory."""
+        first = 0
+        while len((piece := self.arrays(first, zero_of=zero_of, most=PIECE))[0]):
+            yield piece
+            first += PIECE

@@ -10,10 +10,11 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.block_file import BlockFile
 from acquire.load_cell import LoadLog
 from acquire.text import Message
 from analysis.evaluate import Curve, GaugeValue, LoadAxis, load_axis
-from live.pipeline.columns import BlockFile, NumberColumn, TextColumn
+from live.pipeline.columns import NumberColumn, TextColumn
 from live.pipeline.measurement import AXIAL, TRANSVERSE, TimeStep, extension_along, strains_along
 from live.pipeline.queues import Thinned
 from live.pipeline.timed.figure import Arrivals

@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from acquire.block_file import BlockFile
 from acquire.events import Event, EventKind
 from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
 from analysis import StrainField
 from analysis.evaluate import GaugeValue
 from live.pipeline import columns
-from live.pipeline.columns import BlockFile, NumberColumn, TextColumn
+from live.pipeline.columns import NumberColumn, TextColumn
 from live.pipeline.history import History
 from live.pipeline.measurement import AXIAL, TRANSVERSE, extension_along, strains_along, time_step_of
 from tests.live.made_up import START, make_measurement
