@@ -220,11 +220,10 @@ class SessionPart(Closing):
         """All load samples with their raw lines; 280 bytes of memory each."""
         return [sample for piece in self.load_pieces() for sample in piece.samples()]
 
-    def load_curve(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times (N,) in monotonic s and forces (N,) in N of all load samples; raises DataError."""
+    def load_curves(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Times (N,) in monotonic s and forces (N,) in N of all load samples, by the piece; raises DataError."""
         with _reading(self.path, Message("the load samples cannot be read"), self._advice):
-            times, forces = zip((np.empty(0), np.empty(0)), *self._loads.curve(), strict=True)
-        return np.concatenate(times), np.concatenate(forces)
+            yield from self._loads.curve()
 
     def events(self) -> list[Event]:
         """All events."""

@@ -269,8 +269,13 @@ class Session(Closing):
 
     def load_curve(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times (N,) in monotonic s and forces (N,) in N of all load samples."""
-        times, forces = zip(*(part.load_curve() for part in self._parts), strict=True)
+        times, forces = zip((np.empty(0), np.empty(0)), *self.load_curves(), strict=True)
         return np.concatenate(times), np.concatenate(forces)
+
+    def load_curves(self) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """The same by the piece: a day at 1 kHz is larger than memory."""
+        for part in self._parts:
+            yield from part.load_curves()
 
     def events(self) -> list[Event]:
         """All events."""

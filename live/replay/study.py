@@ -25,6 +25,7 @@ from analysis.picture.pattern import gauge_length, l10_strain
 from live.config.loading import Config
 from live.pipeline.reference import averaged
 from live.replay.source import ReplaySource
+from live.results.readings import Readings
 from live.setup.pictures import read_mask
 from live.setup.prepared import MeasurePlan
 
@@ -99,10 +100,10 @@ def _no_force(option: str) -> DataError:
 
 
 def _forces(source: ReplaySource, option: str) -> tuple[np.ndarray, np.ndarray]:
-    t, force = source.loads.arrays()
-    if not len(t) or not np.isfinite(force).any():
+    shown = Readings.of_log(source.loads, late_s=source.start.monotonic).curve
+    if not np.isfinite(shown.values).any():
         raise _no_force(option)
-    return t - source.start.monotonic, force
+    return shown.t, shown.values
 
 
 def still_window(source: ReplaySource) -> Seconds:

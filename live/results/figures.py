@@ -25,7 +25,6 @@ from analysis.evaluate import (
     TensileOptions,
     Track,
     evaluate_test,
-    find_lag,
     free,
     true_at_top,
 )
@@ -34,6 +33,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
 from live.pipeline.measurement import AXIAL
 from live.results.budget import BudgetRow, CameraView, budget_rows
+from live.results.readings import Readings
 
 HEADLINE = ("E", "nu", "Rp02", "Rm")
 """The figures that are shown first, and compared between tests."""
@@ -182,17 +182,17 @@ def budget_of(figures: TensileFigures, view: CameraView, *, stresses: bool) -> l
 
 def lag_of(history: History, loads: LoadLog, specimen: SpecimenConfig) -> Figure:
     """The lag of the load behind the frames, s, found from the test itself."""
-    t, force = loads.arrays()
-    if not len(t):
+    readings = Readings.of_log(loads)
+    if not readings.count:
         return Figure.none(Message("no readings of a load cell are there"))
     if loads.by_name:
         return Figure.none(Message("each force was given for a picture: there is none"))
-    return find_lag(Track(history.column("t"), history.along(specimen.axis)[0]), Track(t, force))
+    return readings.lag_behind(Track(history.column("t"), history.along(specimen.axis)[0]))
 
 
 def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
     """``lag_of`` as text; nothing without a load, or where there can be none."""
-    if not len(loads.arrays()[0]) or loads.by_name:
+    if not Readings.of_log(loads).count or loads.by_name:
         return []
     lag = lag_of(history, loads, specimen)
     if not lag.known:

@@ -25,7 +25,7 @@ from acquire.load_sample import LoadSample
 from acquire.record_mode import Crop
 from acquire.session import Session
 from acquire.text import Message
-from analysis.evaluate import Curve, LoadAxis, load_axis
+from analysis.evaluate import Curve, LoadAxis, Track, load_axis
 from analysis.field import StrainField
 from live.config.cameras import FIELDS, SIDES
 from live.config.loading import from_dict
@@ -34,6 +34,7 @@ from live.pipeline.history import curve_of
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.results.pictures import Image, Pictures, of_images, of_session
 from live.results.reader import Strain
+from live.results.readings import Readings
 from live.results.row import gauge_columns
 from live.results.stored_fields import StoredPattern, length_between, read_field, stored_pattern
 
@@ -109,11 +110,21 @@ class RunFolder(Closing):
         return [] if session is None else self._recorded(session.load_samples, [])
 
     @cached_property
+    def readings(self) -> Readings:
+        """Times in s since the start and forces in N of all load samples; none without a recording."""
+        session, none = self.session, Readings(lambda: iter(()))
+        if session is None:
+            return none
+        start, curves = session.start_monotonic, session.load_curves
+        found = Readings(lambda: (Track(times - start, forces) for times, forces in curves()))
+        return found if self._recorded(lambda: found.count, 0) else none
+
+    @property
     def load_curve(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times (N,) in s since the start and forces (N,) in N of all load samples; empty without a recording."""
-        session, none = self.session, (np.empty(0), np.empty(0))
-        times, forces = none if session is None else self._recorded(session.load_curve, none)
-        return times - self.start_monotonic, forces
+        """The same at once, (N,) each: 16 bytes a sample."""
+        pieces = [(np.empty(0), np.empty(0)), *((one.t, one.values) for one in self.readings.pieces())]
+        times, forces = (np.concatenate(one) for one in zip(*pieces, strict=True))
+        return times, forces
 
     @cached_property
     def frame_counts(self) -> dict[str, Any] | None:

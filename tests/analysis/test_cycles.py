@@ -51,7 +51,8 @@ class Made:
         return load, BurstStrains(at, strain, np.full(len(at), self.width))
 
     def table(self) -> CycleTable:
-        return CycleTable.of(*self.made())
+        load, bursts = self.made()
+        return CycleTable.of([load], bursts)
 
 
 def triangle(theta: Floats) -> Floats:
@@ -91,7 +92,7 @@ def test_a_stiffness_that_falls_is_followed() -> None:
     load, bursts = Made(n=20).made()
     rng = np.random.default_rng(3)
     strain = bursts.strain / softer(bursts.t) + rng.normal(0, 5e-6, len(bursts.t))
-    table = CycleTable.of(load, bursts._replace(strain=strain))
+    table = CycleTable.of([load], bursts._replace(strain=strain))
     modulus, sigma = table.column("modulus"), table.column("sigma_modulus")
     assert len(table) == 20
     truth = E * (1 - 0.1 * np.arange(20) / 19)
@@ -124,7 +125,7 @@ def test_long_bursts_do_not_stiffen() -> None:
 
 def test_bursts_in_step_with_the_load_see_a_part_of_it() -> None:
     load, bursts = Made(n=6).made()
-    table = CycleTable.of(load, bursts.part(np.abs((bursts.t % 1) - 0.5) < 0.22))
+    table = CycleTable.of([load], bursts.part(np.abs((bursts.t % 1) - 0.5) < 0.22))
     assert len(table) == 6 and all("of the range of the load" in why for why in table.why)
 
 
@@ -145,7 +146,7 @@ def test_a_drift_over_the_cycle_does_not_change_the_modulus() -> None:
 def test_the_secant_of_a_loop_that_bends_is_that_of_its_tips() -> None:
     load, bursts = Made(n=6, bursts_hz=40).made()
     s = (np.interp(bursts.t, load.t, load.values) - MEAN) / AMPLITUDE
-    table = CycleTable.of(load, bursts._replace(strain=1e-3 * s + 3e-4 * s**3 + 1e-4 * s**2))
+    table = CycleTable.of([load], bursts._replace(strain=1e-3 * s + 3e-4 * s**3 + 1e-4 * s**2))
     assert table.column("modulus") == pytest.approx(AMPLITUDE / 1.3e-3, rel=1e-3)
     assert table.column("peak_strain") == pytest.approx(1.4e-3, rel=2e-3)
 
@@ -199,7 +200,7 @@ def tables(programme: str, share: float, seed: int) -> tuple[CycleTable, CycleTa
     t, at = np.arange(0, 80, 0.02), np.arange(0, 80, 0.1)
     load = Track(t, PROGRAMMES[programme](t) + red(rng, len(t), share))
     bursts = BurstStrains(at, PROGRAMMES[programme](at) / E + red(rng, len(at), share) / E, 0 * at)
-    return CycleTable.of(load, bursts), CycleTable.of(None, bursts)
+    return CycleTable.of([load], bursts), CycleTable.of(None, bursts)
 
 
 @pytest.mark.parametrize("programme", PROGRAMMES)
@@ -244,7 +245,7 @@ def test_a_count_begins_anew_where_the_cycles_before_were_small() -> None:
     t = np.arange(0, 40, 0.01)
     load = Track(t, np.where(t < 20, 1e6, 50e6) * np.sin(2 * np.pi * t))
     at = np.arange(0, 40, 0.05)
-    table = CycleTable.of(load, BurstStrains(at, np.interp(at, t, load.values) / E, 0 * at))
+    table = CycleTable.of([load], BurstStrains(at, np.interp(at, t, load.values) / E, 0 * at))
     assert 19 <= len(table) <= 20 and table.column("range_load").min() > 50e6
 
 

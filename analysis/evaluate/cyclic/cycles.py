@@ -12,9 +12,10 @@ more than ``_KEPT`` readings is thinned.
 
 from __future__ import annotations
 
+import itertools
 import math
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -190,6 +191,40 @@ def _crossing(t: Floats, y: Floats, i: int, level: float) -> float:
     return float(t[i] + (t[i + 1] - t[i]) * (level - y[i]) / (y[i + 1] - y[i]))
 
 
+def _side_by_side(load: Iterable[Track], bursts: BurstStrains) -> Iterator[tuple[Track, BurstStrains, bool]]:
+    """Load and bursts of the same times, at most ``_BLOCK`` of each, and whether nothing follows."""
+    waiting, first, done = Track(*np.empty((2, 0))), 0, -math.inf
+    for block in itertools.chain(_blocks(load), [None]):
+        until = math.inf if block is None else float(block.t[0])
+        if len(waiting.t) or block is None:
+            for done in sorted(t for t in {*bursts.t[_BLOCK::_BLOCK].tolist(), until} if done < t <= until):
+                n, last = (int(np.searchsorted(t, done)) for t in (waiting.t, bursts.t))
+                yield (
+                    Track(waiting.t[:n], waiting.values[:n]),
+                    bursts.part(slice(first, last)),
+                    done == math.inf,
+                )
+                waiting, first = Track(waiting.t[n:], waiting.values[n:]), last
+        waiting = waiting if block is None else _joined(waiting, block)
+
+
+def _blocks(pieces: Iterable[Track]) -> Iterator[Track]:
+    """The same in blocks of ``_BLOCK``; the last has fewer."""
+    rest = Track(*np.empty((2, 0)))
+    for piece in pieces:
+        rest = _joined(rest, piece)
+        whole = len(rest.t) - len(rest.t) % _BLOCK
+        for k in range(0, whole, _BLOCK):
+            yield Track(rest.t[k : k + _BLOCK], rest.values[k : k + _BLOCK])
+        rest = Track(rest.t[whole:], rest.values[whole:])
+    if len(rest.t):
+        yield rest
+
+
+def _joined(one: Track, other: Track) -> Track:
+    return Track(np.concatenate([one.t, other.t]), np.concatenate([one.values, other.values]))
+
+
 class CycleTable:
     """The cycles of a test, by column.
 
@@ -210,26 +245,19 @@ class CycleTable:
         return cls(np.empty((0, len(Cycle._fields) - 1)), ())
 
     @classmethod
-    def of(cls, load: Track | None, bursts: BurstStrains, start_t: float = 0.0) -> CycleTable:
-        """Of a test that is over; without a ``load`` by the strain.
+    def of(cls, load: Iterable[Track] | None, bursts: BurstStrains, start_t: float = 0.0) -> CycleTable:
+        """Of a test that is over; without a ``load``, which comes by the piece, by the strain.
 
         Both have increasing times, s; ``start_t`` is the zero of those of the table.
         """
         counter = CycleCounter(loaded=load is not None)
-        load = load or Track(*np.empty((2, 0)))
         numbers, why = array("d"), list[str]()
-        edges = np.unique([*load.t[_BLOCK::_BLOCK], *bursts.t[_BLOCK::_BLOCK], math.inf])
-        first = [0, 0]
-        for edge in edges:
-            last = [int(np.searchsorted(t, edge)) for t in (load.t, bursts.t)]
-            (a, b), (c, d) = zip(first, last, strict=True)
-            piece = Track(load.t[a:b], load.values[a:b])
-            for cycle in counter.add(piece, bursts.part(slice(c, d)), ended=math.isinf(edge)):
+        for piece, part, ended in _side_by_side(load or (), bursts):
+            for cycle in counter.add(piece, part, ended=ended):
                 if cycle.number == 1:
                     del numbers[:], why[:]
                 numbers.extend(cycle._replace(t=cycle.t - start_t)[:-1])
                 why.append(cycle.why)
-            first = last
         if not counter.is_cyclic:
             del numbers[:], why[:]
         return cls(np.array(numbers).reshape(len(why), len(Cycle._fields) - 1), tuple(why))

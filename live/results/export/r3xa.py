@@ -27,7 +27,7 @@ def write_r3xa(job: ExportJob, path: Path) -> None:
     with new_folder(path) as folder:
         with (folder / "means.csv").open("x", encoding="utf-8", newline="\n") as file:
             means(job, file, notes=False)
-        loaded = len(job.run.load_curve[0]) > 0
+        loaded = job.run.readings.count > 0
         if loaded:
             with (folder / "load.csv").open("x", encoding="utf-8", newline="\n") as file:
                 load_table(job.run, file)

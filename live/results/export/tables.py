@@ -78,7 +78,8 @@ def field_table(job: ExportJob, number: int, file: TextIO) -> None:
 def load_table(run: RunFolder, file: TextIO) -> None:
     """All readings of the load cell, seconds since the start of the test."""
     _line(file, ["time_s", "force_N"])
-    _rows(file, run.load_curve)
+    for piece in run.readings.pieces():
+        _rows(file, [piece.t, piece.values])
 
 
 def _long(job: ExportJob, file: TextIO) -> None:

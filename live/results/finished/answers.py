@@ -61,7 +61,7 @@ def checks_line(found: Sequence[DataCheck]) -> str:
 def missing_lines(test: FinishedTest, again: MeasuredAgain) -> Iterator[str]:
     """What is missing for E and the rest, each with what to type."""
     section = "" if test.specimen.area_m2 else " --section W,T"
-    if not test.has_force and not len(test.samples.t):
+    if not test.has_force and not test.samples.count:
         yield Message("missing: forces, for E: {command} --load FORCES.csv{section}", again.command, section)
     elif not test.has_force:
         yield Message(

@@ -21,6 +21,7 @@ from analysis.evaluate.cyclic.loop import BurstStrains
 from analysis.evaluate.figure import quantile
 from live.config.new_files import new_file
 from live.results.figures import figure_text
+from live.results.readings import Readings
 
 Floats = NDArray[np.float64]
 FILE = "cycles.csv"
@@ -87,7 +88,7 @@ class Cycles:
         curve: Curve,
         strain: Floats,
         width: Floats,
-        samples: Track,
+        samples: Readings,
         area_m2: float | None,
         start_t: float = 0.0,
     ) -> Cycles:
@@ -95,12 +96,18 @@ class Cycles:
 
         Both on one clock, of which ``start_t`` (s) is the zero of the table.
         """
-        stop, samples = broken_at(curve.stress, curve.strain), samples.known()
+        stop = broken_at(curve.stress, curve.strain)
         bursts = BurstStrains(curve.t, strain, width).part(slice(None if stop is None else stop + 1))
         step = float(np.median(np.diff(curve.t, prepend=curve.t[:1]))) if len(curve.t) else 0.0
-        first, last = np.searchsorted(samples.t, (bursts.t[:1].sum() - step, bursts.t[-1:].sum() + step))
-        load = Track(samples.t[first:last], samples.values[first:last] / (area_m2 or 1.0))
-        return cls(CycleTable.of(load if len(samples.t) else None, bursts, start_t), area_m2)
+        ends = bursts.t[:1].sum() - step, bursts.t[-1:].sum() + step
+
+        def load(piece: Track) -> Track:
+            known = piece.known()
+            first, last = np.searchsorted(known.t, ends)
+            return Track(known.t[first:last], known.values[first:last] / (area_m2 or 1.0))
+
+        loaded = any(len(piece.known().t) for piece in samples.pieces())
+        return cls(CycleTable.of(map(load, samples.pieces()) if loaded else None, bursts, start_t), area_m2)
 
     @property
     def moduli(self) -> dict[int, Figure]:

@@ -124,7 +124,7 @@ def finished(
 def finished_in(run: RunFolder) -> FinishedTest:
     """The finished test of a folder; where no reading is recorded, with the lag that the replay found with its file."""
     test = FinishedTest.of_folder(run)
-    return test if len(run.load_curve[0]) else replace(test, lag=stored_lag(run.path) or test.lag)
+    return test if run.readings.count else replace(test, lag=stored_lag(run.path) or test.lag)
 
 
 def stored_lag(folder: Path) -> Figure | None:

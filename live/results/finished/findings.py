@@ -127,7 +127,7 @@ def _modulus(test: FinishedTest) -> str | None:
 
 def _coverage(test: FinishedTest) -> str | None:
     """Forces over the whole time of the pictures, and not beyond."""
-    samples, t = test.samples.known(), test.curve.t
+    samples, t = test.samples.curve.known(), test.curve.t
     if not len(samples.t) or len(t) < 2:
         return None
     limit = max(_UNCOVERED_S, _UNCOVERED * float(np.median(np.diff(t))))
@@ -227,10 +227,10 @@ def _out_of_plane(test: FinishedTest) -> str | None:
 
 def _reference_load(test: FinishedTest) -> str | None:
     """No force at the reference: strains count from there."""
-    force, samples = test.reference_N, test.samples.known()
+    force, samples = test.reference_N, test.samples.curve.known()
     if not math.isfinite(force) or not len(samples.t):
         return None
-    sigma = noise(samples.values) if len(samples.t) > 3 else 0.0
+    sigma = noise(test.samples.first().values) if len(samples.t) > 3 else 0.0
     if abs(force) <= max(_SIGMAS * sigma, _PRELOAD * float(np.abs(samples.values).max())):
         return ""
     return Message(

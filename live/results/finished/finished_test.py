@@ -20,7 +20,6 @@ from analysis.evaluate import (
     TensileFigures,
     Track,
     evaluate_test,
-    find_lag,
 )
 from analysis.evaluate.creep import Creep
 from live.config.sections import SpecimenConfig
@@ -29,6 +28,7 @@ from live.pipeline.run_state import RunState
 from live.results.figures import lag_of, tensile_options
 from live.results.finished.creep import creep_lines
 from live.results.finished.cycles import Cycles
+from live.results.readings import Readings
 from live.results.run_folder import RunFolder
 
 NO_VALUE = Message("no ZOI has a value in the last burst")
@@ -50,7 +50,7 @@ class FinishedTest:
     axis : LoadAxis
     gauge : mapping of str to value
         The gauge ``axial`` as configured; empty where there is none.
-    samples : Track, s and N
+    samples : Readings, s and N
         Readings of the load cell or of the file; the forces of the bursts where no reading is recorded.
     lag : Figure, s
         Of the load behind the frames, as found from the test; ``corrected_s`` is taken off already.
@@ -71,7 +71,7 @@ class FinishedTest:
     figures: TensileFigures
     specimen: SpecimenConfig
     axis: LoadAxis
-    samples: Track
+    samples: Readings
     lag: Figure
     corrected_s: float = 0.0
     reference_N: float = math.nan
@@ -95,22 +95,22 @@ class FinishedTest:
         ``gauges`` as configured, ``reference_N`` the force at the reference, ``start_t`` (s) the zero of times.
         """
         history, loads = run_state.history, run_state.loads
-        samples = Track(*loads.arrays())
         curve = history.curve(specimen.load(history.forces(loads)), specimen.axis)
-        t, force = loads.arrays(zero_of=float(curve.t[0]) if len(curve.t) else None)
+        zero_of = float(curve.t[0]) if len(curve.t) else None
+        one_zero = Readings.of_log(loads, zero_of=zero_of, late_s=loads.lag_s)
         strain, width = history.along(specimen.axis)[0], history.column("width_s")
         return cls(
             curve,
             evaluate_test(curve, tensile_options(specimen)),
             specimen,
             history.axis(specimen.axis),
-            samples,
+            Readings.of_log(loads),
             lag_of(history, loads, specimen),
             loads.lag_s,
             reference_N,
             gauges.get(AXIAL, {}),
             strains_at_end(history.time_steps[-1]) if len(history.time_steps) else {},
-            Cycles.of(curve, strain, width, Track(t - loads.lag_s, force), specimen.area_m2, start_t),
+            Cycles.of(curve, strain, width, one_zero, specimen.area_m2, start_t),
             Creep.of(replace(curve, t=curve.t - start_t), specimen.test),
         )
 
@@ -118,21 +118,18 @@ class FinishedTest:
     def of_folder(cls, run: RunFolder) -> FinishedTest:
         """A finished run, from its files."""
         t, corrected = run.strain.time_s, run.section("load").get("lag_s")
-        samples = Track(*run.load_curve)
-        recorded = len(samples.t) > 0
-        at_bursts = Track(np.asarray(t, np.float64), run.force)
+        samples, t = run.readings, np.asarray(t, np.float64)
+        recorded = samples.count > 0
         lag_s = float(corrected) if isinstance(corrected, int | float) else 0.0
         width = mean_width(run.strain.values["duration_s"], run.strain.values["n_frames"])
-        one_zero = _one_zero(samples, run, lag_s) if recorded else Track(at_bursts.t, run.force_one_zero)
+        one_zero = _one_zero(samples, run, lag_s) if recorded else Readings.of(t, run.force_one_zero)
         return cls(
             run.curve,
             evaluate_test(run.curve, tensile_options(run.specimen)),
             run.specimen,
             run.load_axis,
-            samples if recorded else at_bursts,
-            find_lag(Track(at_bursts.t, run.axial_strain), samples)
-            if recorded
-            else Figure.none(_NO_READINGS),
+            samples if recorded else Readings.of(t, run.force),
+            samples.lag_behind(Track(t, run.axial_strain)) if recorded else Figure.none(_NO_READINGS),
             lag_s,
             reference_force(run.events),
             run.gauges[AXIAL].described if AXIAL in run.gauges else {},
@@ -173,13 +170,16 @@ def reference_force(events: list[Event]) -> float:
     return float(forces[0]) if forces and forces[0] is not None else math.nan
 
 
-def _one_zero(samples: Track, run: RunFolder, lag_s: float) -> Track:
+def _one_zero(samples: Readings, run: RunFolder, lag_s: float) -> Readings:
     """The readings on the clock of the pictures, as if the zero of the first instant had held."""
-    t, zero = samples.t - lag_s, run.strain.values.get("zero_N")
-    if zero is None:
-        return Track(t, samples.values)
-    at = np.clip(np.searchsorted(run.strain.time_s, t, side="right") - 1, 0, None)
-    return Track(t, samples.values + np.asarray(zero, np.float64)[at] - float(zero[0]))
+    zero = np.asarray(run.strain.values.get("zero_N", np.zeros(run.strain.n)), np.float64)
+
+    def zeroed(piece: Track) -> Track:
+        t = piece.t - lag_s
+        at = np.clip(np.searchsorted(run.strain.time_s, t, side="right") - 1, 0, None)
+        return Track(t, piece.values + zero[at] - zero[0])
+
+    return Readings(lambda: map(zeroed, samples.pieces()))
 
 
 def _stored_at_end(run: RunFolder) -> dict[str, GaugeValue]:

@@ -137,7 +137,8 @@ def gauge_strains(run: RunFolder) -> Plot | None:
 
 def force(run: RunFolder) -> Plot | None:
     """Force against time, with every reading of the load cell where a session has them; None without force."""
-    t, f = run.load_curve if len(run.load_curve[0]) else (run.strain.time_s, run.force)
+    readings = run.readings.curve
+    t, f = (readings.t, readings.values) if len(readings.t) else (run.strain.time_s, run.force)
     if not np.isfinite(f).any():
         return None
     unit = force_unit(f)

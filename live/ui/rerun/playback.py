@@ -46,6 +46,7 @@ MAX_BYTES = 500e6
 """Of pictures and maps as drawn: the viewer keeps them all in memory."""
 
 _BYTES_PX, _BYTES_ZOI = 0.35, 250.0  # of a JPEG of speckle; of a ZOI in three maps, with its values
+_MOST_READINGS = 200_000
 _MAX_PX = 1280  # larger pictures are drawn reduced
 _POLL_S, _CLOSE_S = 0.1, 600.0
 
@@ -275,7 +276,8 @@ def _curves(run: RunFolder) -> Iterator[Parcel]:
     yield rows_message(Kind.MEANS, zip(t, *columns, strict=True))
     for name, gauge in run.gauges.items():
         yield rows_message(Kind.GAUGE, zip(t, gauge.value, gauge.sigma, strict=True), name)
-    times, forces = run.load_curve if len(run.load_curve[0]) else (t, run.force)
+    shown = run.readings.thinned(_MOST_READINGS)
+    times, forces = (shown.t, shown.values) if len(shown.t) else (t, run.force)
     known = np.isfinite(forces)
     yield rows_message(Kind.LOADS, zip(times[known].tolist(), forces[known].tolist(), strict=True))
 

@@ -227,11 +227,13 @@ def test_xarray(run_dir: Path) -> None:
 
 def test_a_table_of_loads_counts_from_the_start_of_the_test() -> None:
     recorded: Any = SimpleNamespace(
-        session=SimpleNamespace(load_curve=lambda: (np.array([100.5, 101.25]), np.array([12.5, math.nan]))),
+        session=SimpleNamespace(
+            load_curves=lambda: iter([(np.array([100.5, 101.25]), np.array([12.5, math.nan]))]),
+            start_monotonic=100.0,
+        ),
         _recorded=lambda read, none: read(),
-        start_monotonic=100.0,
     )
-    run: Any = SimpleNamespace(load_curve=RunFolder.load_curve.func(recorded))
+    run: Any = SimpleNamespace(readings=RunFolder.readings.func(recorded))
     file = io.StringIO()
     load_table(run, file)
     heads, *rows = csv.reader(io.StringIO(file.getvalue()))

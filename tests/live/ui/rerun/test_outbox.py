@@ -16,6 +16,7 @@ from acquire.text.printable import printable
 from acquire.text.quantity import Amount
 from live.pipeline.screen import Screen
 from live.pipeline.snapshot import Snapshot
+from live.results.readings import Readings
 from live.results.run_folder import open_run
 from live.ui.rerun import playback, view
 from live.ui.rerun.messages import (
@@ -229,7 +230,7 @@ def test_the_settings_and_the_words_of_a_finished_run(tmp_path: Path) -> None:
         means, *_, loads = playback._curves(run)
         assert rows_of(means)[3][3:5] == (run.strain.values["eyy"][3], run.strain.values["sigma_eyy"][3])
         assert [row[0] for row in rows_of(loads)][:3] == pytest.approx([0.0, 0.1, 0.2], abs=1e-9)
-        run.__dict__["load_curve"] = (np.empty(0), np.empty(0))
+        run.__dict__["readings"] = Readings(lambda: iter(()))
         run.strain.values["force_N"][1] = np.nan
         *_, loads = playback._curves(run)
         assert [row[0] for row in rows_of(loads)][:2] == pytest.approx([0.0, 0.2])
