@@ -1,10 +1,11 @@
 """HDF5 that survives a kill, a full disk and bad bytes.
 
 ``damage`` reads a file's state before the library does, ``tables`` and ``pictures`` append, ``disk`` flushes
-and forecasts the free space, ``declared`` checks what a file holds.
+and forecasts the free space, ``declared`` and ``json_fields`` say what a file holds: it is made of that, and checked.
 """
 
 from acquire.hdf5.damage import (
+    DAMAGE,
     PaddedFile,
     abandon_file,
     check_size,
@@ -17,14 +18,15 @@ from acquire.hdf5.damage import (
 )
 from acquire.hdf5.declared import (
     Declared,
-    JsonField,
+    Group,
+    check_format,
     check_links,
-    check_object,
+    new_datasets,
     open_dataset,
     open_datasets,
     open_group,
     read_attribute,
-    read_object,
+    read_attributes,
     read_scalar,
     stored_rows,
 )
@@ -37,6 +39,7 @@ from acquire.hdf5.disk import (
     free_bytes,
     network_share,
 )
+from acquire.hdf5.json_fields import JsonField, check_object, read_object
 from acquire.hdf5.pictures import COMPRESSED, PictureReader, PictureStack, compile_loops
 from acquire.hdf5.tables import (
     NO_UNIT,
@@ -44,7 +47,6 @@ from acquire.hdf5.tables import (
     RowTable,
     as_text,
     new_group,
-    new_json,
     set_attributes,
     storable,
     to_json,
@@ -52,12 +54,14 @@ from acquire.hdf5.tables import (
 
 __all__ = [
     "COMPRESSED",
+    "DAMAGE",
     "NO_UNIT",
     "Declared",
     "DiskSync",
     "FileWatch",
     "FlushTimer",
     "FolderWatch",
+    "Group",
     "GrowingDataset",
     "JsonField",
     "PaddedFile",
@@ -66,6 +70,7 @@ __all__ = [
     "RowTable",
     "abandon_file",
     "as_text",
+    "check_format",
     "check_links",
     "check_object",
     "check_size",
@@ -74,14 +79,15 @@ __all__ = [
     "forecast",
     "free_bytes",
     "network_share",
+    "new_datasets",
     "new_group",
-    "new_json",
     "open_dataset",
     "open_datasets",
     "open_file",
     "open_group",
     "probe",
     "read_attribute",
+    "read_attributes",
     "read_object",
     "read_scalar",
     "read_superblock",

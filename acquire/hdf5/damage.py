@@ -31,6 +31,10 @@ from acquire.errors import DataError
 from acquire.system import python_command, python_environment
 from acquire.text import Message
 
+DAMAGE = (
+    OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, MemoryError, OverflowError,
+)  # fmt: skip
+"""What HDF5, JSON and our own decoding raise on bytes that are not what they were."""
 PROBE_S = 30.0  # without a sign of progress: HDF5 retries a bad checksum of an unfinished file for ever
 _EVERY_S = 1.0
 _PROGRESS = "\0"  # a line of the child

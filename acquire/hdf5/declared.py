@@ -1,17 +1,17 @@
-"""What a file must hold, as data, and the check of it: shape, type and range of everything that is read.
+"""What a file holds, as data: a writer makes it of that, a reader checks shape, type and range of all it reads.
 
 A file from elsewhere may hold anything. Nothing outside of it is ever opened: links must be hard, and
 values must stand in the file itself. A dataset is read only once its size is that of what is stored.
-``JsonField`` and ``read_object`` check the JSON in a file in the same way.
 """
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import h5py
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.hdf5.tables import as_text
+from acquire.hdf5.tables import as_text, set_attributes
 from acquire.text import Message
 
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
@@ -34,23 +34,50 @@ _TEXTS = {
 
 @dataclass(frozen=True, slots=True)
 class Declared:
-    """What a dataset or attribute must be.
+    """What a dataset or attribute is: how it is made, and what it must be where it is read.
 
     Attributes
     ----------
     dtype : str
-        As numpy names it; "S": text of any fixed length, "text": text of any kind, "int": any whole number,
-        "number": any number.
+        As numpy names it, or several; "S": text of any fixed length, "text": text of any kind, "int": any whole
+        number, "number": any number.
     shape : tuple of int or None
-        None: of any length.
+        None: of any length; one that is None first is made empty, and grows.
     low, high : float
         Range of its values, ends included; not a number is within.
+    unit : str or None
+        Its attribute ``units``; None: it has none.
+    long_name, words : str
+        Its attribute ``long_name``; its definition, where that is another or the file does not have it.
+    missing : object
+        The value of what is not written.
+    later : bool
+        Files of the first versions do not have it.
+    rows : int
+        Of a chunk, where it grows; 0: the library chooses the chunks.
+    packed : mapping
+        How it is compressed, as ``create_dataset`` takes it.
+    more : mapping
+        Its further attributes.
     """
 
     dtype: str
     shape: tuple[int | None, ...] = ()
     low: float = -math.inf
     high: float = math.inf
+    unit: str | None = None
+    long_name: str = ""
+    words: str = ""
+    missing: Any = None
+    later: bool = False
+    rows: int = 512
+    packed: Mapping[str, Any] = field(default_factory=dict)
+    more: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def meaning(self) -> str:
+        """Its definition, for documents."""
+        return self.words or self.long_name
 
     def takes_type(self, dtype: np.dtype[Any]) -> bool:
         """Whether values of this type may stand there."""
@@ -60,7 +87,7 @@ class Declared:
             return dtype.kind == "S" or h5py.check_string_dtype(dtype) is not None
         if self.dtype in ("int", "number"):
             return dtype.kind in ("iu" if self.dtype == "int" else "iuf") and dtype.isnative
-        return dtype == np.dtype(self.dtype) and dtype.names is None
+        return dtype in map(np.dtype, self.dtype.split()) and dtype.names is None
 
     def takes_shape(self, shape: tuple[int, ...] | None) -> bool:
         """Whether it may have this shape; None is that of an empty dataspace."""
@@ -88,8 +115,8 @@ class Declared:
         """Whether a range is demanded at all."""
         return (self.low, self.high) != (-math.inf, math.inf)
 
-    def words(self) -> str:
-        """For a person."""
+    def demand(self) -> str:
+        """What it must be, for a person."""
         kind = _TEXTS.get(self.dtype, self.dtype)
         sizes = ", ".join("N" if size is None else str(size) for size in self.shape)
         return (
@@ -99,6 +126,48 @@ class Declared:
             if kind == self.dtype
             else kind
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """A group: its NeXus class, its datasets by name, its attributes, and its title for viewers."""
+
+    nexus: str
+    items: Mapping[str, Declared] = field(default_factory=dict)
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+    title: str = ""
+
+
+def new_datasets(
+    group: h5py.Group,
+    items: Mapping[str, Declared],
+    values: Mapping[str, Any] = MappingProxyType({}),
+    *,
+    checksum: bool = True,
+    fixed: bool = True,
+) -> None:
+    """Make the datasets ``items``, with their attributes: holding one of ``values``, or without values yet.
+
+    Parameters
+    ----------
+    checksum : bool
+        Fletcher-32 on what is in chunks.
+    fixed : bool
+        See ``set_attributes``.
+    """
+    for name, one in items.items():
+        if name in values:
+            dataset = group.create_dataset(name, data=values[name])
+        else:
+            grows = one.shape[:1] == (None,)
+            rest = one.shape[grows:]
+            chunks = (one.rows, *rest) if grows and one.rows else None if one.rows else True
+            dataset = group.create_dataset(
+                name, (0,) * grows + rest, one.dtype, maxshape=(None,) * grows + rest if chunks else None,
+                chunks=chunks, fillvalue=one.missing, fletcher32=bool(chunks and checksum), **one.packed,
+            )  # fmt: skip
+        said = {"units": one.unit, "long_name": one.long_name or None, **one.more}
+        set_attributes(dataset, fixed=fixed, **{key: text for key, text in said.items() if text is not None})
 
 
 def open_group(parent: h5py.Group, name: str) -> h5py.Group:
@@ -139,22 +208,16 @@ def open_dataset(group: h5py.Group, name: str, declared: Declared) -> h5py.Datas
         dtype = dataset.dtype
     except TypeError as error:
         raise _wrong(group, name, Message("is of a type that is not known here ({error})", error)) from error
-    if not (declared.takes_type(dtype) and declared.takes_shape(dataset.shape)):
-        raise _wrong(
-            group,
-            name,
-            Message(
-                "is {dtype} of shape {shape}; it must be {words}", dtype, dataset.shape, declared.words()
-            ),
-        )
+    _check_kind(group, name, dtype, dataset.shape, declared)
     if declared.shape[1:] == () and dataset.nbytes > _MAX_BYTES:
         raise _wrong(group, name, Message("is {nbytes} MB large; no test is so long", dataset.nbytes >> 20))
     return dataset
 
 
 def open_datasets(group: h5py.Group, declared: Mapping[str, Declared]) -> dict[str, h5py.Dataset]:
-    """All of them by name; raises as ``open_dataset``."""
-    return {name: open_dataset(group, name, what) for name, what in declared.items()}
+    """All of them by name, but those of later versions that are not there; raises as ``open_dataset``."""
+    there = (name for name, what in declared.items() if not what.later or name in group)
+    return {name: open_dataset(group, name, declared[name]) for name in there}
 
 
 def _member(group: h5py.Group, name: str) -> Any:
@@ -211,14 +274,7 @@ def _rows_before_a_hole(dataset: h5py.Dataset, rows: int, across: int) -> int:
 
 def read_scalar(dataset: h5py.Dataset, declared: Declared) -> Any:
     """The one value of a dataset that ``open_dataset`` gave; raises DataError where it leaves its range."""
-    value = dataset[()]
-    if not declared.takes_value(value):
-        raise _wrong(
-            dataset.parent,
-            dataset.name,
-            Message("is {value}; it must be {low:g} to {high:g}", value, declared.low, declared.high),
-        )
-    return value
+    return _in_range(dataset.parent, dataset.name, dataset[()], declared)
 
 
 def read_attribute(item: h5py.Group | h5py.Dataset, name: str, declared: Declared) -> Any:
@@ -233,19 +289,44 @@ def read_attribute(item: h5py.Group | h5py.Dataset, name: str, declared: Declare
         raise _wrong(item, f"@{name}", Message("is missing"))
     held = item.attrs.get_id(name)
     shape = None if held.get_space().get_simple_extent_type() == h5py.h5s.NULL else held.shape
-    if not (declared.takes_type(held.dtype) and declared.takes_shape(shape)):
-        raise _wrong(
-            item,
-            f"@{name}",
-            Message("is {dtype} of shape {shape}; it must be {words}", held.dtype, shape, declared.words()),
+    _check_kind(item, f"@{name}", held.dtype, shape, declared)
+    return _in_range(item, f"@{name}", item.attrs[name], declared)
+
+
+def read_attributes(item: h5py.Group | h5py.Dataset, declared: Mapping[str, Declared]) -> dict[str, Any]:
+    """All of them by name; raises as ``read_attribute``."""
+    return {name: read_attribute(item, name, what) for name, what in declared.items()}
+
+
+def check_format(path: Path, file: h5py.File, root: Mapping[str, Declared], wanted: str, newest: int) -> None:
+    """Refuse a file whose attributes ``format`` and ``format_version`` are others; raises DataError."""
+    there = h5py.h5a.exists(file.id, b"format")
+    found = as_text(read_attribute(file, "format", root["format"])) if there else None
+    if found != wanted:
+        shown = "something else" if found is None else repr(found[:40])
+        raise DataError("{path}: holds {found}, not {wanted}; give another file", path, shown, wanted)
+    version = int(read_attribute(file, "format_version", root["format_version"]))
+    if version > newest:
+        raise DataError(
+            "{path}: format version {version}, this program reads up to {newest}; update phasedic",
+            path,
+            version,
+            newest,
         )
-    value = item.attrs[name]
+
+
+def _check_kind(
+    item: h5py.Group | h5py.Dataset, name: str, dtype: np.dtype[Any], shape: Any, declared: Declared
+) -> None:
+    if not (declared.takes_type(dtype) and declared.takes_shape(shape)):
+        what = Message("is {dtype} of shape {shape}; it must be {words}", dtype, shape, declared.demand())
+        raise _wrong(item, name, what)
+
+
+def _in_range(item: h5py.Group | h5py.Dataset, name: str, value: Any, declared: Declared) -> Any:
     if not declared.takes_value(value):
-        raise _wrong(
-            item,
-            f"@{name}",
-            Message("is {value}; it must be {low:g} to {high:g}", value, declared.low, declared.high),
-        )
+        low, high = declared.low, declared.high
+        raise _wrong(item, name, Message("is {value}; it must be {low:g} to {high:g}", value, low, high))
     return value
 
 
@@ -255,78 +336,3 @@ def _wrong(group: h5py.Group | h5py.Dataset, name: str, what: str) -> DataError:
     return DataError(
         "{filename}: {words}; this is not a file as phasedic writes it", group.file.filename, words
     )
-
-
-@dataclass(frozen=True, slots=True)
-class JsonField:
-    """What a value must be.
-
-    Attributes
-    ----------
-    kind : type
-        str, bool, int, float (which whole numbers are too), dict or list.
-    low, high : float
-        Range of a number, ends included; not a number is outside.
-    missing : bool
-        Whether it may be left out or null.
-    words : tuple of str
-        The texts that are allowed; empty: any.
-    """
-
-    kind: type
-    low: float = -math.inf
-    high: float = math.inf
-    missing: bool = False
-    words: tuple[str, ...] = ()
-
-    def takes(self, value: Any) -> bool:
-        """Whether ``value`` is so."""
-        if value is None:
-            return self.missing
-        if self.kind in (int, float):
-            number = isinstance(value, int) if self.kind is int else isinstance(value, int | float)
-            return (
-                number and not isinstance(value, bool) and self.low <= value <= self.high and _finite(value)
-            )
-        return isinstance(value, self.kind) and (not self.words or value in self.words)
-
-
-def _finite(value: float) -> bool:
-    return isinstance(value, int) or math.isfinite(value)
-
-
-def read_object(text: Any, where: str) -> dict[str, Any]:
-    """The JSON object that stands in ``text``.
-
-    Raises
-    ------
-    DataError
-        It is none.
-    """
-    try:
-        value = json.loads(as_text(text))
-    except (ValueError, RecursionError) as error:
-        raise DataError(
-            "{where} is not JSON ({error}); the file is damaged, or not of phasedic", where, error
-        ) from error
-    if not isinstance(value, dict):
-        raise DataError("{where} is not a JSON object; this is not a file as phasedic writes it", where)
-    return value
-
-
-def check_object(value: Mapping[str, Any], form: Mapping[str, JsonField], where: str) -> None:
-    """Refuse an object whose values are not of ``form``; others than those are let be.
-
-    Raises
-    ------
-    DataError
-    """
-    for name, declared in form.items():
-        if not declared.takes(value.get(name)):
-            shown = repr(value.get(name))[:60]
-            raise DataError(
-                "{where}: {name} is {shown}; this is not a file as phasedic writes it",
-                where,
-                repr(name),
-                shown,
-            )

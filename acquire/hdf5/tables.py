@@ -96,16 +96,18 @@ class RowTable:
 NO_UNIT = "none"
 
 
-def set_attributes(item: Any, **attributes: Any) -> None:
-    """Set attributes, texts in fixed length.
+def set_attributes(item: Any, *, fixed: bool = True, **attributes: Any) -> None:
+    """Set attributes, texts in ``fixed`` length.
 
-    Texts of variable length would stand in HDF5's global heap, the one structure of this file
-    without a checksum: the library loops for ever on a damaged one. Bytes of a name that is not UTF-8 are escaped.
+    Texts of variable length stand in HDF5's global heap, the one structure of a session without a checksum: the
+    library loops for ever on a damaged one. Bytes of a name that is not UTF-8 are escaped.
     """
     for name, value in attributes.items():
-        if isinstance(value, list):
+        if not fixed:
+            value = storable(value) if isinstance(value, str) else value
+        elif isinstance(value, list):
             value = np.array([storable(text).encode() for text in value], "S")
-        item.attrs[name] = np.bytes_(storable(value).encode()) if isinstance(value, str) else value
+        item.attrs[name] = np.bytes_(storable(value).encode()) if fixed and isinstance(value, str) else value
 
 
 def storable(text: str) -> str:
@@ -118,16 +120,13 @@ def as_text(value: Any) -> str:
     return bytes(value).decode("utf-8") if isinstance(value, bytes) else str(value)
 
 
-def new_group(parent: h5py.Group, name: str, nexus_class: str, **attributes: Any) -> h5py.Group:
-    """A group with its NeXus class."""
+def new_group(
+    parent: h5py.Group, name: str, nexus_class: str, *, fixed: bool = True, **attributes: Any
+) -> h5py.Group:
+    """A group with its NeXus class; ``fixed`` as of ``set_attributes``."""
     group = parent.create_group(name)
-    set_attributes(group, NX_class=nexus_class, **attributes)
+    set_attributes(group, fixed=fixed, NX_class=nexus_class, **attributes)
     return group
-
-
-def new_json(group: h5py.Group, name: str, value: Any) -> None:
-    """A scalar text dataset holding JSON."""
-    set_attributes(group.create_dataset(name, data=np.bytes_(to_json(value))), units=NO_UNIT)
 
 
 def to_json(value: Any) -> str:

@@ -1,6 +1,7 @@
-"""Where everything stands in a session file, and how it is encoded. Writer and reader share it.
+"""Where everything stands in a session file, and how it is encoded. Writer, reader and documents share it.
 
-The file is HDF5 in NeXus conventions (docs/session-format.md describes it for other programs).
+The file is HDF5 in NeXus conventions (docs/session-format.md describes it for other programs). A file from elsewhere is
+believed where it is as declared here, and nowhere else.
 All groups, datasets and attributes exist before the first frame, since a file in SWMR mode
 can only grow. ``SessionInfo`` is what a session has once: devices, time zero, configuration, what is recorded.
 """
@@ -12,16 +13,16 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import Any, Self, get_args
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from acquire.clock import ClockPair
-from acquire.events import Event
+from acquire.events import Event, Level
 from acquire.frame import CameraInfo, Clock
-from acquire.hdf5 import NO_UNIT, Declared, new_group, new_json, set_attributes, to_json
+from acquire.hdf5 import NO_UNIT, Declared, Group, JsonField, new_datasets, new_group, set_attributes, to_json
 from acquire.load_sample import LoadCellInfo, LoadFlag
 from acquire.record_mode import RecordMode
 from acquire.text.message import kept
@@ -83,99 +84,136 @@ CONTINUED = b"+"
 LEDGER_BYTES = 8192
 CLOCKS: tuple[Clock, ...] = ("device", "host", "nominal")
 STABLE = {None: -1, False: 0, True: 1}
-ROWS = 512  # of a chunk of a one-dimensional dataset
-
-_FIRST = ["0", ".", "."]
-"""``default_slice`` of pictures: viewers begin with the first."""
+FLAGS = {flag.name: flag.value for flag in LoadFlag}
 
 MAX_TIME_S = 1e12  # no clock has gone so far
 MAX_FORCE_N = 1e12
 MAX_PIXELS = 1 << 28
 
 
-class Column(NamedTuple):
-    """A column of one value a row; ``missing`` is that of a row that is not written, the range that of others.
-
-    ``later``: files of the first versions do not have it.
-    """
-
-    dtype: str
-    missing: Any
-    unit: str
-    meaning: str
-    low: float = -math.inf
-    high: float = math.inf
-    later: bool = False
-
-    def declared(self) -> Declared:
-        """What a reader demands of it."""
-        return Declared(self.dtype, (None,), self.low, self.high)
+def _time(meaning: str) -> Declared:
+    return Declared("f8", (None,), -MAX_TIME_S, MAX_TIME_S, "s", meaning, missing=np.nan)
 
 
-def _time(meaning: str) -> Column:
-    return Column("f8", np.nan, "s", meaning, -MAX_TIME_S, MAX_TIME_S)
+def _count(meaning: str, high: float = math.inf, low: int = 0, *, later: bool = False) -> Declared:
+    return Declared("u4", (None,), low, high, NO_UNIT, meaning, missing=0, later=later)
 
 
-def _count(meaning: str, high: float = math.inf, low: int = 0) -> Column:
-    return Column("u4", 0, NO_UNIT, meaning, low, high)
+def _sequence(meaning: str) -> Declared:
+    return Declared("i8", (None,), 0, math.inf, NO_UNIT, meaning, missing=-1)
 
 
-def _sequence(meaning: str) -> Column:
-    return Column("i8", -1, NO_UNIT, meaning, 0)
+def _word(dtype: str, meaning: str, low: float, high: float, missing: int = 0) -> Declared:
+    return Declared(dtype, (None,), low, high, NO_UNIT, meaning, missing=missing)
 
 
-Columns = dict[str, Column]
+def _text(size: int, meaning: str) -> Declared:
+    return Declared(f"S{size}", (None,), unit=NO_UNIT, long_name=meaning, missing=b"")
 
-FRAME_COLUMNS: Columns = {
+
+def _json(words: str) -> Declared:
+    return Declared("S", unit=NO_UNIT, words=f"JSON: {words}")
+
+
+FRAME_COLUMNS = {
     "time_s": _time("time since the start of the session, mid-exposure where known"),
     "monotonic_s": _time("the same on the machine's monotonic clock"),
     "raw_monotonic_s": _time("the stamp as it came, monotonic clock"),
     "index": _sequence("sequence number of the source"),
     "lost_before": _count("frames known to be lost since the frame before"),
-    "damaged": Column("u1", 0, NO_UNIT, "1: the device said that the content is not whole", 0, 1),
-    "clock": Column("u1", 0, NO_UNIT, "who stamped: 0 device, 1 host, 2 nobody (a given rate)", 0, 2),
+    "damaged": _word("u1", "1: the device said that the content is not whole", 0, 1),
+    "clock": _word("u1", "who stamped: 0 device, 1 host, 2 nobody (a given rate)", 0, 2),
 }
-LOAD_COLUMNS: Columns = {
+LOAD_COLUMNS = {
     "time_s": _time("time since the start of the session"),
     "monotonic_s": _time("the same on the machine's monotonic clock"),
-    "force": Column(
-        "f8",
-        np.nan,
-        "N",
-        "tension positive; NaN where the line gave no valid value",
-        -MAX_FORCE_N,
-        MAX_FORCE_N,
+    "force": Declared(
+        "f8", (None,), -MAX_FORCE_N, MAX_FORCE_N, "N", "tension positive; NaN where the line gave no valid value",
+        missing=np.nan,
     ),
-    "flags": _count("bits: see flag_names", sum(flag.value for flag in LoadFlag)),
-    "stable": Column("i1", -1, NO_UNIT, "1 yes, 0 no, -1 not said", -1, 1),
-    "device_ms": Column("f8", np.nan, "ms", "the device's own time, where it sends one"),
-    "unit": Column("S8", b"", NO_UNIT, "unit on the line, or as the user said"),
-    "line_end": Column("u8", 0, NO_UNIT, "where in lines the line of this sample ends", 1),
-}
-BURST_COLUMNS: Columns = {
+    "flags": Declared(
+        "u4", (None,), 0, sum(FLAGS.values()), NO_UNIT, "bits: see flag_names", missing=0,
+        more={"flag_names": json.dumps(FLAGS)},
+    ),
+    "stable": _word("i1", "1 yes, 0 no, -1 not said", -1, 1, -1),
+    "device_ms": Declared(
+        "f8", (None,), unit="ms", long_name="the device's own time, where it sends one", missing=np.nan
+    ),
+    "unit": _text(8, "unit on the line, or as the user said"),
+    "line_end": _word("u8", "where in lines the line of this sample ends", 1, math.inf),
+}  # fmt: skip
+BURST_COLUMNS = {
     "time_s": _time("mean time of the frames, since the start of the session"),
     "monotonic_s": _time("the same on the machine's monotonic clock"),
     "n": _count("frames summed", MAX_BURST_FRAMES, 1),
-    "noise": Column("f8", np.nan, "GL", "temporal standard deviation of one frame", 0, 65535),
+    "noise": Declared(
+        "f8", (None,), 0, 65535, "GL", "temporal standard deviation of one frame", missing=np.nan
+    ),
     "duration": _time("time from the first frame to the last"),
     "first_index": _sequence("sequence number of the first frame"),
     "last_index": _sequence("sequence number of the last frame"),
     "lost": _count("frames lost or left out since the burst before"),
-    "blank": Column(
-        "u4",
-        0,
-        NO_UNIT,
+    "blank": _count(
         "which of its frames, from 1, has less than half the contrast of another; 0: none",
-        0,
         MAX_BURST_FRAMES,
         later=True,
     ),
-    "clock": Column("u1", 0, NO_UNIT, "who stamped: 0 device, 1 host, 2 nobody (a given rate)", 0, 2),
+    "clock": _word("u1", "who stamped: 0 device, 1 host, 2 nobody (a given rate)", 0, 2),
 }
-CLOCK_COLUMNS: Columns = {
+CLOCK_COLUMNS = {
     "monotonic_s": _time("monotonic clock"),
-    "utc": Column("S27", b"", NO_UNIT, "the same instant in UTC, ISO 8601"),
+    "utc": _text(27, "the same instant in UTC, ISO 8601"),
 }
+ROOT = {
+    "format": Declared("S"), "format_version": Declared("int", (), 1), "set_id": Declared("S"),
+    "part": Declared("int", (), 0, 999_999),
+}  # fmt: skip
+OF_ENTRY = {"record": Declared("S"), "crop": Declared("i8", (4,), 0, 65_535)}
+"""Attributes of the root and of ``entry``."""
+ENTRY = {
+    "start_time": Declared("S", unit="ISO 8601 UTC", words="start of the test, UTC"),
+    "start_monotonic_s": Declared(
+        "f8", (), -MAX_TIME_S, MAX_TIME_S, "s",
+        words="the same instant on the monotonic clock of the recording machine",
+    ),
+    "config": _json("configuration in force"),
+    "metadata": _json("free text of the user"),
+    "versions": _json("versions of the software"),
+}  # fmt: skip
+NOTES = {
+    "events": Declared(
+        f"S{EVENT_BYTES}", (None,), unit=NO_UNIT, rows=16,
+        words="one JSON object a row; a row that begins with `+` continues the row before",
+    ),
+    "ledger": Declared(
+        f"S{LEDGER_BYTES}", (1,), unit=NO_UNIT,
+        words="JSON: final frame counts; empty where the run did not come to its end",
+    ),
+}  # fmt: skip
+CAMERA = {"description": _json("identity, format and controls in force")}
+LOAD_CELL = {"description": _json("identity, settings, sign and calibration; null without one")}
+_CLOCK = JsonField(str, words=CLOCKS)
+CAMERA_FIELDS = {
+    "address": JsonField(str), "name": JsonField(str),
+    "width": JsonField(int, 1, 65_535), "height": JsonField(int, 1, 65_535), "bits": JsonField(int, 1, 16),
+    "live": JsonField(bool), "clock": _CLOCK,
+    "fps": JsonField(float, 0, 1e9, missing=True), "exposure_s": JsonField(float, 0, 1e9, missing=True),
+    "pixel_format": JsonField(str), "controls": JsonField(dict), "warnings": JsonField(list),
+    "white_level": JsonField(int, 1, 65_535, missing=True),
+}  # fmt: skip
+LOAD_FIELDS = {
+    "address": JsonField(str), "name": JsonField(str), "protocol": JsonField(str), "clock": _CLOCK,
+    "sign": JsonField(int, -1, 1), "capacity_N": JsonField(float, 0, MAX_FORCE_N, missing=True),
+    "settings": JsonField(dict), "warnings": JsonField(list),
+}  # fmt: skip
+EVENT_FIELDS = {
+    "monotonic_s": JsonField(float, -MAX_TIME_S, MAX_TIME_S),
+    "kind": JsonField(str), "source": JsonField(str), "text": JsonField(str),
+    "level": JsonField(str, words=get_args(Level)), "data": JsonField(dict),
+}  # fmt: skip
+_FRAME = JsonField(int, 0, 2**63 - 1)
+BURST_FIELDS = {"first": _FRAME, "last": _FRAME, "n": JsonField(int, 1, MAX_BURST_FRAMES)}
+"""JSON of the camera, of the load cell, of an event, and of the data of one that names a burst."""
 
 
 def image_dtype(bits: int) -> np.dtype[Any]:
@@ -183,110 +221,74 @@ def image_dtype(bits: int) -> np.dtype[Any]:
     return np.dtype(np.uint8 if bits <= 8 else np.uint16)
 
 
-def new_columns(group: h5py.Group, columns: Columns, checksum: bool) -> None:
-    """Empty one-dimensional datasets that can grow, each with its unit and meaning."""
-    for name, c in columns.items():
-        dataset = group.create_dataset(
-            name, (0,), c.dtype, maxshape=(None,), chunks=(ROWS,), fillvalue=c.missing, fletcher32=checksum
-        )
-        set_attributes(dataset, units=c.unit, long_name=c.meaning)
-
-
-def new_images(group: h5py.Group, name: str, shape: tuple[int, ...], dtype: Any, checksum: bool) -> None:
-    """An empty stack of pictures; one chunk holds exactly one of them."""
-    dataset = group.create_dataset(
-        name, (0, *shape), dtype, maxshape=(None, *shape), chunks=(1, *shape), fletcher32=checksum
-    )
-    set_attributes(dataset, units="GL")
+def groups(camera: CameraInfo, sums: str = "u2 u4") -> dict[str, Group]:
+    """The groups of ``entry`` in a file of pictures of ``camera``, with the type of the sums of bursts."""
+    size, packed = (None, camera.height, camera.width), (camera.height * camera.width + 7) // 8
+    of_pictures = {"axes": ["time_s", ".", "."], "time_s_indices": 0, "default_slice": ["0", ".", "."]}
+    image = Declared(
+        image_dtype(camera.bits).str, size, unit="GL", rows=1, more={"bits": camera.bits},
+        words="grey levels as grabbed; the attribute `bits` has the significant bits",
+    )  # fmt: skip
+    total = Declared(sums, size, unit="GL", long_name="sum of the n frames; the mean is sum / n", rows=1)
+    clipped = Declared(
+        "u1", (None, packed), unit=NO_UNIT, rows=1, packed={"compression": "gzip", "compression_opts": 1},
+        long_name="pixels at saturation in any frame: one bit each, rows end to end, high bit first",
+    )  # fmt: skip
+    lines = Declared(
+        "u1", (None,), unit=NO_UNIT, rows=8192,
+        long_name="the bytes of the lines, one after the other, each ended by a line feed",
+    )  # fmt: skip
+    frames, bursts = FRAME_COLUMNS | {"image": image}, BURST_COLUMNS | {"sum": total, "clipped": clipped}
+    of_load = {"signal": "force", "axes": ["time_s"], "time_s_indices": 0}
+    return {
+        "frames": Group("NXdata", frames, of_pictures | {"signal": "image"}, "Frames as they were grabbed"),
+        "bursts": Group("NXdata", bursts, of_pictures | {"signal": "sum"}, "Sums of bursts"),
+        "load": Group("NXdata", LOAD_COLUMNS | {"lines": lines}, of_load, "Force"),
+        "clock": Group("NXcollection", CLOCK_COLUMNS),
+        "instrument": Group("NXinstrument"),
+        "instrument/camera": Group("NXdetector", CAMERA),
+        "instrument/load_cell": Group("NXsensor", LOAD_CELL),
+    }
 
 
 def describe_camera(info: CameraInfo) -> dict[str, Any]:
     """``CameraInfo`` as JSON values."""
-    names = ("address", "name", "width", "height", "bits", "live", "clock", "fps", "exposure_s")
-    return {
-        name: getattr(info, name) for name in (*names, "pixel_format", "controls", "warnings", "white_level")
-    }
+    return {name: getattr(info, name) for name in CAMERA_FIELDS}
 
 
 def describe_load(info: LoadCellInfo | None) -> dict[str, Any] | None:
     """``LoadCellInfo`` as JSON values."""
-    if info is None:
-        return None
-    names = ("address", "name", "protocol", "clock", "sign", "capacity_N", "settings", "warnings")
-    return {name: getattr(info, name) for name in names}
+    return None if info is None else {name: getattr(info, name) for name in LOAD_FIELDS}
 
 
 def create(file: h5py.File, about: SessionInfo, checksum: bool) -> None:
     """Everything that will ever stand in the file, empty."""
+    camera, mode = about.camera, about.mode
     set_attributes(file, NX_class="NXroot", default="entry", format=FORMAT, format_version=FORMAT_VERSION)
     set_attributes(file, set_id=about.set_id or NO_SET, part=about.part)
-    shown = "bursts" if about.mode.kind == "bursts" else "frames"
-    entry = new_group(file, "entry", "NXentry", default=shown)
-    set_attributes(entry, record=about.mode.text(), crop=np.array(about.mode.crop or NO_CROP, np.int64))
-    set_attributes(
-        entry.create_dataset("start_time", data=np.bytes_(about.start.iso())), units="ISO 8601 UTC"
-    )
-    set_attributes(entry.create_dataset("start_monotonic_s", data=about.start.monotonic), units="s")
-    for name in ("config", "metadata", "versions"):
-        new_json(entry, name, getattr(about, name))
-    instrument = new_group(entry, "instrument", "NXinstrument")
-    new_json(new_group(instrument, "camera", "NXdetector"), "description", describe_camera(about.camera))
-    new_json(new_group(instrument, "load_cell", "NXsensor"), "description", describe_load(about.load))
-    _create_frames(entry, about.camera, checksum)
-    _create_bursts(entry, about.camera, about.burst_frames, checksum)
-    _create_load(entry, checksum)
-    new_columns(new_group(entry, "clock", "NXcollection"), CLOCK_COLUMNS, checksum)
-    entry.create_dataset(
-        "events", (0,), f"S{EVENT_BYTES}", maxshape=(None,), chunks=(16,), fletcher32=checksum
-    )
-    entry.create_dataset("ledger", (1,), f"S{LEDGER_BYTES}")
-    set_attributes(entry["events"], units=NO_UNIT)
-    set_attributes(entry["ledger"], units=NO_UNIT)
+    entry = new_group(file, "entry", "NXentry", default="bursts" if mode.kind == "bursts" else "frames")
+    set_attributes(entry, record=mode.text(), crop=np.array(mode.crop or NO_CROP, np.int64))
+    values = {"start_time": np.bytes_(about.start.iso()), "start_monotonic_s": about.start.monotonic}
+    values |= {name: _stored_json(getattr(about, name)) for name in ("config", "metadata", "versions")}
+    new_datasets(entry, ENTRY | NOTES, values, checksum=checksum)
+    sums = "u2" if (2**camera.bits - 1) * about.burst_frames < 2**16 else "u4"
+    descriptions = {"camera": describe_camera(camera), "load_cell": describe_load(about.load)}
+    for name, form in groups(camera, sums).items():
+        group = new_group(entry, name, form.nexus, **form.attributes)
+        described = {"description": _stored_json(descriptions.get(name.rpartition("/")[2]))}
+        new_datasets(group, form.items, described, checksum=checksum)
+        if form.title:
+            _add_title(group, form.title)
+
+
+def _stored_json(value: Any) -> np.bytes_:
+    return np.bytes_(to_json(value))
 
 
 def _add_title(group: h5py.Group, words: str) -> None:
     """As a dataset of fixed length and UTF-8: viewers show what is marked as ASCII as bytes."""
     data = np.array(words.encode(), h5py.string_dtype("utf-8", len(words)))
     set_attributes(group.create_dataset("title", data=data), units=NO_UNIT)
-
-
-def _create_frames(entry: h5py.Group, camera: CameraInfo, checksum: bool) -> None:
-    axes = ["time_s", ".", "."]
-    frames = new_group(entry, "frames", "NXdata", signal="image", axes=axes, time_s_indices=0)
-    set_attributes(frames, default_slice=_FIRST)
-    _add_title(frames, "Frames as they were grabbed")
-    new_columns(frames, FRAME_COLUMNS, checksum)
-    new_images(frames, "image", (camera.height, camera.width), image_dtype(camera.bits), checksum)
-    set_attributes(frames["image"], bits=camera.bits)
-
-
-def _create_bursts(entry: h5py.Group, camera: CameraInfo, frames: int, checksum: bool) -> None:
-    axes = ["time_s", ".", "."]
-    bursts = new_group(entry, "bursts", "NXdata", signal="sum", axes=axes, time_s_indices=0)
-    set_attributes(bursts, default_slice=_FIRST)
-    _add_title(bursts, "Sums of bursts")
-    new_columns(bursts, BURST_COLUMNS, checksum)
-    size = (camera.height, camera.width)
-    dtype = np.uint16 if (2**camera.bits - 1) * frames < 2**16 else np.uint32
-    new_images(bursts, "sum", size, dtype, checksum)
-    set_attributes(bursts["sum"], long_name="sum of the n frames; the mean is sum / n")
-    packed = (camera.height * camera.width + 7) // 8
-    clipped = bursts.create_dataset(
-        "clipped", (0, packed), "u1", maxshape=(None, packed), chunks=(1, packed), compression="gzip",
-        compression_opts=1, fletcher32=checksum,
-    )  # fmt: skip
-    meaning = "pixels at saturation in any frame: one bit each, rows end to end, high bit first"
-    set_attributes(clipped, units=NO_UNIT, long_name=meaning)
-
-
-def _create_load(entry: h5py.Group, checksum: bool) -> None:
-    load = new_group(entry, "load", "NXdata", signal="force", axes=["time_s"], time_s_indices=0)
-    _add_title(load, "Force")
-    new_columns(load, LOAD_COLUMNS, checksum)
-    set_attributes(load["flags"], flag_names=json.dumps({flag.name: flag.value for flag in LoadFlag}))
-    lines = load.create_dataset("lines", (0,), "u1", maxshape=(None,), chunks=(8192,), fletcher32=checksum)
-    meaning = "the bytes of the lines, one after the other, each ended by a line feed"
-    set_attributes(lines, units=NO_UNIT, long_name=meaning)
 
 
 def event_rows(event: Event, start: float) -> NDArray[np.bytes_]:

@@ -77,7 +77,7 @@ class LoadTable:
         self, names: Sequence[str], low: float = -math.inf, high: float = math.inf
     ) -> Iterator[tuple[dict[str, NDArray[Any]], NDArray[np.bool_], int]]:
         """Columns, which rows are good, and the number of the first; for ``low`` and ``high`` the time comes first."""
-        held = open_datasets(self._group, {name: one.declared() for name, one in layout.LOAD_COLUMNS.items()})
+        held = open_datasets(self._group, layout.LOAD_COLUMNS)
         n = same_length(self._group, [*held.values()], whole=self._whole)
         for first in range(0, n, PIECE):
             table: dict[str, NDArray[Any]] = {}

@@ -22,10 +22,12 @@ from acquire.errors import DataError, PhasedicError
 from acquire.events import Event
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.hdf5 import (
+    DAMAGE,
     Declared,
     PaddedFile,
     PictureReader,
     as_text,
+    check_format,
     check_links,
     check_size,
     open_dataset,
@@ -33,7 +35,7 @@ from acquire.hdf5 import (
     open_file,
     open_group,
     probe,
-    read_attribute,
+    read_attributes,
     read_object,
     read_scalar,
     read_superblock,
@@ -44,11 +46,10 @@ from acquire.record_mode import RecordMode
 from acquire.session import layout, stored
 from acquire.session.bursts import burst_from
 from acquire.session.loads import LoadPiece, LoadTable
-from acquire.session.stored import DAMAGE, events_from, read_column, read_rows
+from acquire.session.stored import events_from, read_column, read_rows
 from acquire.text import Message
 from acquire.text.message import about
 
-TEXT = Declared("S")
 UNFINISHED = Message(
     "was not closed by its writer (killed, or still recording); everything complete in it is read. "
     "'phasedic recover' makes a clean copy"
@@ -94,33 +95,31 @@ class SessionPart(Closing):
             raise DataError(error.text) from error
 
     def _read(self) -> None:
-        _check_format(self.path, self.file)
-        root = {name: read_attribute(self.file, name, what) for name, what in stored.ROOT.items()}
+        check_format(self.path, self.file, layout.ROOT, layout.FORMAT, layout.FORMAT_VERSION)
+        root = read_attributes(self.file, layout.ROOT)
         check_links(self.file)
         entry = self.entry = open_group(self.file, "entry")
-        texts = {name: self._text(entry, name) for name in stored.TEXTS}
-        self.config = stored.config_from(texts["config"], Message("{path}: config", self.path))
+        held = _values(entry, layout.ENTRY)
+        self.config = stored.config_from(held["config"], Message("{path}: config", self.path))
         self.metadata, self.versions = (
-            read_object(texts[name], about(self.path, name)) for name in ("metadata", "versions")
+            read_object(held[name], about(self.path, name)) for name in ("metadata", "versions")
         )
         instrument = open_group(entry, "instrument")
-        camera, cell = (self._text(open_group(instrument, n), "description") for n in ("camera", "load_cell"))
+        camera, cell = (
+            _values(open_group(instrument, name), items)["description"]
+            for name, items in (("camera", layout.CAMERA), ("load_cell", layout.LOAD_CELL))
+        )
         self.camera: CameraInfo = stored.camera_from(camera, Message("{path}: the camera", self.path))
         self.load_cell: LoadCellInfo | None = stored.load_from(
             cell, Message("{path}: the load cell", self.path)
         )
-        self.mode = _mode({name: read_attribute(entry, name, what) for name, what in stored.ENTRY.items()})
+        self._form = layout.groups(self.camera)
+        self.mode = _mode(read_attributes(entry, layout.OF_ENTRY))
         set_id = as_text(root["set_id"])
         self.set_id, self.part = "" if set_id == layout.NO_SET else set_id, int(root["part"])
-        utc, monotonic = (
-            read_scalar(item, stored.START[name]) for name, item in open_datasets(entry, stored.START).items()
-        )
-        self.start = ClockPair.from_iso(float(monotonic), as_text(utc))
+        self.start = ClockPair.from_iso(float(held["start_monotonic_s"]), as_text(held["start_time"]))
         self._groups = {name: open_group(entry, name) for name in ("frames", "bursts", "load", "clock")}
         self.refresh()
-
-    def _text(self, group: h5py.Group, name: str) -> Any:
-        return read_scalar(open_dataset(group, name, TEXT), TEXT)
 
     def refresh(self) -> None:
         """Look for what the writer has added since."""
@@ -140,16 +139,18 @@ class SessionPart(Closing):
                     dataset.id.refresh()
             for name in ("events", "ledger"):
                 self.entry[name].id.refresh()
-        pictures = stored.pictures_of(self.camera)
-        frames, bursts = self._groups["frames"], self._groups["bursts"]
-        self._images = open_datasets(frames, pictures["frames"])["image"]
+        self._images, self._sums, self._clipped, lines = (
+            open_dataset(self._groups[group], name, self._form[group].items[name])
+            for group, name in (
+                ("frames", "image"),
+                ("bursts", "sum"),
+                ("bursts", "clipped"),
+                ("load", "lines"),
+            )
+        )
         self._pictures = PictureReader(self._images)
-        self._clipped = open_datasets(bursts, pictures["bursts"])["clipped"]
-        self._sums = stored.open_sums(bursts, self.camera)
-        lines = open_dataset(self._groups["load"], "lines", stored.LINES)
         self._loads = LoadTable(self._groups["load"], lines, whole=self._whole, closed=not self._follows)
-        self._events = open_dataset(self.entry, "events", stored.EVENTS)
-        self._frame_counts = open_dataset(self.entry, "ledger", stored.LEDGER)
+        self._events, self._frame_counts = open_datasets(self.entry, layout.NOTES).values()
 
     def _check_order(self) -> None:
         """Frames are found by their sequence numbers."""
@@ -308,20 +309,8 @@ def _open_file(path: Path, probed: bool, salvage: bool) -> tuple[h5py.File, str 
         raise damaged(path, Message("it cannot be opened"), error, NOTHING if salvage else ADVICE) from error
 
 
-def _check_format(path: Path, file: h5py.File) -> None:
-    if (
-        not h5py.h5a.exists(file.id, b"format")
-        or as_text(read_attribute(file, "format", TEXT)) != layout.FORMAT
-    ):
-        raise DataError("{path} is an HDF5 file, but not a session of this program", path)
-    version = int(read_attribute(file, "format_version", stored.ROOT["format_version"]))
-    if version > layout.FORMAT_VERSION:
-        raise DataError(
-            "{path} has format version {version}, this program reads up to {FORMAT_VERSION}; update phasedic",
-            path,
-            version,
-            layout.FORMAT_VERSION,
-        )
+def _values(group: h5py.Group, items: Mapping[str, Declared]) -> dict[str, Any]:
+    return {name: read_scalar(item, items[name]) for name, item in open_datasets(group, items).items()}
 
 
 def _mode(attributes: Mapping[str, Any]) -> RecordMode:

@@ -5,20 +5,20 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.events import Event, EventKind, Level
+from acquire.events import Event, EventKind
 from acquire.frame import CameraInfo
 from acquire.hdf5 import (
+    DAMAGE,
     Declared,
     JsonField,
     check_object,
-    open_dataset,
     open_datasets,
     read_object,
     stored_rows,
@@ -29,74 +29,12 @@ from acquire.session.oddities import Oddities
 from acquire.text import Message
 from acquire.text.message import about, taken
 
-ROOT = {
-    "format_version": Declared("int", (), 1),
-    "set_id": Declared("S"),
-    "part": Declared("int", (), 0, 999_999),
-}
-ENTRY = {"record": Declared("S"), "crop": Declared("i8", (4,), 0, 65_535)}
-START = {
-    "start_time": Declared("S"),
-    "start_monotonic_s": Declared("f8", (), -layout.MAX_TIME_S, layout.MAX_TIME_S),
-}
-TEXTS = dict.fromkeys(("config", "metadata", "versions"), Declared("S"))
-EVENTS = Declared(f"S{layout.EVENT_BYTES}", (None,))
-LEDGER = Declared(f"S{layout.LEDGER_BYTES}", (1,))
-LINES = Declared("u1", (None,))
-
-# What HDF5, JSON and our own decoding raise on bytes that are not what they were.
-DAMAGE = (
-    OSError,
-    RuntimeError,
-    LookupError,
-    ValueError,
-    TypeError,
-    AttributeError,
-    MemoryError,
-    OverflowError,
-)
-_CLOCK = JsonField(str, words=layout.CLOCKS)
-CAMERA_FIELDS = {
-    "address": JsonField(str),
-    "name": JsonField(str),
-    "width": JsonField(int, 1, 65_535),
-    "height": JsonField(int, 1, 65_535),
-    "bits": JsonField(int, 1, 16),
-    "live": JsonField(bool),
-    "clock": _CLOCK,
-    "fps": JsonField(float, 0, 1e9, missing=True),
-    "exposure_s": JsonField(float, 0, 1e9, missing=True),
-    "pixel_format": JsonField(str),
-    "controls": JsonField(dict),
-    "warnings": JsonField(list),
-    "white_level": JsonField(int, 1, 65_535, missing=True),
-}
-LOAD_FIELDS = {
-    "address": JsonField(str),
-    "name": JsonField(str),
-    "protocol": JsonField(str),
-    "clock": _CLOCK,
-    "sign": JsonField(int, -1, 1),
-    "capacity_N": JsonField(float, 0, layout.MAX_FORCE_N, missing=True),
-    "settings": JsonField(dict),
-    "warnings": JsonField(list),
-}
-EVENT_FIELDS = {
-    "monotonic_s": JsonField(float, -layout.MAX_TIME_S, layout.MAX_TIME_S),
-    "kind": JsonField(str),
-    "source": JsonField(str),
-    "text": JsonField(str),
-    "level": JsonField(str, words=get_args(Level)),
-    "data": JsonField(dict),
-}
-_FRAME = JsonField(int, 0, 2**63 - 1)
-BURST_FIELDS = {"first": _FRAME, "last": _FRAME, "n": JsonField(int, 1, 65_536)}
 _NAMES_A_BURST = {EventKind.REFERENCE, EventKind.MEASURED}
 
 
 def camera_from(text: Any, where: str) -> CameraInfo:
     """The camera whose description stands in ``text``; raises DataError where it is none."""
-    values = _described(text, CAMERA_FIELDS, where)
+    values = _described(text, layout.CAMERA_FIELDS, where)
     if values["width"] * values["height"] > layout.MAX_PIXELS:
         raise DataError(
             "{where}: pictures of {values} x {values2} px are beyond sense",
@@ -111,7 +49,7 @@ def load_from(text: Any, where: str) -> LoadCellInfo | None:
     """The load cell, or None for "null"; raises DataError where it is neither."""
     if bytes(text).strip() == b"null":
         return None
-    return LoadCellInfo(**_described(text, LOAD_FIELDS, where))
+    return LoadCellInfo(**_described(text, layout.LOAD_FIELDS, where))
 
 
 def _described(text: Any, form: Mapping[str, JsonField], where: str) -> dict[str, Any]:
@@ -120,25 +58,6 @@ def _described(text: Any, form: Mapping[str, JsonField], where: str) -> dict[str
     return {name: values[name] for name in form if name in values} | {
         "warnings": tuple(map(str, values["warnings"]))
     }
-
-
-def pictures_of(camera: CameraInfo) -> dict[str, dict[str, Declared]]:
-    """The pictures that frames and bursts of ``camera`` have, by group and name; for sums see ``open_sums``."""
-    size = (None, camera.height, camera.width)
-    packed = (camera.height * camera.width + 7) // 8
-    return {
-        "frames": {"image": Declared(layout.image_dtype(camera.bits).str, size)},
-        "bursts": {"clipped": Declared("u1", (None, packed))},
-    }
-
-
-def open_sums(group: h5py.Group, camera: CameraInfo) -> h5py.Dataset:
-    """The sums of bursts: of 16 or of 32 bits."""
-    size = (None, camera.height, camera.width)
-    try:
-        return open_dataset(group, "sum", Declared("u2", size))
-    except DataError:
-        return open_dataset(group, "sum", Declared("u4", size))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -217,7 +136,7 @@ def same_length(group: h5py.Group, items: Sequence[h5py.Dataset], *, whole: bool
 def usable(
     group: h5py.Group,
     table: Mapping[str, NDArray[Any]],
-    columns: layout.Columns,
+    columns: Mapping[str, Declared],
     first: int = 0,
     *,
     whole: bool,
@@ -229,17 +148,16 @@ def usable(
     DataError
         Where ``whole``, a value is beyond its range.
     """
-    declared = {name: columns[name].declared() for name in table}
-    outside = {name: what.outside(table[name]) for name, what in declared.items()}
+    outside = {name: columns[name].outside(values) for name, values in table.items()}
     beyond = np.logical_or.reduce([*outside.values()], axis=0)
     if whole and beyond.any():
-        raise DataError(_beyond(about(group.file.filename, group.name), table, outside, declared, first))
+        raise DataError(_beyond(about(group.file.filename, group.name), table, outside, columns, first))
     return np.asarray(~(beyond | np.isnan(table["monotonic_s"])), np.bool_)
 
 
 def read_rows(
     group: h5py.Group,
-    columns: layout.Columns,
+    columns: Mapping[str, Declared],
     pictures: Sequence[h5py.Dataset] = (),
     *,
     whole: bool,
@@ -259,11 +177,10 @@ def read_rows(
     DataError
         Columns are missing or of another kind; where ``whole``, also of another length or out of range.
     """
-    there = {name: column for name, column in columns.items() if name in group or not column.later}
-    held = open_datasets(group, {name: column.declared() for name, column in there.items()})
+    held = open_datasets(group, columns)
     n = same_length(group, [*held.values(), *pictures], whole=whole)
     table = {name: read_column(item, n, columns[name].missing, whole=whole) for name, item in held.items()}
-    for name in columns.keys() - there.keys():
+    for name in columns.keys() - held.keys():
         table[name] = np.full(n, columns[name].missing, columns[name].dtype)
     good = usable(group, table, columns, whole=whole)
     odd = Oddities(str(group.name).rpartition("/")[2], closed=closed)
@@ -275,10 +192,10 @@ def read_rows(
     return Rows(kept, places, odd.words())
 
 
-def _beyond(where: str, table: Any, outside: Any, declared: Mapping[str, Declared], first: int) -> str:
+def _beyond(where: str, table: Any, outside: Any, columns: Mapping[str, Declared], first: int) -> str:
     name = next(name for name, rows in outside.items() if rows.any())
     row = int(np.argmax(outside[name]))
-    low, high = declared[name].low, declared[name].high
+    low, high = columns[name].low, columns[name].high
     return Message(
         "{where}/{name} is {table} in row {first}, beyond {low:g} to {high:g}; the file is damaged: "
         "'phasedic recover' saves the other rows",
@@ -331,12 +248,12 @@ def events_from(rows: NDArray[np.bytes_], where: str, *, whole: bool) -> list[Ev
 
 def _event_from(text: bytes, where: str) -> Event | None:
     values = read_object(text, where)
-    check_object(values, EVENT_FIELDS, where)
+    check_object(values, layout.EVENT_FIELDS, where)
     if values["kind"] not in {*EventKind}:
         return None
     kind = EventKind(values["kind"])
     if kind in _NAMES_A_BURST:
-        check_object(values["data"], BURST_FIELDS, where)
+        check_object(values["data"], layout.BURST_FIELDS, where)
     return Event(
         values["monotonic_s"], kind, values["source"], taken(values), values["level"], values["data"]
     )

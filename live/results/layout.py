@@ -1,19 +1,24 @@
-"""The layout of ``strain.h5``: the writer makes it, the reader refuses any other."""
+"""The layout of ``strain.h5``, as data: the writer makes it, the reader refuses any other, the documents list it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Mapping
 from itertools import chain
+from typing import Any
 
-from acquire.hdf5 import Declared
+import numpy as np
+
+from acquire.hdf5 import COMPRESSED, Declared
+from analysis.field import Status
 from live.config.figures import FIGURES, columns
+from live.results.quantities import quantity_of
 from live.results.row import BLUR, GRADIENTS, STRAINS, gauge_columns
 from live.results.strain_csv import COLUMNS
 
 FORMAT, FORMAT_VERSION = "phasedic-strain", 1
 PLAIN_MAPS = ("u", "v", *GRADIENTS, *STRAINS)
 MAPS = (*PLAIN_MAPS, *(f"sigma_{name}" for name in PLAIN_MAPS), "residual", "status", "iterations")
-ADDED_MAPS = BLUR  # that files of earlier versions do not have
 BYTES = {"status", "iterations"}  # maps of whole numbers; the others are float32
 WHOLE = {figure.name for figure in FIGURES if figure.column and figure.kind == "count"}
 """Columns of whole numbers; the others are float64."""
@@ -28,26 +33,62 @@ MAX_SIDE_PX = 65_535
 
 ROOT = {"format": Declared("text"), "format_version": Declared("int", (), 1), "start_time": Declared("text")}
 STRAIN = {"strain_measure": Declared("text"), "grid": Declared("text")}
-TEXTS = dict.fromkeys(("config", "metadata", "versions"), Declared("text"))
+"""Attributes of the root and of ``strain``."""
+TEXTS = dict.fromkeys(("config", "metadata", "versions"), Declared("text", more={"format": "JSON"}))
+ENTRY = {
+    "start_time": Declared("text"), "start_monotonic_s": Declared("f8", unit="s"), "title": Declared("text"), **TEXTS,
+}  # fmt: skip
+GRID = {
+    "x": Declared("f8", (None,), unit="px", long_name="x of the centre of the ZOI (px)"),
+    "y": Declared("f8", (None,), unit="px", long_name="y of the centre of the ZOI (px)"),
+    "active": Declared("u1", (None, None), 0, 1, ""),  # 0 where the mask leaves the ZOI out
+    "size": Declared("int", unit="px"),
+    "step": Declared("int", unit="px"),
+}
 
 
-def map_declared(name: str, shape: tuple[int, int]) -> Declared:
-    """The maps of one name, (T, R, C)."""
-    return Declared("u1" if name in BYTES else "f4", (None, *shape))
+def maps(shape: tuple[int, int]) -> dict[str, Declared]:
+    """The maps, (T, R, C) each; files of earlier versions have no ``BLUR``."""
+    return {name: _map(name, shape) for name in (*MAPS, *BLUR)}
 
 
-def normal_declared(shape: tuple[int, int]) -> dict[str, Declared]:
+def _map(name: str, shape: tuple[int, int]) -> Declared:
+    about, whole = quantity_of(name), name in BYTES
+    label = f"{about.label} ({about.unit})" if about.unit else about.label
+    more = {"interpretation": "image"}
+    if name == "status":
+        more["meaning"] = json.dumps({str(int(one)): f"{one.name}: {one.text}" for one in Status})
+    return Declared(
+        "u1" if whole else "f4", (None, *shape), unit=about.unit, long_name=label, words=about.words,
+        missing=255 if whole else np.nan, later=name in BLUR, rows=1, packed=COMPRESSED, more=more,
+    )  # fmt: skip
+
+
+def references(shape: tuple[int, int]) -> dict[str, Declared]:
     """The normal matrices of the references, which files of earlier versions do not have."""
-    return {NORMAL: Declared("f4", (None, N_PAIRS, *shape)), FIRST_ROW: Declared("i8", (None,), 0)}
+    of_matrices = "normal matrices of u, du/dx, du/dy, v, dv/dx, dv/dy: upper triangles"
+    of_rows = "row of the maps from which on it holds"
+    size = (None, N_PAIRS, *shape)
+    return {
+        NORMAL: Declared("f4", size, long_name=of_matrices, rows=1, packed=COMPRESSED),
+        FIRST_ROW: Declared("i8", (None,), 0, long_name=of_rows, rows=64),
+    }
 
 
-def column_declared(name: str) -> Declared:
+def column(name: str, more: Mapping[str, Any] | None = None) -> Declared:
     """A column of ``mean``, (T,)."""
-    kind = "i8" if name in WHOLE else "f8"
-    return Declared(kind, (None,))
+    about, kind = quantity_of(name), "i8" if name in WHOLE else "f8"
+    more = {"uncertainties": f"sigma_{name}"} if name in STRAINS else more or {}
+    return Declared(kind, (None,), unit=about.unit, words=about.words, rows=256, more=more)
 
 
-def column_names(gauges: Iterable[str] = (), extras: Iterable[str] = ()) -> tuple[str, ...]:
+def mean(gauges: Mapping[str, Any], extras: Iterable[str] = ()) -> dict[str, Declared]:
     """The columns in the order in which they are written: time_s is last, so a row with a time is complete."""
-    names = tuple(name for name in COLUMNS if name != "time_s")
-    return (*names, *extras, *chain.from_iterable(map(gauge_columns, gauges)), "time_s")
+    names = [name for name in (*COLUMNS, *extras) if name != "time_s"]
+    more: dict[str, dict[str, Any]] = {}
+    for name, described in gauges.items():
+        value, sigma, _ = gauge_columns(name)
+        more[value] = {"uncertainties": sigma, "gauge": json.dumps(described)}
+    return {
+        name: column(name, more.get(name)) for name in (*names, *chain(*map(gauge_columns, gauges)), "time_s")
+    }

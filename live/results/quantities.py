@@ -31,11 +31,14 @@ class Quantity:
         "px", "s", "N", "Pa", "1/Pa", "1/s", "GL" or "" (dimensionless).
     words : str
         Its definition.
+    label : str
+        What ``strain.h5`` calls its map.
     """
 
     name: str
     unit: str
     words: str
+    label: str = ""
 
     @property
     def is_strain(self) -> bool:
@@ -55,20 +58,24 @@ _STRAINS = {*_GRADIENTS, *(one.plain for one in FIGURES if one.column and one.ki
 _TURNING = ("v", "exy", "du_dy", "dv_dx", "y")
 
 _FIELDS = (
-    Quantity("u", "px", "displacement along x since the reference"),
-    Quantity("v", "px", "displacement along y since the reference"),
-    Quantity("du_dx", UNITLESS, "displacement gradient du/dx, fitted over the ZOI"),
-    Quantity("du_dy", UNITLESS, "displacement gradient du/dy, fitted over the ZOI"),
-    Quantity("dv_dx", UNITLESS, "displacement gradient dv/dx, fitted over the ZOI"),
-    Quantity("dv_dy", UNITLESS, "displacement gradient dv/dy, fitted over the ZOI"),
-    Quantity("exx", UNITLESS, "normal strain along x"),
-    Quantity("eyy", UNITLESS, "normal strain along y"),
-    Quantity("exy", UNITLESS, "shear strain, tensor component: half of the engineering shear gamma_xy"),
-    Quantity("residual", UNITLESS, "variance left by the fit over that expected from the noise; about 1"),
-    Quantity("blur", "px", "standard deviation of the blur since the reference; negative: sharper"),
-    Quantity("status", UNITLESS, "0 where the ZOI has a value, else the reason why it has none"),
-    Quantity("iterations", UNITLESS, "iterations of the fit"),
-)
+    Quantity("u", "px", "displacement along x since the reference", "displacement along x (right)"),
+    Quantity("v", "px", "displacement along y since the reference", "displacement along y (down)"),
+    Quantity("du_dx", UNITLESS, "displacement gradient du/dx, fitted over the ZOI", "du/dx"),
+    Quantity("du_dy", UNITLESS, "displacement gradient du/dy, fitted over the ZOI", "du/dy"),
+    Quantity("dv_dx", UNITLESS, "displacement gradient dv/dx, fitted over the ZOI", "dv/dx"),
+    Quantity("dv_dy", UNITLESS, "displacement gradient dv/dy, fitted over the ZOI", "dv/dy"),
+    Quantity("exx", UNITLESS, "normal strain along x", "strain xx"),
+    Quantity("eyy", UNITLESS, "normal strain along y", "strain yy"),
+    Quantity("exy", UNITLESS, "shear strain, tensor component: half of the engineering shear gamma_xy",
+             "strain xy (tensor component, gamma/2)"),
+    Quantity("residual", UNITLESS, "variance left by the fit over that expected from the noise; about 1",
+             "residual chi^2 (about 1 when all is well)"),
+    Quantity("blur", "px", "standard deviation of the blur since the reference; negative: sharper",
+             "blur since the reference, negative: sharper"),
+    Quantity("status", UNITLESS, "0 where the ZOI has a value, else the reason why it has none",
+             "status of the ZOI (0 = ok)"),
+    Quantity("iterations", UNITLESS, "iterations of the fit", "iterations"),
+)  # fmt: skip
 _MAPS = {q.name for q in _FIELDS}
 _RESPONSES = (
     Quantity("compliance", "1/Pa", "strain along the load over stress, slope over all instants"),
@@ -128,7 +135,7 @@ def quantity_of(name: str) -> Quantity:
     of = KNOWN.get(plain.removeprefix("sigma_"))
     if of is None or not plain.startswith("sigma_"):
         return Quantity(plain, UNITLESS, "see docs/strain-format.md")
-    return Quantity(plain, of.unit, _sigma_of(of.name))
+    return Quantity(plain, of.unit, _sigma_of(of.name), of.label and f"standard uncertainty of {of.label}")
 
 
 def _sigma_of(name: str) -> str:

@@ -8,7 +8,7 @@ that does not hold what ``layout`` declares is refused.
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError
 from acquire.hdf5 import (
-    Declared,
+    DAMAGE,
     JsonField,
     as_text,
+    check_format,
     check_links,
     check_object,
     check_size,
@@ -29,7 +30,7 @@ from acquire.hdf5 import (
     open_file,
     open_group,
     probe,
-    read_attribute,
+    read_attributes,
     read_object,
     read_scalar,
     read_superblock,
@@ -75,20 +76,20 @@ class Strain(Closing):
 
     def __init__(self, path: Path, file: Any, *, unfinished: bool) -> None:
         self.path, self._file, self.unfinished = path, file, unfinished
-        root = _attributes(file, layout.ROOT)
+        root = read_attributes(file, layout.ROOT)
         check_links(file)
         entry = open_group(file, "entry")
         strain, mean = open_group(entry, "strain"), open_group(entry, "mean")
         self.start_utc = as_text(root["start_time"])
-        described = _attributes(strain, layout.STRAIN)
+        described = read_attributes(strain, layout.STRAIN)
         self.strain_measure = as_text(described["strain_measure"])
         self.grid = _grid(strain, described["grid"], path)
         self.config, self.metadata, self.versions = (
             read_object(item[()], f"{path}: {name}")
             for name, item in open_datasets(entry, layout.TEXTS).items()
         )
-        self.names = (*layout.MAPS, *(name for name in layout.ADDED_MAPS if name in strain))
-        self._maps = open_datasets(strain, {n: layout.map_declared(n, self.grid.shape) for n in self.names})
+        self._maps = open_datasets(strain, layout.maps(self.grid.shape))
+        self.names = tuple(self._maps)
         self._references = _references(entry, self.grid.shape)
         self.response: StoredResponse | None = read_response(entry, self.grid.shape)
         columns = _columns(mean)
@@ -108,20 +109,12 @@ class Strain(Closing):
         """
         file, unfinished = _open(path, probed)
         try:
-            _check(path, file)
+            check_format(path, file, layout.ROOT, layout.FORMAT, layout.FORMAT_VERSION)
             return cls(path, file, unfinished=unfinished)
         except DataError:
             file.close()
             raise
-        except (
-            LookupError,
-            OSError,
-            RuntimeError,
-            ValueError,
-            TypeError,
-            MemoryError,
-            OverflowError,
-        ) as error:
+        except DAMAGE as error:
             file.close()
             raise DataError(
                 "{path}: is damaged ({why}); make it again with phasedic replay", path, error
@@ -267,25 +260,6 @@ def _open(path: Path, probed: bool) -> tuple[Any, bool]:
     return file, block.unfinished
 
 
-def _check(path: Path, file: Any) -> None:
-    found = as_text(read_attribute(file, "format", layout.ROOT["format"])) if "format" in file.attrs else None
-    if found != layout.FORMAT:
-        shown = "something else" if found is None else repr(found[:40])
-        raise DataError("{path}: holds {found}, not {wanted}; give a strain.h5", path, shown, layout.FORMAT)
-    version = read_attribute(file, "format_version", layout.ROOT["format_version"])
-    if int(version) > layout.FORMAT_VERSION:
-        raise DataError(
-            "{path}: format version {version}, this program reads up to {newest}; update phasedic",
-            path,
-            version,
-            layout.FORMAT_VERSION,
-        )
-
-
-def _attributes(item: Any, declared: Mapping[str, Declared]) -> dict[str, Any]:
-    return {name: read_attribute(item, name, what) for name, what in declared.items()}
-
-
 def _grid(strain: Any, text: Any, path: Path) -> ZoiGrid:
     """The grid; its description and the arrays in the file must agree."""
     where = f"{path}: the grid"
@@ -294,7 +268,7 @@ def _grid(strain: Any, text: Any, path: Path) -> ZoiGrid:
     check_object(
         described["roi"], {"x": _POSITION, "y": _POSITION, "width": _LENGTH, "height": _LENGTH}, where
     )
-    active = open_dataset(strain, "active", Declared("u1", (None, None), 0, 1))
+    active = open_dataset(strain, "active", layout.GRID["active"])
     shape = tuple(
         (described["roi"][name] - described["size"]) // described["step"] + 1 for name in ("height", "width")
     )
@@ -305,9 +279,9 @@ def _grid(strain: Any, text: Any, path: Path) -> ZoiGrid:
             shape,
             active.shape,
         )
-    grid = ZoiGrid.from_dict(described, read_scalar(active, Declared("u1", shape, 0, 1)).astype(bool))
+    grid = ZoiGrid.from_dict(described, read_scalar(active, layout.GRID["active"]).astype(bool))
     for name, places in (("x", grid.x), ("y", grid.y)):
-        if not np.array_equal(open_dataset(strain, name, Declared("f8", places.shape))[()], places):
+        if not np.array_equal(open_dataset(strain, name, layout.GRID[name])[()], places):
             raise DataError(
                 "{where} has other centres {name} than its description; make it again", where, name
             )
@@ -318,13 +292,13 @@ def _references(entry: Any, shape: tuple[int, int]) -> dict[str, Any]:
     """What is stored of each reference; nothing in files of earlier versions."""
     if layout.REFERENCES not in entry:
         return {}
-    return open_datasets(open_group(entry, layout.REFERENCES), layout.normal_declared(shape))
+    return open_datasets(open_group(entry, layout.REFERENCES), layout.references(shape))
 
 
 def _columns(mean: Any) -> dict[str, Any]:
     """All columns: those that every file has, and those that another version added."""
     declared = {*layout.REQUIRED, *(name for name in mean if name in layout.KNOWN)}
-    known = {name: layout.column_declared(name) for name in declared}
+    known = {name: layout.column(name) for name in declared}
     present = (name for name in mean if not name.endswith(layout.ERRORS))
     return open_datasets(mean, dict.fromkeys(present, layout.ANY_COLUMN) | known)
 

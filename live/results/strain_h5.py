@@ -18,21 +18,22 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from acquire.hdf5 import (
-    COMPRESSED,
     FlushTimer,
     GrowingDataset,
     PictureStack,
     RowTable,
     abandon_file,
     create_file,
+    new_datasets,
+    new_group,
     reason,
+    set_attributes,
     storable,
 )
 from acquire.text import Message
 from acquire.text.printable import counted
 from analysis.evaluate import load_axis
 from live.results import layout
-from live.results.quantities import quantity_of
 from live.results.response.stored import CORRELATION, CURRENT, GROUP, add_group
 from live.results.row import STRAINS, StrainRow, gauge_columns
 
@@ -43,22 +44,6 @@ if TYPE_CHECKING:
 VALUE_BITS, SIGMA_BITS = 9, 9
 """Binary digits kept: of a value below its standard uncertainty; of an uncertainty."""
 FLUSH_S = 0.25  # a row of a live test waits for its flush no longer than this
-_WORDS = {
-    "u": "displacement along x (right)",
-    "v": "displacement along y (down)",
-    "du_dx": "du/dx",
-    "du_dy": "du/dy",
-    "dv_dx": "dv/dx",
-    "dv_dy": "dv/dy",
-    "exx": "strain xx",
-    "eyy": "strain yy",
-    "exy": "strain xy (tensor component, gamma/2)",
-    "residual": "residual chi^2 (about 1 when all is well)",
-    "status": "status of the ZOI (0 = ok)",
-    "iterations": "iterations",
-    "blur": "blur since the reference, negative: sharper",
-}
-_MAPS = (*layout.MAPS, *layout.ADDED_MAPS)
 
 
 class StrainWriter:
@@ -94,8 +79,8 @@ class StrainWriter:
         self._timer = FlushTimer(flush_s, now)
         self._file = self._guard(lambda: create_file(path, lambda file: _declare(file, grid, info)))
         entry = self._file["entry"]
-        self._maps = {n: PictureStack(entry["strain"][n]) for n in _MAPS}
-        self._values = RowTable(entry["mean"], _value_names(info))
+        self._maps = {n: PictureStack(entry["strain"][n]) for n in layout.maps(grid.shape)}
+        self._values = RowTable(entry["mean"], list(layout.mean(info.gauges, info.extras)))
         references = entry[layout.REFERENCES]
         self._normal, self._first_row = PictureStack(references[layout.NORMAL]), references[layout.FIRST_ROW]
         of_response = (CURRENT, CORRELATION) if info.response else ()
@@ -219,12 +204,8 @@ def _to_digit(values: NDArray[Any], digit: NDArray[Any], scale: NDArray[Any]) ->
         return np.where(np.isfinite(multiple) & (scale > 0) & np.isfinite(scale), multiple, values)
 
 
-def _value_names(info: ResultsInfo) -> tuple[str, ...]:
-    return layout.column_names(info.gauges, info.extras)
-
-
 def _declare(file: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
-    """Everything but the rows."""
+    """Everything but the rows. Texts have no fixed length, as h5py makes them by itself."""
     file.attrs.update(
         NX_class="NXroot",
         default="entry",
@@ -233,18 +214,19 @@ def _declare(file: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
         creator="phasedic",
         start_time=info.start_utc,
     )
-    entry = _group(file, "entry", "NXentry", default="strain")
-    entry["start_time"] = info.start_utc
-    entry["start_monotonic_s"] = info.start_monotonic
-    entry["start_monotonic_s"].attrs["units"] = "s"
-    entry["title"] = storable(str(info.metadata.get("specimen", "") or "phasedic"))
+    entry = new_group(file, "entry", "NXentry", fixed=False, default="strain")
+    notes = {name: json.dumps(getattr(info, name), default=str, indent=1) for name in layout.TEXTS}
+    title = storable(str(info.metadata.get("specimen", "") or "phasedic"))
+    begin = {"start_time": info.start_utc, "start_monotonic_s": info.start_monotonic, "title": title}
+    new_datasets(entry, layout.ENTRY, begin | notes, fixed=False)
     _add_strain(entry, grid, info)
-    _add_references(entry, grid.shape)
+    references = new_group(entry, layout.REFERENCES, "NXcollection", fixed=False)
+    new_datasets(references, layout.references(grid.shape), fixed=False)
     if info.response:
         add_group(entry, info.response, grid.shape)
     _add_mean(entry, info)
     _add_gauges(entry, info)
-    _add_notes(entry, info)
+    _add_camera(entry, info)
 
 
 def _slice_of(row: int) -> Any:
@@ -252,27 +234,39 @@ def _slice_of(row: int) -> Any:
     return np.array([str(row), ".", "."], "S12")
 
 
-def _group(parent: Any, name: str, nx_class: str, **attrs: Any) -> Any:
-    group = parent.create_group(name)
-    group.attrs.update(NX_class=nx_class, **attrs)
-    return group
+def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
+    strain = new_group(
+        entry, "strain", "NXdata", fixed=False, signal="eyy", axes=["time_s", "y", "x"],
+        strain_measure=info.strain_measure,
+        grid=json.dumps(grid.to_dict()),
+        frame_of_reference="fields lie on the reference picture; x right, y down, px",
+        auxiliary_signals=["exx", "exy"],
+        title=f"Strain maps, {info.strain_measure} strain",
+        default_slice=_slice_of(0),
+    )  # fmt: skip
+    places = {"x": np.asarray(grid.x, np.float64), "y": np.asarray(grid.y, np.float64)}
+    values = {
+        **places,
+        "active": grid.active.astype(np.uint8),
+        "size": int(grid.size),
+        "step": int(grid.step),
+    }
+    new_datasets(strain, layout.maps(grid.shape) | layout.GRID, values, fixed=False)
+    for name in (*layout.PLAIN_MAPS, "blur"):
+        strain[f"{name}{layout.ERRORS}"] = strain[f"sigma_{name}"]
 
 
 def _add_mean(entry: Any, info: ResultsInfo) -> None:
-    mean = _group(entry, "mean", "NXdata", signal="eyy", axes=["time_s"], title="Strains of the region")
-    mean.attrs["auxiliary_signals"] = ["exx", "exy"]
-    mean.attrs["load_axis"] = np.array("x" if info.axis == "x" else "y", "S1")
-    mean.attrs["load_angle_deg"] = np.float64(math.nan)
-    for name in _value_names(info):
-        kind = layout.column_declared(name).dtype
-        dataset = mean.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(256,), fletcher32=True)
-        dataset.attrs["units"] = quantity_of(name).unit
-        if name in STRAINS:
-            dataset.attrs["uncertainties"] = f"sigma_{name}"
+    mean = new_group(
+        entry, "mean", "NXdata", fixed=False, signal="eyy", axes=["time_s"], title="Strains of the region",
+        auxiliary_signals=["exx", "exy"],
+        load_axis=np.array("x" if info.axis == "x" else "y", "S1"),
+        load_angle_deg=np.float64(math.nan),
+    )  # fmt: skip
+    new_datasets(mean, layout.mean(info.gauges, info.extras), fixed=False)
     for name in STRAINS:
         mean[f"{name}{layout.ERRORS}"] = mean[f"sigma_{name}"]
-    entry["strain/time_s"] = mean["time_s"]
-    for name in ("force_N", "frame", "last_frame", "n_frames", "noise_GL", "lost"):
+    for name in ("time_s", "force_N", "frame", "last_frame", "n_frames", "noise_GL", "lost"):
         entry[f"strain/{name}"] = mean[name]
 
 
@@ -281,84 +275,21 @@ def _add_gauges(entry: Any, info: ResultsInfo) -> None:
     if not info.gauges:
         return
     first = next(iter(info.gauges))
-    group = _group(entry, "gauges", "NXdata", signal=first, axes=["time_s"], title="Virtual gauges")
+    group = new_group(
+        entry, "gauges", "NXdata", fixed=False, signal=first, axes=["time_s"], title="Virtual gauges"
+    )
     group["time_s"] = entry["mean/time_s"]
-    for name, described in info.gauges.items():
+    for name in info.gauges:
         column, sigma, _ = gauge_columns(name)
         group[name], group[f"sigma_{name}"] = entry["mean"][column], entry["mean"][sigma]
         group[f"{name}{layout.ERRORS}"] = entry["mean"][sigma]
-        entry["mean"][column].attrs.update(uncertainties=sigma, gauge=json.dumps(described))
 
 
-def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
-    strain = _group(entry, "strain", "NXdata", signal="eyy", axes=["time_s", "y", "x"])
-    strain.attrs.update(
-        strain_measure=info.strain_measure,
-        grid=json.dumps(grid.to_dict()),
-        frame_of_reference="fields lie on the reference picture; x right, y down, px",
-        auxiliary_signals=["exx", "exy"],
-        title=f"Strain maps, {info.strain_measure} strain",
-        default_slice=_slice_of(0),
-    )
-    for name in _MAPS:
-        _add_map(strain, name, grid.shape)
-    for name in (*layout.PLAIN_MAPS, "blur"):
-        strain[f"{name}{layout.ERRORS}"] = strain[f"sigma_{name}"]
-    for name, values in (("x", grid.x), ("y", grid.y)):
-        strain[name] = np.asarray(values, np.float64)
-        strain[name].attrs.update(units="px", long_name=f"{name} of the centre of the ZOI (px)")
-    strain["active"] = np.asarray(grid.active, np.uint8)
-    strain["active"].attrs["units"] = ""
-    for name, value in (("size", grid.size), ("step", grid.step)):
-        strain[name] = int(value)
-        strain[name].attrs["units"] = "px"
-
-
-def _add_map(strain: Any, name: str, shape: tuple[int, int]) -> None:
-    kind = layout.map_declared(name, shape).dtype
-    dataset = strain.create_dataset(
-        name, (0, *shape), kind, maxshape=(None, *shape), chunks=(1, *shape), fillvalue=_fill(kind),
-        fletcher32=True, **COMPRESSED,
-    )  # fmt: skip
-    plain = name.removeprefix("sigma_")
-    unit = quantity_of(plain).unit
-    words = _WORDS[plain] if plain == name else f"standard uncertainty of {_WORDS[plain]}"
-    dataset.attrs.update(units=unit, long_name=f"{words} ({unit})" if unit else words, interpretation="image")
-    if name == "status":
-        dataset.attrs["meaning"] = json.dumps(_status_words())
-
-
-def _add_references(entry: Any, shape: tuple[int, int]) -> None:
-    group = _group(entry, layout.REFERENCES, "NXcollection")
-    normal = group.create_dataset(
-        layout.NORMAL, (0, layout.N_PAIRS, *shape), "f4", maxshape=(None, layout.N_PAIRS, *shape),
-        chunks=(1, layout.N_PAIRS, *shape), fletcher32=True, **COMPRESSED,
-    )  # fmt: skip
-    normal.attrs["long_name"] = "normal matrices of u, du/dx, du/dy, v, dv/dx, dv/dy: upper triangles"
-    row = group.create_dataset(layout.FIRST_ROW, (0,), "i8", maxshape=(None,), chunks=(64,), fletcher32=True)
-    row.attrs["long_name"] = "row of the maps from which on it holds"
-
-
-def _fill(kind: str) -> float:
-    return np.nan if kind == "f4" else 255
-
-
-def _status_words() -> dict[str, str]:
-    from analysis.field import Status
-
-    return {str(int(status)): f"{status.name}: {status.text}" for status in Status}
-
-
-def _add_notes(entry: Any, info: ResultsInfo) -> None:
-    for name in ("config", "metadata", "versions"):
-        entry[name] = json.dumps(getattr(info, name), default=str, indent=1)
-        entry[name].attrs["format"] = "JSON"
-    camera = _group(entry, "camera", "NXdetector")
+def _add_camera(entry: Any, info: ResultsInfo) -> None:
+    camera = new_group(entry, "camera", "NXdetector", fixed=False)
     if info.camera is None:
         return
     camera["description"] = storable(info.camera.name)
-    for key in ("address", "width", "height", "bits", "fps", "exposure_s", "pixel_format", "clock"):
-        value = getattr(info.camera, key)
-        if value is not None:
-            camera.attrs[key] = storable(value) if isinstance(value, str) else value
-    camera.attrs["controls"] = json.dumps(dict(info.camera.controls), default=str)
+    names = ("address", "width", "height", "bits", "fps", "exposure_s", "pixel_format", "clock")
+    known = {name: value for name in names if (value := getattr(info.camera, name)) is not None}
+    set_attributes(camera, fixed=False, **known, controls=json.dumps(dict(info.camera.controls), default=str))

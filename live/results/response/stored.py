@@ -5,7 +5,7 @@ A file that was left before that holds it empty, and is read as one without.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,14 +17,13 @@ from acquire.errors import DataError
 from acquire.hdf5 import (
     Declared,
     as_text,
+    new_datasets,
     new_group,
-    open_dataset,
     open_datasets,
     open_file,
     open_group,
-    read_attribute,
+    read_attributes,
     reason,
-    storable,
 )
 from acquire.text.printable import printable
 from live.pipeline.timed.response import leaves_name, slope_name
@@ -44,23 +43,34 @@ def map_names(channel: str) -> tuple[str, ...]:
     return (*first, *((leaves,) if leaves else ()), FATE)
 
 
+_NOISE = (CURRENT, CORRELATION)
+
+
+def _items(names: Iterable[str], shape: tuple[int, int]) -> dict[str, Declared]:
+    """Maps of these names, (R, C), and what the writer notes of noise."""
+    shapes = {CURRENT: (None,), CORRELATION: (None, *shape)}
+    about = {name: quantity_of(name) for name in names}
+    return {
+        name: Declared(
+            "f4", shapes.get(name, shape), unit=one.unit, long_name=one.words, missing=np.nan, rows=0
+        )
+        for name, one in about.items()
+    }
+
+
+def items(channel: str, shape: tuple[int, int]) -> dict[str, Declared]:
+    """All datasets of a response over ``channel``."""
+    return _items((*map_names(channel), *_NOISE), shape)
+
+
 def add_group(entry: Any, channel: str, shape: tuple[int, int]) -> None:
     """Make the group, without values, after ``strain``."""
+    title = f"Response of each place over {channel}"
     group = new_group(
-        entry, GROUP, "NXdata", signal=slope_name(channel), title=f"Response of each place over {channel}"
+        entry, GROUP, "NXdata", signal=slope_name(channel), title=title, channel=channel, strain="eyy"
     )
-    numbers = {"instants": 0, "first": np.nan, "last": np.nan, "common": 0.0, "vsg_px": 0.0}
-    group.attrs.update(
-        axes=["y", "x"], channel=np.bytes_(storable(channel).encode()), strain=np.bytes_("eyy")
-    )
-    group.attrs.update(numbers)
-    for name in (*map_names(channel), CURRENT, CORRELATION):
-        grows, rest = name in (CURRENT, CORRELATION), () if name == CURRENT else shape
-        dataset = group.create_dataset(
-            name, (0,) * grows + rest, "f4", maxshape=(None,) * grows + rest, chunks=True, fletcher32=True,
-            fillvalue=np.nan,
-        )  # fmt: skip
-        dataset.attrs.update(units=quantity_of(name).unit, long_name=str(quantity_of(name).words))
+    group.attrs.update(axes=["y", "x"], instants=0, first=np.nan, last=np.nan, common=0.0, vsg_px=0.0)
+    new_datasets(group, items(channel, shape), fixed=False)
     for name in ("x", "y"):
         group[name] = entry[f"strain/{name}"]
 
@@ -70,8 +80,8 @@ def read_noise(path: Path, n: int, shape: tuple[int, int]) -> tuple[NDArray[np.f
     where it is not known, and correlation of the noises of exx and eyy against each reference, (J, R, C)."""
     with open_file(path) as file:
         group = file["entry"][GROUP]
-        held = open_dataset(group, CURRENT, Declared("f4", (None,)))[:n].astype(np.float64)
-        both = open_dataset(group, CORRELATION, Declared("f4", (None, *shape)))[()].astype(np.float64)
+        noise = open_datasets(group, _items(_NOISE, shape))
+        held, both = noise[CURRENT][:n].astype(np.float64), noise[CORRELATION][()].astype(np.float64)
     share = np.pad(held, (0, n - len(held)), constant_values=np.nan)
     return np.where((share > 0) & (share <= 1), share, 1.0), np.where(np.abs(both) < 1, both, 0.0)
 
@@ -143,9 +153,7 @@ def read_response(entry: Any, shape: tuple[int, int]) -> StoredResponse | None:
     if GROUP not in entry:
         return None
     group = open_group(entry, GROUP)
-    channel, strain, instants, first, last, common, vsg_px = (
-        read_attribute(group, name, what) for name, what in ATTRIBUTES.items()
-    )
+    channel, strain, instants, first, last, common, vsg_px = read_attributes(group, ATTRIBUTES).values()
     if as_text(strain) not in ("exx", "eyy"):
         raise DataError(
             "{path}: {group}/@strain is {value}; make it again",
@@ -154,7 +162,7 @@ def read_response(entry: Any, shape: tuple[int, int]) -> StoredResponse | None:
             repr(printable(as_text(strain))),
         )
     channel = printable(as_text(channel))
-    maps = open_datasets(group, dict.fromkeys(map_names(channel), Declared("f4", shape)))
+    maps = open_datasets(group, _items(map_names(channel), shape))
     if not instants:
         return None
     return StoredResponse(
