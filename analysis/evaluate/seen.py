@@ -1,4 +1,4 @@
-"""What of the force was seen: readings of a load cell that lives, confirmed by neighbours; gaps that may hide the top."""
+"""What of the force was seen: of a load cell that lives, confirmed by neighbours; gaps that may hide the highest."""
 
 from __future__ import annotations
 
@@ -63,7 +63,8 @@ def _stuck(stress: Floats, strain: Floats) -> list[tuple[int, int]]:
     sigma, steps = noise(rest), np.abs(np.diff(rest))
     if not runs or len(rest) < _FEWEST or sigma == 0:
         return []
-    chance = max(float(steps[steps > 0].min()) / (2 * math.sqrt(math.pi) * sigma), float(np.mean(steps == 0)))
+    by_step = float(steps[steps > 0].min()) / (2 * math.sqrt(math.pi) * sigma)
+    chance = min(max(by_step, float(np.mean(steps == 0))), 1.0)
     least, rises = _LOADED * float(stress.max()), _SURE * noise(strain)
     found = [
         (a, b)

@@ -121,15 +121,17 @@ def highest_stress(loading: Loading, at: int) -> Figure:
     steps = np.diff(loading.strain[before : at + 2])
     if at > before and at + 1 < loading.n and steps[-1] > 2 * (usual := float(steps[:-1].mean())) > 0:
         rise *= float(steps[-1]) / usual
-    rounded = _rounding(stress)
+    rounded = _rounding(stress, sigma)
     return Figure(value, value - lifted - rounded, value + quantile() * sigma + rise + rounded)
 
 
-def _rounding(stress: Floats) -> float:
+def _rounding(stress: Floats, sigma: float) -> float:
     """Half the resolution of the readings where it is coarser than their noise, so that neighbours are equal."""
     steps = np.abs(np.diff(stress))
-    coarse = len(steps) > 0 and np.mean(steps == 0) > _EQUAL and steps.any()
-    return float(steps[steps > 0].min()) / 2 if coarse else 0.0
+    if not steps.any() or np.mean(steps == 0) < _EQUAL:
+        return 0.0
+    step = float(steps[steps > 0].min())
+    return step / 2 if step / math.sqrt(12) > sigma else 0.0
 
 
 def strain_at_top(loading: Loading) -> Figure:
