@@ -1,4 +1,4 @@
-"""What of the force was seen: readings that their neighbours confirm, and gaps that may hide the highest force."""
+"""What of the force was seen: of a load cell that lives, confirmed by neighbours; gaps that may hide the highest."""
 
 from __future__ import annotations
 
@@ -19,6 +19,76 @@ _RUN, _LONGEST, _SHARE = 3, 0.025, 0.1  # readings in a row, or share of all; an
 _PART = 0.01  # of the strain: over so much the steepest rise is read
 _FEWEST = 12  # readings that know what is usual
 _GAP, _FASTEST = 2.5, 95  # usual intervals; percentile of the rises
+_EQUAL = 5  # readings in a row that may be those of a load cell that stands still
+_BY_CHANCE = 1e-6  # how often so many may be equal in a living load cell
+_LEVELS = 3  # values at which readings rest: as many are the resolution of a quiet load cell
+_LOADED = 0.05  # of the highest stress
+_AROUND, _SAME_RATE = 8, 0.5  # readings before and after a fall, and how much the strain rates may differ
+
+
+def without_stopped(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
+    """The curve without the stresses of a load cell that stood still or fell out, and words that say so."""
+    known = np.flatnonzero(np.isfinite(curve.stress) & np.isfinite(curve.strain))
+    runs = [known[a + 1 : b] for a, b in _stuck(curve.stress[known], curve.strain[known])]
+    words = [
+        Message(
+            "forces left out: the same to the last digit from {t:.4g} s to {end:.4g} s while the strain rises; does "
+            "the load cell reach its limit, or stop?",
+            curve.t[rows[0] - 1] - curve.t[0],
+            curve.t[rows[-1]] - curve.t[0],
+        )
+        for rows in runs
+    ]
+    left = replace(curve, stress=curve.stress.copy())
+    for rows in runs:
+        left.stress[rows] = math.nan
+    stop = broken_at(left.stress, left.strain)
+    if stop is not None and _goes_on(left.strain, stop):
+        left.stress[stop + 1 :] = math.nan
+        words.append(
+            Message(
+                "forces left out: they fall to nothing at {t:.4g} s and the strain rises on as before; is the load "
+                "cell connected, and within its range?",
+                curve.t[stop] - curve.t[0],
+            )
+        )
+    return (left, tuple(words)) if words else (curve, ())
+
+
+def _stuck(stress: Floats, strain: Floats) -> list[tuple[int, int]]:
+    """First and end of each run of equal stresses that noise cannot make, under load and while the strain rises."""
+    same = np.flatnonzero(np.diff(np.concatenate([[False], np.diff(stress) == 0, [False]])))
+    runs = [(int(a), int(b) + 1) for a, b in same.reshape(-1, 2) if b + 1 - a >= _EQUAL]
+    rest = np.delete(stress, [k for a, b in runs for k in range(a, b)])
+    sigma, steps = noise(rest), np.abs(np.diff(rest))
+    if not runs or len(rest) < _FEWEST or sigma == 0:
+        return []
+    by_step = float(steps[steps > 0].min()) / (2 * math.sqrt(math.pi) * sigma)
+    chance = min(max(by_step, float(np.mean(steps == 0))), 1.0)
+    least, rises = _LOADED * float(stress.max()), _SURE * noise(strain)
+    found = [
+        (a, b)
+        for a, b in runs
+        if len(stress) * chance ** (b - a - 1) < _BY_CHANCE
+        and stress[a] > least
+        and strain[b - 1] - strain[a] > rises
+    ]
+    return found if len({float(stress[a]) for a, _ in runs}) < _LEVELS else []
+
+
+def _goes_on(strain: Floats, stop: int) -> bool:
+    """Whether the strain rises through a break as if there were none: neither a leap nor another rate."""
+    k = np.arange(-_AROUND, _AROUND)
+    part = strain[stop + 1 - _AROUND : stop + 1 + _AROUND]
+    if stop + 1 < _AROUND or len(part) < len(k) or not np.isfinite(part).all():
+        return False
+    before, after = (np.polyfit(k[side], part[side], 1) for side in (k < 0, k >= 0))
+    sigma = max(noise(strain[: stop + 1]), noise(part))
+    rise = float(before[0]) * _AROUND
+    leap = abs(float(np.polyval(after, -0.5) - np.polyval(before, -0.5)))
+    return bool(
+        rise > _SURE * sigma and abs(after[0] / before[0] - 1) < _SAME_RATE and leap < 3 * sigma + 0.2 * rise
+    )
 
 
 def confirmed(curve: Curve) -> tuple[Curve, tuple[str, ...]]:

@@ -32,6 +32,7 @@ _ABOUT = 0.25  # of a proof strain: the part of the curve that its stress is rea
 _PULLED = 0.5  # of the plastic strain there: the strain must grow by as much, or it is a hold
 _BEFORE = 5  # samples whose rise bounds what may lie between two of them
 _SURE = 4.0  # standard deviations that a fall must exceed
+_EQUAL = 0.1  # of the readings equal to the one before: their noise is below their resolution
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +121,17 @@ def highest_stress(loading: Loading, at: int) -> Figure:
     steps = np.diff(loading.strain[before : at + 2])
     if at > before and at + 1 < loading.n and steps[-1] > 2 * (usual := float(steps[:-1].mean())) > 0:
         rise *= float(steps[-1]) / usual
-    return Figure(value, value - lifted, value + quantile() * sigma + rise)
+    rounded = _rounding(stress, sigma)
+    return Figure(value, value - lifted - rounded, value + quantile() * sigma + rise + rounded)
+
+
+def _rounding(stress: Floats, sigma: float) -> float:
+    """Half the resolution of the readings where it is coarser than their noise, so that neighbours are equal."""
+    steps = np.abs(np.diff(stress))
+    if not steps.any() or np.mean(steps == 0) < _EQUAL:
+        return 0.0
+    step = float(steps[steps > 0].min())
+    return step / 2 if step / math.sqrt(12) > sigma else 0.0
 
 
 def strain_at_top(loading: Loading) -> Figure:
@@ -131,7 +142,9 @@ def strain_at_top(loading: Loading) -> Figure:
     if last == loading.n - 1 and not loading.broke:
         return Figure.none(Message("the test ended before the stress fell"))
     low, high = float(loading.course[first]), float(loading.course[last])
-    half = quantile() * loading.noise_strain + _step(loading, last)
+    # A neck beside the gauge lets that shorten: the highest stress may have more strain than the end of the flat top.
+    high = max(high, float(loading.strain[loading.top])) if first <= loading.top <= last else high
+    half = quantile() * loading.noise_strain + max(_step(loading, k) for k in (last, loading.top))
     return Figure((low + high) / 2, low - half, high + half)
 
 

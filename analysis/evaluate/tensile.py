@@ -31,7 +31,7 @@ from analysis.evaluate.figure import Figure
 from analysis.evaluate.flow import anisotropy, hardening
 from analysis.evaluate.programme import KindOfTest
 from analysis.evaluate.rates import midway, seconds_of, strain_rate
-from analysis.evaluate.seen import Unseen, confirmed, unseen
+from analysis.evaluate.seen import Unseen, confirmed, unseen, without_stopped
 from analysis.evaluate.standards import Standard
 from analysis.evaluate.strengths import (
     Yield,
@@ -46,6 +46,7 @@ from analysis.evaluate.tensile_figures import Span, StrainZero, TensileFigures, 
 _LINE = ("E", "E_chord", "nu")
 _OF_TENSION = ("Rp01", "Rp02", "Rp1", "ReH", "ReL", "Rm", "Agt", "Ag", "At", "A", "r", "n")
 _ROUNDS = 8
+_BENT, _SURE = 0.03, 4.0  # of the slope of a half: off that of the whole, and standard uncertainties
 
 
 def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> TensileFigures:
@@ -64,7 +65,8 @@ def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> Tensil
         Strengths and extensions are known of a tensile test alone, and are bounds where forces were not seen.
     """
     options = options or TensileOptions()
-    sure, notes = confirmed(curve)
+    living, stopped = without_stopped(curve)
+    sure, notes = confirmed(living)
     programme = KindOfTest.of(sure, options.test)
     if programme.why:
         found = _untensile(_evaluated(programme.first_rise(sure), options), programme.why)
@@ -74,7 +76,7 @@ def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> Tensil
         notes += () if gap is None else (gap.words,)
     if programme.why or options.test != "auto":
         notes += (programme.words,)
-    found = _of_film(found, options.limits.film)
+    found, notes = _of_film(found, options.limits.film), stopped + notes
     source, elastic = curve.source, curve.elastic_source or curve.source
     return replace(found, strain=source, elastic_strain=elastic, kind=programme.kind, notes=notes)
 
@@ -213,7 +215,7 @@ def _with_line(
     shares = options.limits.shares(strained) | lens_share(loading, line, strained) | blur_share(loading, line)
     nu = _poisson(loading, slope, options.standard)
     figures = TensileFigures(
-        E=slope.modulus(math.hypot(*shares.values())).remarked(remark),
+        E=slope.modulus(math.hypot(*shares.values())).remarked(remark or _not_straight(region, slope)),
         E_chord=chord(region, slope, math.hypot(*shares.values())),
         budget={"scatter": slope.sigma / slope.slope, **shares},
         r2=slope.r2,
@@ -240,6 +242,21 @@ def _with_line(
         standard=options.standard.name,
     )
     return figures if options.standard.flow else _without_flow(figures)
+
+
+def _not_straight(loading: Loading, line: FittedLine) -> str:
+    """A remark where a half of the interval of ``line`` has another slope than the whole; else empty."""
+    middle = (line.first + line.last) // 2
+    halves = [line_through(loading, *part) for part in ((line.first, middle), (middle, line.last))]
+    slopes = [half.slope / line.slope for half in halves if half]
+    bent = any(
+        half is not None
+        and abs(half.slope - line.slope) > max(_BENT * line.slope, _SURE * max(half.sigma, line.sigma))
+        for half in halves
+    )
+    if not bent or len(slopes) < len(halves):
+        return ""
+    return Message("the elastic part is not straight: {low:.0%} and {high:.0%} of E in its halves", *slopes)
 
 
 def _poisson(loading: Loading, line: FittedLine, standard: Standard) -> Figure:

@@ -112,7 +112,7 @@ class _Reader:
         self._remarks = list(table.remarks)
         self._is_clock, self._last_clock, self._days = False, 0.0, 0
         self._dates: list[tuple[int, str]] = []  # rows from which a date holds
-        self._n_texts, self._n_unread, self._other = 0, 0, ""
+        self._n_texts, self._n_unread, self._other, self._first_text = 0, 0, "", ""
         force, _, time = (part.strip() for part in (given.unit or "").partition(","))
         self._unit = force or name_and_unit(table.heads[table.force])[1]
         self._time_unit = time or (name_and_unit(table.heads[table.key])[1] if table.key is not None else "")
@@ -261,6 +261,7 @@ class _Reader:
             )
         else:
             self._n_texts += 1
+            self._first_text = self._first_text or t.separator.join(row)[:60]
         return None
 
     def _time(self, cell: str, row: Sequence[str]) -> float | tuple[str, float] | None:
@@ -338,6 +339,13 @@ class _Reader:
         """All that was taken; raises DataError where there is nothing, or numbers have two readings."""
         forces = np.array(self._forces) * (self._newtons * self._given.sign)
         if not np.isfinite(forces).any():
+            if self._n_texts:
+                raise DataError(
+                    "{where}: no row has a time beside its force, as {row}; wanted: s, h:min:s with or without a date"
+                    " as 2026-11-25, or Unix times",
+                    self._where,
+                    repr(self._first_text),
+                )
             raise DataError("{where}: holds no forces", self._where)
         if (most := np.nanmax(np.abs(forces))) > MAX_FORCE_N:
             raise DataError(

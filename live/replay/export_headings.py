@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from acquire.errors import ConfigError
 from acquire.protocols.units import is_mass, newtons_per
@@ -111,25 +111,27 @@ def _rank(name: str, kind: str) -> int | None:
 
 
 def find_columns(heads: Sequence[str], kind: str) -> list[int]:
-    """The columns that may be of ``kind``: force, time, clock, name or row.
+    """The columns that may be of ``kind``: force, time, clock, duration (by its unit alone), name or row.
 
     Those with a unit of it come before those without, and these before those of another unit. Of times that whose name
     says so most surely is taken, of forces none: two may be two load cells.
     """
     per = {"force": newtons_of, "time": seconds_per}.get(kind)
+    if kind == "duration":  # in a language that is not known here
+        return [k for k, head in enumerate(heads) if _is_by_unit(*name_and_unit(head), seconds_per)]
     ranked: dict[tuple[int, int], list[int]] = {}
     for k, (name, unit) in enumerate(map(name_and_unit, heads)):
         if (rank := _rank(name, kind)) is not None:
             fit = 0 if per is None else 1 if not unit else 0 if per(unit) is not None else 2
             ranked.setdefault((fit, 0 if kind == "force" else rank), []).append(k)
     if kind == "force" and not ranked:
-        return [k for k, head in enumerate(heads) if _is_force_by_unit(*name_and_unit(head))]
+        return [k for k, head in enumerate(heads) if _is_by_unit(*name_and_unit(head), newtons_of)]
     return ranked[min(ranked)] if ranked else []
 
 
-def _is_force_by_unit(name: str, unit: str) -> bool:
+def _is_by_unit(name: str, unit: str, per: Callable[[str], float | None]) -> bool:
     words = set(re.findall(r"[^\W\d_]+", _folded(name)))
-    return bool(unit) and newtons_of(unit) is not None and not words & _KINDS["other"]
+    return bool(unit) and per(unit) is not None and not words & _KINDS["other"]
 
 
 def given_columns(heads: Sequence[str], given: str) -> tuple[int, int | None] | None:

@@ -31,6 +31,7 @@ _SEPARATORS = {
     "\t": Message("tabs"), ";": Message("semicolons"), "|": Message("bars"), ",": Message("commas"),
     "  ": Message("blanks"), " ": Message("blanks"),
 }  # fmt: skip
+_TIMES = ("time", "clock", "duration")
 _BETWEEN = 5  # lines of text and blanks between a heading and its rows, at most
 _SHORT = {"file", "time", "time_s", "t", "force", "F"}
 """Our own headings; with them a force without a unit is in newtons."""
@@ -161,11 +162,25 @@ def find_table(file: BinaryIO, where: str, given: LoadConfig) -> Table:
 
 def _head_rows(lines: list[str], separator: str) -> Rows:
     try:
-        rows, _ = split_rows(lines, separator)
+        rows, _ = split_rows(_named_by_remark(lines, separator), separator)
     except csv.Error:
         return []
     rows = [[] if is_remark(row) else [" ".join(cell.split()) for cell in row] for row in rows]
     return [_trimmed(row) for row in rows]
+
+
+def _named_by_remark(lines: list[str], separator: str) -> list[str]:
+    """The same lines; a remark that names the values below it, as numpy.savetxt writes, is their heading."""
+    first = next((k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")), 0)
+    for k in reversed(range(first)):
+        (heads, values), _ = split_rows([lines[k].lstrip("# "), lines[first]], separator)
+        if (
+            len(heads) == len(values)
+            and find_columns(heads, "force")
+            and _has_value([*map(str.strip, values)])
+        ):
+            return [*lines[:k], separator.join(heads), *lines[k + 1 :]]
+    return lines
 
 
 def _trimmed(row: list[str]) -> list[str]:
@@ -250,7 +265,8 @@ class _Search:
         given = given_columns(heads, self.given.column) if self.given.column else None
         if self.given.column and given is None:
             return None
-        name, time = find_columns(heads, "name"), find_columns(heads, "time") or find_columns(heads, "clock")
+        name = find_columns(heads, "name")
+        time = next(filter(None, (find_columns(heads, kind) for kind in _TIMES)), [])
         if given and given[1] is not None:
             return given[0], given[1], given[1] in name
         keys = name or time
@@ -272,7 +288,7 @@ class _Search:
         begin = next(k for k, table in enumerate(found) if table.heads == longest.heads)
         table = found[begin]
         given = given_columns(table.heads, self.given.column) if self.given.column else None
-        for kinds, option in ((("force",), "FORCE"), (("name", "time", "clock"), "FORCE,TIME")):
+        for kinds, option in ((("force",), "FORCE"), (("name", *_TIMES), "FORCE,TIME")):
             called = next(filter(None, (find_columns(table.heads, kind) for kind in kinds)), [])
             if len(called) > 1 and (given is None or (option != "FORCE" and given[1] is None)):
                 words = ", ".join(repr(table.heads[k]) for k in called)

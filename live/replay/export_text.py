@@ -82,10 +82,10 @@ def split_rows(lines: list[str], separator: str) -> tuple[Rows, int | None]:
     if separator[0] == " ":
         parting = re.compile(rf"{separator}(?!\(|\[) *")  # not before a unit in brackets
         lines, separator = [parting.sub("\t", line.strip()) for line in lines], "\t"
-    rows = list(csv.reader(lines, delimiter=separator))
+    rows = list(csv.reader(lines, delimiter=separator, skipinitialspace=True))
     if len(rows) == len(lines):
         return rows, None
-    rows, broken, reader = [], None, csv.reader(lines, delimiter=separator)
+    rows, broken, reader = [], None, csv.reader(lines, delimiter=separator, skipinitialspace=True)
     for row in reader:
         if len(rows) < reader.line_num - 1 and broken is None:
             broken = len(rows)

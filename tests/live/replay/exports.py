@@ -203,6 +203,12 @@ EXPORTS: dict[str, Made] = {
         forces=[1e3 * round(1 + f / 1e4, 3) for f in FORCES],
         given={"decimal": "point"},
     ),
+    "numpy.savetxt, the heading is a remark": Made(
+        _simple("# made by hand\r\n# time_s,load_kN\r\n# of run 7", lambda t, f: f"{t},{f / 1e3:.7f}")
+    ),
+    "numpy.savetxt with blanks": Made(_simple("# time_s load_kN", lambda t, f: f"{t} {f / 1e3:.7f}")),
+    "a language that is not known": Made(_simple("Idő (s);Erő (N)", _german)),
+    "quotes behind blanks": Made(_simple('"Time (s)", "Load (N)"', lambda t, f: f'"{t}", "{f}"')),
     # -- refused --------------------------------------------------------------------------------
     "groups of three digits": Made(
         _simple("Time (s);Load (N)", lambda t, f: f"{10 * t:.0f};{thousands(f, '.', digits=0)}"),
@@ -225,6 +231,9 @@ EXPORTS: dict[str, Made] = {
     "unknown headings": Made(_simple("A;B;C", lambda t, f: f"{f};0;{t}"), refused="--load-column"),
     "two marks": Made(
         _simple("Time (s);Load (N)", lambda t, f: f"{t:.1f};{comma(f'{f:.4f}')}"), refused="--load-decimal"
+    ),
+    "months by name": Made(
+        _simple("Time;Load (N)", lambda t, f: f"25-Nov-2026 {clock(t)};{f}"), refused="as '25-Nov-2026 12:01:02"
     ),
     "all times are equal": Made(_simple("Time (s),Load (N)", lambda t, f: f"1.0,{f}"), refused="line 3"),
     "clock without fractions": Made(
