@@ -146,7 +146,11 @@ class Strain(Closing):
                 "{path}: no map {name}; there are {known}", self.path, repr(name), ", ".join(names)
             )
         if isinstance(row, int) and not -self.n <= row < self.n:
-            there = Message("no row {row}; there are {n}", row, self.n) if self.n else "holds no measurement"
+            there = (
+                Message("no row {row}; there are {n}", row, self.n)
+                if self.n
+                else Message("holds no measurement")
+            )
             raise DataError(about(self.path, there))
         rows = range(self.n)[row]
         try:
@@ -270,7 +274,7 @@ def _open(path: Path, probed: bool) -> tuple[Any, bool]:
 def _check(path: Path, file: Any) -> None:
     found = as_text(read_attribute(file, "format", layout.ROOT["format"])) if "format" in file.attrs else None
     if found != layout.FORMAT:
-        shown = "something else" if found is None else repr(found[:40])
+        shown = Message("something else") if found is None else repr(found[:40])
         raise DataError("{path}: holds {found}, not {wanted}; give a strain.h5", path, shown, layout.FORMAT)
     version = read_attribute(file, "format_version", layout.ROOT["format_version"])
     if int(version) > layout.FORMAT_VERSION:

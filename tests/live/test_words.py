@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 from collections.abc import Iterator
 from functools import cache
@@ -12,13 +13,16 @@ from typing import Any
 import pytest
 from babel.messages.extract import extract
 
-from acquire.events import EventKind
+from acquire.errors import ConfigError
+from acquire.events import Event, EventKind
 from acquire.text import Message
-from acquire.text.message import FIELD, about, fields
+from acquire.text.message import FIELD, about, fields, from_json, joined, word
 from analysis.evaluate import GAUGE_KINDS
+from live.pipeline.event_log import sentence
 from live.results.maps.field_maps import FIELD_MAPS
 from live.results.quantities import KNOWN as QUANTITIES
 from live.results.report.record import FIGURES
+from live.ui.web.broadcaster import json_bytes
 from live.words import language
 from live.words.language import LANGUAGES, entries, parsed, said
 from tests.live.ui.web.browser import ROOT
@@ -63,7 +67,36 @@ def test_a_message_is_said_in_a_language_with_its_numbers_and_parts(german: Path
     assert said(text, "de") == "/dev/video0: seit 2,1 s kein Bild"
     assert said('still "waiting"', "de") == "wartet"
     assert said(text, "en") == str(text) and said("not yet", "de") == "not yet"
-    assert said(about("a", 'still "waiting"'), "de") == "a: wartet"
+    assert said(about("a", Message('still "waiting"')), "de") == "a: wartet"
+
+
+NAMES = ("file", "Run", "stress", "ok", "camera", "operator", "none", "Datei")
+"""What a user may call a camera, a file, a gauge, a column, or be called."""
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("in_language", LANGUAGES)
+def test_a_name_like_a_text_of_the_program_stays(in_language: str, name: str) -> None:
+    """Whatever says it: messages and errors, joined texts, events, also as a file or the page gets them."""
+    texts = [
+        about(name, Message("{name} lost", name)),
+        joined(", ", (name, Message("{name} lost", name))),
+        ConfigError("{path}: cannot be read ({error}); give a text file in TOML", Path(name), name).text,
+        sentence(Event(0.0, EventKind.NOTE, f"v4l2:{name}", Message("{text} ({count} times)", name, 2))),
+    ]
+    for text in texts:
+        assert isinstance(text, Message)
+        words = said(text, in_language)
+        assert words != str(text) and name in re.split(r"[ :,(]+", words.replace("v4l2:", " ")), words
+        assert said(from_json(json.loads(json_bytes(text))), in_language) == words
+    assert said(about(name, name), in_language) == f"{name}: {name}"
+
+
+def test_a_word_of_the_program_is_translated_among_others() -> None:
+    text = about(word("camera"), ValueError("no load cell"))
+    assert said(text, "de") == "Kamera: keine Kraftmessdose" == said(from_json(text.to_json()), "de")
+    assert word("{a} m") == "{a} m" and not isinstance(word("{a} m"), Message)
+    assert Message(text) is text
 
 
 @pytest.mark.parametrize("content", ["msgid 1\n", "hello\n", 'msgid "a\n', None])
