@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import ast
 import json
 import re
@@ -18,6 +19,7 @@ from acquire.events import Event, EventKind
 from acquire.text import Message
 from acquire.text.message import FIELD, about, fields, from_json, joined, word
 from analysis.evaluate import GAUGE_KINDS
+from live.commands.arguments import COMMANDS, EXAMPLES, full_parser, parse
 from live.pipeline.event_log import sentence
 from live.results.maps.field_maps import FIELD_MAPS
 from live.results.quantities import KNOWN as QUANTITIES
@@ -195,6 +197,47 @@ def test_a_translation_has_the_fields_of_its_text_and_stands_for_one_that_is_the
         assert set(FIELDS.findall(words)) == set(FIELDS.findall(english)), english
         made_of_words = "{n} "  # ``counted`` puts a noun behind
         assert not FIELDS.search(english) or english in known or english.startswith(made_of_words), english
+
+
+def helps(parser: argparse.ArgumentParser) -> Iterator[str]:
+    """All texts of a parser and those of its commands: descriptions line by line, headings, helps."""
+    for text in (parser.description, parser.epilog):
+        yield from (text or "").splitlines()
+    for group in parser._action_groups:
+        yield from filter(None, (group.title, group.description))
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            yield from (str(one.help) for one in action._choices_actions)
+            for one in action.choices.values():
+                yield from helps(one)
+        elif action.help:
+            yield action.help
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_every_help_is_translated(name: str) -> None:
+    known, texts = entries(name), set(helps(full_parser(COMMANDS)))
+    texts |= {part for text in texts if isinstance(text, Message) for part in text.values.values()}
+    words = {text for text in texts if not isinstance(text, Message) or not text.values}
+    assert len(words) > 200
+    examples = {f"  {line}" for line in EXAMPLES.values()}
+    assert not {one for one in words - examples if " " in one.strip() and one not in known}
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_the_help_of_a_command_speaks_the_language_of_the_terminal(
+    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("LC_ALL", f"{name}.UTF-8")
+    with pytest.raises(SystemExit):
+        parse(["run", "--help"])
+    shown = " ".join(capsys.readouterr().out.split())
+    for text in (
+        "exit codes:",
+        "measure at once, but record only after the start command",
+        "side of a ZOI, px",
+    ):
+        assert text not in shown and " ".join(said(text, name).split()) in shown
 
 
 def test_every_field_has_a_value() -> None:
