@@ -21,6 +21,7 @@ from urllib.parse import quote, unquote
 from acquire.bounds import NotAllowed, integer_of, number_of, one_of, yes_or_no
 from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
+from acquire.text import Message
 
 # A glob may hold a question mark too: settings are the last one followed by key=value pairs, whose values have none
 # unless they are a pattern or what a device says and takes.
@@ -222,7 +223,7 @@ class Options:
             Names the unknown key and lists the known ones.
         """
         if self._left:
-            known = ", ".join(self._known) or "none"
+            known = ", ".join(self._known) or Message("none")
             raise ConfigError(
                 "{text}: unknown setting {next}; known: {known}",
                 self.address.text,

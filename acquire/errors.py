@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from acquire.text import Message
+from acquire.text.message import word
 
 DEFECT, USAGE, DEVICE, DATA, LOSS, NOT_READY, EXIT_INTERRUPTED = 1, 2, 3, 4, 5, 6, 130
 
@@ -20,10 +21,12 @@ EXIT_CODES = """exit codes:
 """
 
 EXIT_WORDS = {
-    DEFECT: "a defect of phasedic, see the log",
-    DEVICE: "the camera was lost before the end",
-    LOSS: "finished with loss or nothing measured; summary, frame counts and events show what is missing",
-    EXIT_INTERRUPTED: "interrupted; everything was closed cleanly",
+    DEFECT: Message("a defect of phasedic, see the log"),
+    DEVICE: Message("the camera was lost before the end"),
+    LOSS: Message(
+        "finished with loss or nothing measured; summary, frame counts and events show what is missing"
+    ),
+    EXIT_INTERRUPTED: Message("interrupted; everything was closed cleanly"),
 }
 
 
@@ -37,7 +40,7 @@ class Spoken(Exception):
     """
 
     def __init__(self, text: str = "", *values: Any) -> None:
-        self.text = Message(text, *values) if values else text
+        self.text = Message(text, *values) if values else word(text)
         super().__init__(self.text)
 
 

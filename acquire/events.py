@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any, Literal
 
+from acquire.text.message import word
+
 Level = Literal["info", "warning", "error"]
 
 
@@ -34,6 +36,13 @@ class EventKind(StrEnum):
     RECORDER = "recorder"  # disk space, write errors, counted gaps
     MEASUREMENT = "measurement"  # a trouble or remark of the measuring path
     VIEW = "view"  # a trouble of the view or another output
+
+
+SOURCES = (
+    "alarm", "burst", "force", "measurement", "operator", "pattern", "phasedic", "picture", "plates", "recorder",
+    "reference", "region", "sharpness", "strain", "view",
+)  # fmt: skip
+"""Parts of the program that events come from; other sources are addresses and names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +68,11 @@ class Event:
     text: str
     level: Level = "info"
     data: Mapping[str, Any] = field(default_factory=dict)
+
+
+def named(source: str) -> str:
+    """A source of events as it is shown: a part of the program by its word, which is translated."""
+    return word(source) if source in SOURCES else source
 
 
 EventSink = Callable[[Event], None]

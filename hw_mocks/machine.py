@@ -92,7 +92,7 @@ class Machine:
             self._listening = socket.create_server(("127.0.0.1", self.port))
         except OSError as error:
             raise ConfigError(
-                "machine={port}: cannot be listened to ({why}); choose another", self.port, error.strerror
+                "machine={port}: cannot be listened to ({why}); choose another", self.port, error
             ) from None
         self.port = self._listening.getsockname()[1]
         threading.Thread(target=self._serve, args=(self._listening,), name="machine", daemon=True).start()

@@ -19,7 +19,7 @@ from live.commands.arguments import Command, parse
 from live.commands.environment import check_environment, limit_resources
 from live.commands.signals import ended_by_sigterm
 from live.commands.streams import nonblocking_streams
-from live.words.language import said_here
+from live.words.language import told
 
 _WRONG_PATH = {errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}
 
@@ -114,16 +114,15 @@ def _run(command: Command, arguments: argparse.Namespace) -> int:
 def _system_error(error: OSError) -> PhasedicError:
     """What the system refused, and what to do; the one place for files that no other message covers."""
     name = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes | os.PathLike) else ""
-    why = error.strerror or str(error)
     if error.errno in _WRONG_PATH:
-        text = Message("{why}; give another name", why)
+        text = Message("{why}; give another name", error)
         return ConfigError(about(name[:200], text) if name else text)
-    text = Message("{why}; check the path, the permissions and the room on the disk", why)
+    text = Message("{why}; check the path, the permissions and the room on the disk", error)
     return DataError(about(name, text) if name else text)
 
 
 def _refused(error: PhasedicError) -> int:
-    print(f"phasedic: {said_here(printable(brief(error)))}", file=sys.stderr)
+    print(f"phasedic: {told(printable(brief(error)))}", file=sys.stderr)
     return error.exit_code
 
 

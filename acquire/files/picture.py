@@ -294,5 +294,5 @@ def write_picture(path: Path, picture: NDArray[Any]) -> None:
             file.write(content.tobytes())
     except OSError as error:
         raise DataError(
-            "{path}: cannot be written: {strerror}; look at the folder and the disk", path, error.strerror
+            "{path}: cannot be written: {strerror}; look at the folder and the disk", path, error
         ) from error

@@ -49,7 +49,7 @@ def tiff_pages(path: Path) -> list[Page]:
         with path.open("rb") as file:
             return list(_pages(file, path))
     except OSError as error:
-        raise DataError("{path}: cannot be read: {strerror}", path, error.strerror) from error
+        raise DataError("{path}: cannot be read: {strerror}", path, error) from error
     except struct.error as error:
         raise DataError(
             "{path}: a TIFF that is cut off; copy it again or take it out of the list", path

@@ -78,7 +78,7 @@ def name_of(library: Aravis, target: str, where: str) -> str:
     exact = [one for one in found if target and target == one.id]
     if len(found) == 1 or exact:
         return (exact or found)[0].id
-    here = "; ".join(Message("genicam:{id}  {one}", one.id, one) for one in cameras) or "none"
+    here = "; ".join(Message("genicam:{id}  {one}", one.id, one) for one in cameras) or Message("none")
     if found:
         raise ConfigError(
             "{where}: {count} cameras are meant; give one of them. Cameras here: {here}",

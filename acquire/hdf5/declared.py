@@ -303,7 +303,7 @@ def check_format(path: Path, file: h5py.File, root: Mapping[str, Declared], want
     there = h5py.h5a.exists(file.id, b"format")
     found = as_text(read_attribute(file, "format", root["format"])) if there else None
     if found != wanted:
-        shown = "something else" if found is None else repr(found[:40])
+        shown = Message("something else") if found is None else repr(found[:40])
         raise DataError("{path}: holds {found}, not {wanted}; give another file", path, shown, wanted)
     version = int(read_attribute(file, "format_version", root["format_version"]))
     if version > newest:

@@ -129,7 +129,7 @@ def save(calibration: Calibration, path: Path, address: str) -> None:
         raise DataError("{path} exists already and is not overwritten; choose another name", path) from error
     except OSError as error:
         raise DataError(
-            "{path} cannot be written ({strerror}); choose another folder", path, error.strerror
+            "{path} cannot be written ({strerror}); choose another folder", path, error
         ) from error
 
 
@@ -155,7 +155,7 @@ def load(path: str) -> Calibration:
         date = str(content["date"])
     except OSError as error:
         raise ConfigError(
-            "calibration={path}: {strerror}; name the file of a calibration", path, error.strerror
+            "calibration={path}: {strerror}; name the file of a calibration", path, error
         ) from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, ValueError, TypeError) as error:
         raise ConfigError(

@@ -254,7 +254,7 @@ def _only(address: Address) -> str:
     here = list_cameras()
     found = [one.address for one in here if address.target in ("", one.address.removeprefix("pylon:"))]
     if len(found) != 1:
-        listed = "; ".join(f"{one.address}  {one.name}" for one in here) or "none"
+        listed = "; ".join(f"{one.address}  {one.name}" for one in here) or Message("none")
         raise (ConfigError if found else DeviceError)(
             Message(
                 "{text}: {count} cameras are meant; give a serial number. Cameras here: {listed}",

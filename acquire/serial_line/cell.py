@@ -115,7 +115,7 @@ class SerialCell(Closing):
             text = Message(
                 "no reading within {wait_s:g} s: {what}",
                 self._settings.wait_s,
-                what if seen else "nothing came",
+                what if seen else Message("nothing came"),
             )
             self._report(
                 "warning",

@@ -200,7 +200,9 @@ class Scaling:
             self._report(
                 "warning",
                 Message(
-                    "the unit on the line changed from {last_unit} to {unit}", self._last_unit, unit or "none"
+                    "the unit on the line changed from {last_unit} to {unit}",
+                    self._last_unit,
+                    unit or Message("none"),
                 ),
             )
         self._last_unit = unit

@@ -55,8 +55,8 @@ class Message(str):
     ----------
     template : str
     *given
-        The values of the fields, in the order in which they first stand in the template: numbers, names, or
-        quantities, or messages; what else is given counts as its text.
+        The values of the fields, in the order in which they first stand in the template: numbers, quantities,
+        messages, which are translated, or names, which are not; what else is given counts as its text.
     **named
         Others by their names.
 
@@ -77,10 +77,12 @@ class Message(str):
 
     def __new__(cls, template: str, /, *given: Any, **named: Any) -> Self:
         """Fill it in English."""
+        if isinstance(template, cls) and not (given or named):
+            return template
         names = [name for name in fields(template) if name not in named] if given else []
         values = dict(zip(names, given, strict=True)) | named
         values = {
-            name: getattr(value, "text", value) if isinstance(value, Exception) else value
+            name: _words_of(value) if isinstance(value, Exception) else value
             for name, value in values.items()
         }
         made = super().__new__(cls, filled(template, values, formatted))
@@ -100,10 +102,18 @@ class Message(str):
         return self if times == 1 else "" if times == 0 else str(self) * times
 
     def to_json(self) -> Any:
-        """``{"say": template, "with": values}``; without fields the text alone."""
-        if not self.values:
-            return str(self)
+        """``{"say": template, "with": values}``."""
         return {SAY: self.template, WITH: {key: _plain(value) for key, value in self.values.items()}}
+
+
+def word(text: str) -> str:
+    """A text of the program as a message, which is translated; names and what a user wrote are plain and stay."""
+    return text if FIELD.search(text) else Message(text)
+
+
+def _words_of(error: Exception) -> str:
+    """The message of an error of the program, else what it or the system says."""
+    return getattr(error, "text", None) or word(getattr(error, "strerror", None) or str(error))
 
 
 def _made(template: str, values: Mapping[str, Any]) -> Message:
@@ -133,10 +143,8 @@ def from_json(value: Any) -> Any:
 
 
 def kept(text: str) -> dict[str, Any]:
-    """A text for a file: its English words, and the message that it is, where that has values."""
-    return {"text": str(text)} | (
-        {"message": text.to_json()} if isinstance(text, Message) and text.values else {}
-    )
+    """A text for a file: its English words, and the message that it is."""
+    return {"text": str(text)} | ({"message": text.to_json()} if isinstance(text, Message) else {})
 
 
 def taken(stored: Mapping[str, Any]) -> str:

@@ -67,7 +67,7 @@ _FAULTS = {
 def fault_in_words(error: OSError) -> str:
     """What a failed request means, for a person."""
     words = _FAULTS.get(error.errno or 0, "a request to the camera failed")
-    return Message("{words} ({strerror})", words, error.strerror or error)
+    return Message("{words} ({strerror})", words, error)
 
 
 def why_not_open(path: str, error: OSError, kernel: Kernel) -> str:

@@ -106,7 +106,9 @@ def tensile_strength(curve: Curve) -> Figure:
     if found.low <= 0:
         return Figure.none(Message("no tensile stress beyond its noise is known"))
     rises = not loading.broke and loading.level[-1] >= loading.level.max() - 3 * loading.noise_stress
-    return replace(found, why="so far: the test ended while the stress still rose") if rises else found
+    return (
+        replace(found, why=Message("so far: the test ended while the stress still rose")) if rises else found
+    )
 
 
 def highest_stress(loading: Loading, at: int) -> Figure:

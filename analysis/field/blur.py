@@ -30,7 +30,7 @@ class Blur(NamedTuple):
             return ""
         return Message(
             "{value} by {size:.2f} ± {sigma:.2f} px",
-            "less sharp" if self.px >= 0 else "sharper",
+            Message("less sharp") if self.px >= 0 else Message("sharper"),
             abs(self.px),
             self.sigma,
         )

@@ -119,7 +119,22 @@ COMMANDS = {
 HELP_ALL = "--help-all"
 
 
-class _HelpFormatter(argparse.RawDescriptionHelpFormatter):
+class _AllOptions(argparse.RawDescriptionHelpFormatter):
+    """Says headings, descriptions line by line, and the help of each option in the language of the terminal."""
+
+    def start_section(self, heading: str | None) -> None:
+        """Begin a group of options."""
+        super().start_section(heading and said_here(heading))
+
+    def add_text(self, text: str | None) -> None:
+        """A description."""
+        super().add_text(text and "\n".join(map(said_here, text.splitlines())))
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        return action.help and said_here(action.help)
+
+
+class _HelpFormatter(_AllOptions):
     """Leaves out the expert options, which ``--help-all`` shows."""
 
     def add_usage(self, usage: Any, actions: Any, groups: Any, prefix: Any = None) -> None:
@@ -187,7 +202,7 @@ def full_parser(complete: Iterable[str], *, all_options: bool = True) -> argpars
     all_options : bool
         The help shows expert options too.
     """
-    formatter = argparse.RawDescriptionHelpFormatter if all_options else _HelpFormatter
+    formatter = _AllOptions if all_options else _HelpFormatter
     parser = argparse.ArgumentParser(
         prog="phasedic",
         description="Live strain measurement by phase-DIC: frames, load and strain maps during a test.",

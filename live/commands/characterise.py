@@ -58,7 +58,5 @@ def made_folder(folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise DataError(
-            "{folder} cannot be made: {why}; give another --out", folder, error.strerror
-        ) from error
+        raise DataError("{folder} cannot be made: {why}; give another --out", folder, error) from error
     return folder

@@ -188,7 +188,7 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
 def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], None]) -> None:
     """Open the viewer if there is a display; else print how to open it."""
     if spawn and view.port is not None and spawn_viewer(view.port, trouble) is not None:
-        screen.print("the viewer opens in its own window")
+        screen.print(Message("the viewer opens in its own window"))
         return
     why = Message("no display") if spawn else Message("view.spawn is off")
     screen.print(Message("no viewer is opened ({why}); the test runs without it. To open one:", why))

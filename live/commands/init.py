@@ -134,7 +134,9 @@ def _camera() -> tuple[str, str, tuple[str, ...]]:
     cameras = list_cameras()
     usable = [camera for camera in cameras if not camera.trouble]
     if not usable:
-        why = joined("; ", (about(one.address, one.trouble) for one in cameras)) or "none is plugged in"
+        why = joined("; ", (about(one.address, one.trouble) for one in cameras)) or Message(
+            "none is plugged in"
+        )
         raise DeviceError(
             "no camera can be used ({why}); plug one in, or give --camera ADDRESS (files:shots, sim:)", why
         )

@@ -97,11 +97,11 @@ def command(arguments: argparse.Namespace, print_line: PrintLine = print, ask: A
 def _unfit(samples: Sequence[LoadSample]) -> str:
     """Why these samples give no point of a calibration; "" if they do."""
     if any(sample.flags & (LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD) for sample in samples):
-        return "the cell was in overload or saturated"
+        return Message("the cell was in overload or saturated")
     good = [sample for sample in samples if not math.isnan(sample.force)]
     found = stillness([sample.t for sample in good], [sample.force for sample in good])
     if found.n < 3 or found.still:
-        return "" if found.n else "no reading had a value"
+        return "" if found.n else Message("no reading had a value")
     return Message("the load moved, by {range:.4g} on the line", found.range_N)
 
 

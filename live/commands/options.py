@@ -15,6 +15,7 @@ from acquire.addresses import parse_address, with_setting
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError
 from acquire.text import Message
+from acquire.text.message import word
 from live.commands.arguments import HELP_ALL, bad_value, not_empty
 from live.config.loading import Config, lens_in, load_config, options
 from live.config.values import numbers_of
@@ -41,11 +42,11 @@ def add_options(parser: argparse.ArgumentParser, title: str, *names: str) -> Non
         option, check = field.metadata["option"], field.metadata["check"]
         words = field.metadata["help"]
         if option.off or option.on:
-            words = f"do not {words}" if option.off else words
+            words = Message("do not {what}", word(words)) if option.off else words
             group.add_argument(f"--{name}", dest=key, action="store_const", const=option.on, help=words)
             continue
         if field.default not in (None, "", ()):
-            words += f" (default {field.default})"
+            words = Message("{words} (default {value})", word(words), str(field.default))
         shape = {"metavar": option.metavar} if option.metavar else {"choices": check.words}
         again: Any = {"action": "append"} if option.many else {}
         alone: Any = {"nargs": "?", "const": option.alone} if option.alone else {}
@@ -61,7 +62,7 @@ def _reader(read: Any) -> Any:
         try:
             return read(not_empty(word))
         except ValueError as error:
-            kind = {int: "a whole number", float: "a number"}.get(read)
+            kind = {int: Message("a whole number"), float: Message("a number")}.get(read)
             text = Message("{given}: give {kind}", repr(word), kind) if kind else error
             raise bad_value("{text}", text) from None
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Self
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 
 LOOPBACK = "127.0.0.1"
 MIN_TOKEN_LENGTH = 16  # characters
@@ -62,7 +63,7 @@ class ListenAddress:
                 what,
                 self.host,
                 self.port,
-                error.strerror,
+                error,
             ) from None
         found.setblocking(False)
         return found
@@ -127,7 +128,7 @@ def private_socket(folder: Path, name: str, what: str) -> tuple[socket.socket, C
             "{what}: {path} cannot be made ({why}); choose another --out, or give PORT",
             what,
             folder / name,
-            error.strerror or error,
+            error,
         ) from None
     found.setblocking(False)
     return found, remove
@@ -144,7 +145,7 @@ def read_token(address: ListenAddress, path: str | None, what: str, *, commands:
     if path is None:
         if address.is_loopback and not commands:
             return ""
-        who = "every user" if address.is_loopback else "other machines"
+        who = Message("every user") if address.is_loopback else Message("other machines")
         raise ConfigError(
             "{what}: {who} can reach {host}; give token_file, a file of yours alone with a word of {n} letters, or"
             " {instead}",

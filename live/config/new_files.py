@@ -72,7 +72,7 @@ def _atomic(path: Path, mark: str = "", *, replaces: bool = False) -> Iterator[P
         raise DataError(
             "{path}: cannot be written ({why}); make room or choose another place",
             path,
-            error.strerror or error,
+            error,
         ) from error
     except BaseException:
         _remove(part)

@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from acquire.events import Event, EventKind, EventSink, Level, RateLimiter
+from acquire.events import Event, EventKind, EventSink, Level, RateLimiter, named
 from acquire.text import Message
 from acquire.text.message import about, without_name
 from acquire.text.printable import brief
@@ -35,7 +35,7 @@ def counted_text(text: str, count: int) -> str:
 def sentence(event: Event, names: Mapping[str, str] | None = None) -> str:
     """Source and text: a device by its name in ``names``, else by its address without settings, and only once."""
     source, text = brief(event.source), without_name(brief(event.text), brief(event.source))
-    return about((names or {}).get(event.source, source), text)
+    return about((names or {}).get(event.source) or named(source), text)
 
 
 class EventLog:

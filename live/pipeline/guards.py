@@ -151,7 +151,7 @@ class DilatationGuard:
             self._on_event(Event(step.t, EventKind.MEASUREMENT, "strain", text, "warning", data))
 
     def _text(self, false: float, nu: float) -> str:
-        way = "towards" if false > 0 else "away from"
+        way = Message("towards") if false > 0 else Message("away from")
         far = (
             ""
             if self._stand_off_mm is None

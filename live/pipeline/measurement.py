@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from acquire.frame import Burst
 from acquire.text import Message
+from acquire.text.message import joined
 from analysis.evaluate import COME_APART, REGION, AreaStrain, GaugeSet, GaugeValue
 from analysis.field import StrainField, area_share, mean_blur
 from analysis.optics import ApparentMotion, LensReading
@@ -201,7 +202,9 @@ def time_step_of(
         zoi_sigma=float(np.median(field.sigma_eyy[valid])) if values.size else math.nan,
         n_valid=int(valid.sum()),
         n_zoi=int(field.grid.active.sum()),
-        refused=", ".join(Message("{n} {name}", n, status.name) for status, n in field.refused.items()),
+        refused=joined(
+            ", ", (Message("{n} {name}", n, Message(status.name)) for status, n in field.refused.items())
+        ),
         noise_GL=burst.noise,
         measure_s=measure_s,
         blur=blur.px,

@@ -110,7 +110,9 @@ class FrameCounts:
             self.left_out,
             self.unrecorded,
             on_purpose,
-            "every frame is accounted for" if self.adds_up else "NOT EVERY FRAME IS ACCOUNTED FOR",
+            Message("every frame is accounted for")
+            if self.adds_up
+            else Message("NOT EVERY FRAME IS ACCOUNTED FOR"),
         )
 
 

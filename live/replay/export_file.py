@@ -189,7 +189,11 @@ class _Reader:
             ]
         for number, row in zip(lines, rows, strict=True):
             if any(cell.strip() for cell in row[n:]) and NUMBERISH.fullmatch(cell_of(row, force)):
-                why = "is the comma the decimal mark too? give --load-decimal comma, or" if commas else ""
+                why = (
+                    Message("is the comma the decimal mark too? give --load-decimal comma, or")
+                    if commas
+                    else ""
+                )
                 words = Message("line {line} has {cells} cells for {columns} columns", number, len(row), n)
                 raise DataError(
                     "{where}: {what}; {hint} export it with other separators", self._where, words, why

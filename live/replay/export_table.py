@@ -342,7 +342,7 @@ def _without_heading(parted: dict[str, Rows], where: str, given: LoadConfig, enc
         (row for rows in parted.values() for row in rows[:1000] if not _has_value(row)), key=len, default=[]
     )
     shown = shown or next((row for rows in parted.values() for row in rows if row), [])
-    what: str = "no force against time or picture"
+    what: str = Message("no force against time or picture")
     if given.column:
         what = Message("no column {name}", repr(given.column))
     raise DataError(

@@ -10,13 +10,15 @@ from collections.abc import Iterator
 from typing import BinaryIO
 
 from acquire.errors import DataError
+from acquire.text import Message
 
 HEAD = 1 << 18
 """Bytes or characters at the beginning of a file in which its form is found."""
 _BLOCK, _LONGEST = 1 << 20, 1 << 20  # characters that are read at once, and of a line
 _MAGIC = {
-    b"PK\x03\x04": "a workbook or an archive", b"\xd0\xcf\x11\xe0": "an Excel workbook", b"TDSm": "a TDMS file",
-    b"%PDF": "a PDF", b"\x89HDF": "an HDF5 file", b"\x1f\x8b": "compressed",
+    b"PK\x03\x04": Message("a workbook or an archive"), b"\xd0\xcf\x11\xe0": Message("an Excel workbook"),
+    b"TDSm": Message("a TDMS file"),
+    b"%PDF": Message("a PDF"), b"\x89HDF": Message("an HDF5 file"), b"\x1f\x8b": Message("compressed"),
 }  # fmt: skip
 _BOMS = {
     codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF32_LE: "utf-32", codecs.BOM_UTF32_BE: "utf-32",

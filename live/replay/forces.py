@@ -238,4 +238,4 @@ def read_forces(path: Path, load: LoadConfig | None = None) -> ForceTable:
         with path.open("rb") as file:
             return ForceTable(path, read_export(file, str(path), load or LoadConfig()))
     except OSError as error:
-        raise DataError("{path}: cannot be read ({strerror})", path, error.strerror) from error
+        raise DataError("{path}: cannot be read ({strerror})", path, error) from error

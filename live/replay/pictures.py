@@ -175,9 +175,7 @@ def write_names(source: str, path: Path) -> None:
             rows.writerow(("frame", "file", "page"))
             rows.writerows((frame, *name) for frame, name in enumerate(picture_names(address)))
     except OSError as error:
-        raise DataError(
-            "{path}: cannot be written ({why}); choose another --out", path, error.strerror
-        ) from None
+        raise DataError("{path}: cannot be written ({why}); choose another --out", path, error) from None
 
 
 def picture_of(burst: Burst) -> Frame:

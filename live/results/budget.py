@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from acquire.text import Message
+from acquire.text.message import word
 from live.config.sections import CameraConfig, ScaleConfig
 
 MOTION_MM = 0.1
@@ -119,7 +120,7 @@ def budget_cells(rows: Iterable[BudgetRow], unit: str, one: float) -> list[tuple
     def cells(row: BudgetRow) -> tuple[str, ...]:
         numbers = row.strain * 1e6, row.share * 100, row.modulus / one
         texts = (row.words, "", "") if row.words else tuple(Message("{number:.3g}", n) for n in numbers)
-        return (Message("{cause}", row.cause), *texts[: 3 if known else 2])
+        return (word(row.cause), *texts[: 3 if known else 2])
 
     return [("", "µm/m", Message("% of E"), unit)[: 4 if known else 3], *map(cells, rows)]
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from acquire.load_cell import LoadLog
 from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text.message import joined, word
 from acquire.text.quantity import Amount, unit_of
 from analysis.evaluate import (
     AT_LEAST,
@@ -298,7 +298,7 @@ def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str
 def beyond_scatter(figures: TensileFigures) -> str:
     """What the interval of E holds beside the scatter, in words; empty where it holds no more."""
     causes = [cause for cause in figures.budget if cause != "scatter"]
-    return Message("limits of {causes}", joined(", ", causes)) if causes else ""
+    return Message("limits of {causes}", joined(", ", map(word, causes))) if causes else ""
 
 
 def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> dict[str, TensileRow]:
@@ -306,7 +306,7 @@ def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> dict[str, Tensil
 
 
 def _text(rows: Mapping[str, TensileRow], key: str) -> str:
-    return Message("{name} = {text}", rows[key].name, rows[key].text)
+    return Message("{name} = {text}", word(rows[key].name), rows[key].text)
 
 
 def _known_texts(rows: Mapping[str, TensileRow], keys: Sequence[str]) -> str:

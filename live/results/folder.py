@@ -117,7 +117,7 @@ def make_folder(wanted: str | None, now: datetime.datetime) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigError(
-            "{folder}: cannot be made ({strerror}); choose another --out", folder, error.strerror
+            "{folder}: cannot be made ({strerror}); choose another --out", folder, error
         ) from None
     _check_free(folder)
     return folder

@@ -139,7 +139,11 @@ class Strain(Closing):
                 "{path}: no map {name}; there are {known}", self.path, repr(name), ", ".join(names)
             )
         if isinstance(row, int) and not -self.n <= row < self.n:
-            there = Message("no row {row}; there are {n}", row, self.n) if self.n else "holds no measurement"
+            there = (
+                Message("no row {row}; there are {n}", row, self.n)
+                if self.n
+                else Message("holds no measurement")
+            )
             raise DataError(about(self.path, there))
         rows = range(self.n)[row]
         try:

@@ -53,7 +53,7 @@ class CsvWriter:
 
     def _trouble(self, error: OSError) -> DataError:
         return DataError(
-            "{path}: cannot be written ({why}); make room or choose another place", self._path, error.strerror
+            "{path}: cannot be written ({why}); make room or choose another place", self._path, error
         )
 
 

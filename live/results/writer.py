@@ -57,7 +57,7 @@ class Results(Closing):
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise DataError(
-                "{folder}: cannot be made ({why}); choose another --out", folder, error.strerror
+                "{folder}: cannot be made ({why}); choose another --out", folder, error
             ) from error
         self._h5 = StrainWriter(self.h5_path, grid, info, flush_s)
         try:

@@ -189,7 +189,8 @@ class TareControl:
                 "{text}; repeat the command within {CONFIRM_S:g} s to do it", text, CONFIRM_S
             )
         else:
-            self._emit(EventKind.TARE, "operator", "tare" + (", forced" if how == FORCED else ""), "info")
+            text = Message("tare, forced") if how == FORCED else Message("tare")
+            self._emit(EventKind.TARE, "operator", text, "info")
             self._cell.tare(force=how == FORCED)
         return self._outcome()
 

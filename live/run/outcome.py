@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from acquire.errors import exit_code_of_all
+from acquire.text import Message
 from live.config.loading import Config
 from live.pipeline.run_state import RunState
 from live.results.finished.finished_test import FinishedTest
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
     from analysis import ZoiGrid
 
-INTERRUPTED, TIME_IS_OVER = "interrupted", "the time is over"
+INTERRUPTED, TIME_IS_OVER = Message("interrupted"), Message("the time is over")
 """Reasons to stop; INTERRUPTED gives the exit code of that name."""
 
 

@@ -89,7 +89,10 @@ def new_run_state(config: Config, screen: Screen, *, both_sides: bool = False) -
 
 def _device_names(config: Config) -> dict[str, str]:
     """Names of camera and load cell on the screen, by address; none where both have the same address."""
-    names = {config.load.address: "load cell", config.camera.address: "camera"}
+    names: dict[str, str] = {
+        config.load.address: Message("load cell"),
+        config.camera.address: Message("camera"),
+    }
     return names if len(names) == 2 else {}
 
 

@@ -22,6 +22,7 @@ from typing import Any
 from acquire.errors import DeviceError, PhasedicError
 from acquire.events import Event, Level
 from acquire.serial_line.ports import LineSettings, open_port
+from acquire.text import Message
 from live.config.figures import OF_SNAPSHOT
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
@@ -34,7 +35,7 @@ EVERY_S = 0.4
 _OF_NOW = [one.name for one in OF_SNAPSHOT if one.load or one.part == "age"]
 """Channels of a heartbeat that are not those of the last measurement."""
 AGAIN_S = 5.0
-MISSED = "a reader does not read, or is not there: it misses lines; end it, or let it read faster"
+MISSED = Message("a reader does not read, or is not there: it misses lines; end it, or let it read faster")
 REOPEN_S = 1.0
 """A lost serial port is opened again at this interval."""
 
@@ -132,7 +133,7 @@ class StrainOut(Consumer, ABC):
         if not arrived and not self._lossy:
             self.tell(MISSED, "error")
         elif arrived and self._lossy and now > self._missed_t + AGAIN_S:
-            self.tell("all lines are read again", "info")
+            self.tell(Message("all lines are read again"), "info")
         self.lost = self.lost or not arrived
         self._missed_t = self._missed_t if arrived else now
         self._lossy = now <= self._missed_t + AGAIN_S

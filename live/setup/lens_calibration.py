@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
+from acquire.text import Message
 from analysis.field import StrainField
 from analysis.optics import LensFit, LensModel, lens_of_shifts
 from live.setup.scale import Board, Corners, find_corners
@@ -157,7 +158,7 @@ def lens_of_corners(found: Sequence[Corners], size: tuple[int, int], k3: bool = 
     return LensFit(LensModel(parameters, covariance), float(rms) / math.sqrt(2), 1.0)
 
 
-_MORE = "tilt the board by 10 to 30 degrees in all directions, at all places of the picture"
+_MORE = Message("tilt the board by 10 to 30 degrees in all directions, at all places of the picture")
 
 
 def _inverse_normal(views: Sequence[Floats], free: int) -> Floats:

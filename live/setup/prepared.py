@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from acquire.events import EventSink
 from acquire.frame import QUANTISATION, Burst, CameraInfo
 from acquire.load_cell import LoadLog
+from acquire.text import Message
 from analysis.optics import LensCorrection, LensModel, PlateFit, ShutterCorrection
 from live.config.gauges import gauges_for
 from live.config.loading import Config
@@ -118,7 +119,7 @@ class MeasurePlan:
         phase = self.settings.estimator == "phase"
         return compile_ahead(picture_kinds(camera), phase=phase, show=show, stopped=stopped)
 
-    def on(self, reference: Burst, what: str = "the reference") -> PreparedKernel:
+    def on(self, reference: Burst, what: str = Message("the reference")) -> PreparedKernel:
         """The kernel on ``reference``, named ``what`` in errors; raises as ``live.pipeline.reference.prepare``."""
         stated = self.config.measure.noise_GL
         grid, settings, steps = self.kernel_grid, self.settings, self.quantisation

@@ -121,7 +121,9 @@ def _found(config: Config, picture: NDArray[Any], noise: float | None) -> Region
         zois = 0
     if zois == 0:
         zoi = config.measure.zoi
-        return replace(none, words=f"the pattern that was found takes no ZOI of {zoi} px: all but a rim")
+        return replace(
+            none, words=Message("the pattern that was found takes no ZOI of {zoi} px: all but a rim", zoi)
+        )
     return region
 
 

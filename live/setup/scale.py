@@ -252,8 +252,8 @@ def find_corners(picture: NDArray[Any], board: Board) -> Corners:
     grey = np.clip((picture - low) * (255 / max(float(high - low), 1e-6)), 0, 255).astype(np.uint8)
     found = _charuco(grey, board) if board.marker_mm else _checkerboard(grey, board)
     if found is None or len(found.px) < MIN_CORNERS:
-        kind = Message("ChArUco board") if board.marker_mm else "checkerboard"
-        count = "squares" if board.marker_mm else Message("inner corners")
+        kind = Message("ChArUco board") if board.marker_mm else Message("checkerboard")
+        count = Message("squares") if board.marker_mm else Message("inner corners")
         raise DataError(
             "no {kind} of {columns} x {rows} {count} is found; hold all of it in the picture, in focus and "
             "evenly lit, and count again",
@@ -328,7 +328,7 @@ def from_board(
     uneven = 1 - smaller / larger
     fit = rms / (larger * spread * math.sqrt(len(corners.mm)))
     relative = math.sqrt(fit**2 + (sigma_mm / extent) ** 2 + uneven**2 / 12)
-    kind = Message("ChArUco board") if board.marker_mm else "checkerboard"
+    kind = Message("ChArUco board") if board.marker_mm else Message("checkerboard")
     scale = float(math.sqrt(1 / (larger * smaller)))
     method = Message("{kind} of {count} corners, {rms:.2f} px rms", kind, len(corners.mm), rms)
     change = float(np.hypot(*gradient)) * extent

@@ -82,15 +82,19 @@ def said_here(text: str) -> str:
     return said(text, of_terminal())
 
 
-def told(text: object) -> str:
-    """A message or quantity in the language of the terminal; names and other texts as they are."""
+def told(text: object, language: str | None = None) -> str:
+    """A message or quantity in a language, else that of the terminal; names and other texts as they are."""
+    language = language or of_terminal()
     if isinstance(text, Amount):
-        return str(text.printed(of_terminal()))
-    return said_here(text) if isinstance(text, Message) else str(text)
+        return str(text.printed(language))
+    return said(text, language) if isinstance(text, Message) else str(text)
 
 
 def said(text: str, language: str) -> str:
-    """A text in a language: its template translated, and its values filled in, texts among them likewise."""
+    """A text of the program in a language: its template translated, and its values filled in.
+
+    Messages among the values are translated likewise; names, which are plain texts, stay.
+    """
     words = entries(language)
     if not words:
         return str(text)
@@ -99,7 +103,7 @@ def said(text: str, language: str) -> str:
 
     def shown(value: Any, spec: str) -> str:
         if isinstance(value, str):
-            return format(said(value, language), spec)
+            return format(told(value, language), spec)
         if isinstance(value, Amount):
             return str(value.printed(language))
         number = formatted(value, spec)

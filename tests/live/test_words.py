@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import argparse
 import ast
+import json
 import re
 from collections.abc import Iterator
 from functools import cache
@@ -12,13 +14,17 @@ from typing import Any
 import pytest
 from babel.messages.extract import extract
 
-from acquire.events import EventKind
+from acquire.errors import ConfigError
+from acquire.events import Event, EventKind
 from acquire.text import Message
-from acquire.text.message import FIELD, about, fields
+from acquire.text.message import FIELD, about, fields, from_json, joined, word
 from analysis.evaluate import GAUGE_KINDS
+from live.commands.arguments import COMMANDS, EXAMPLES, full_parser, parse
+from live.pipeline.event_log import sentence
 from live.results.maps.field_maps import FIELD_MAPS
 from live.results.quantities import KNOWN as QUANTITIES
 from live.results.report.record import FIGURES
+from live.ui.web.broadcaster import json_bytes
 from live.words import language
 from live.words.language import LANGUAGES, entries, parsed, said
 from tests.live.ui.web.browser import ROOT
@@ -63,7 +69,36 @@ def test_a_message_is_said_in_a_language_with_its_numbers_and_parts(german: Path
     assert said(text, "de") == "/dev/video0: seit 2,1 s kein Bild"
     assert said('still "waiting"', "de") == "wartet"
     assert said(text, "en") == str(text) and said("not yet", "de") == "not yet"
-    assert said(about("a", 'still "waiting"'), "de") == "a: wartet"
+    assert said(about("a", Message('still "waiting"')), "de") == "a: wartet"
+
+
+NAMES = ("file", "Run", "stress", "ok", "camera", "operator", "none", "Datei")
+"""What a user may call a camera, a file, a gauge, a column, or be called."""
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("in_language", LANGUAGES)
+def test_a_name_like_a_text_of_the_program_stays(in_language: str, name: str) -> None:
+    """Whatever says it: messages and errors, joined texts, events, also as a file or the page gets them."""
+    texts = [
+        about(name, Message("{name} lost", name)),
+        joined(", ", (name, Message("{name} lost", name))),
+        ConfigError("{path}: cannot be read ({error}); give a text file in TOML", Path(name), name).text,
+        sentence(Event(0.0, EventKind.NOTE, f"v4l2:{name}", Message("{text} ({count} times)", name, 2))),
+    ]
+    for text in texts:
+        assert isinstance(text, Message)
+        words = said(text, in_language)
+        assert words != str(text) and name in re.split(r"[ :,(]+", words.replace("v4l2:", " ")), words
+        assert said(from_json(json.loads(json_bytes(text))), in_language) == words
+    assert said(about(name, name), in_language) == f"{name}: {name}"
+
+
+def test_a_word_of_the_program_is_translated_among_others() -> None:
+    text = about(word("camera"), ValueError("no load cell"))
+    assert said(text, "de") == "Kamera: keine Kraftmessdose" == said(from_json(text.to_json()), "de")
+    assert word("{a} m") == "{a} m" and not isinstance(word("{a} m"), Message)
+    assert Message(text) is text
 
 
 @pytest.mark.parametrize("content", ["msgid 1\n", "hello\n", 'msgid "a\n', None])
@@ -162,6 +197,47 @@ def test_a_translation_has_the_fields_of_its_text_and_stands_for_one_that_is_the
         assert set(FIELDS.findall(words)) == set(FIELDS.findall(english)), english
         made_of_words = "{n} "  # ``counted`` puts a noun behind
         assert not FIELDS.search(english) or english in known or english.startswith(made_of_words), english
+
+
+def helps(parser: argparse.ArgumentParser) -> Iterator[str]:
+    """All texts of a parser and those of its commands: descriptions line by line, headings, helps."""
+    for text in (parser.description, parser.epilog):
+        yield from (text or "").splitlines()
+    for group in parser._action_groups:
+        yield from filter(None, (group.title, group.description))
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            yield from (str(one.help) for one in action._choices_actions)
+            for one in action.choices.values():
+                yield from helps(one)
+        elif action.help:
+            yield action.help
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_every_help_is_translated(name: str) -> None:
+    known, texts = entries(name), set(helps(full_parser(COMMANDS)))
+    texts |= {part for text in texts if isinstance(text, Message) for part in text.values.values()}
+    words = {text for text in texts if not isinstance(text, Message) or not text.values}
+    assert len(words) > 200
+    examples = {f"  {line}" for line in EXAMPLES.values()}
+    assert not {one for one in words - examples if " " in one.strip() and one not in known}
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_the_help_of_a_command_speaks_the_language_of_the_terminal(
+    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("LC_ALL", f"{name}.UTF-8")
+    with pytest.raises(SystemExit):
+        parse(["run", "--help"])
+    shown = " ".join(capsys.readouterr().out.split())
+    for text in (
+        "exit codes:",
+        "measure at once, but record only after the start command",
+        "side of a ZOI, px",
+    ):
+        assert text not in shown and " ".join(said(text, name).split()) in shown
 
 
 def test_every_field_has_a_value() -> None:

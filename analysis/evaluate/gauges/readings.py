@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.text import Message
+from acquire.text.message import joined
 from analysis.evaluate.area.affine import Places
 from analysis.evaluate.area.strain import GRADIENTS
 from analysis.evaluate.gauges.geometry import Mask
@@ -210,7 +211,7 @@ def _missing_in(chosen: Mask, field: StrainField) -> str:
     lost = Counter(Status(s) for s in field.status[chosen & ~field.ok].tolist())
     if total - lost.total() >= MIN_SHARE * total:
         return ""
-    words = ", ".join(Message("{n} {name}", n, status.name) for status, n in lost.most_common())
+    words = joined(", ", (Message("{n} {name}", n, Message(status.name)) for status, n in lost.most_common()))
     return Message("{total} of {total2} ZOIs have no value ({words})", lost.total(), total, words)
 
 

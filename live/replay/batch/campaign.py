@@ -182,7 +182,7 @@ def _processes(wanted: CampaignRequest) -> WorkerProcesses:
 
 
 def _no_process(error: OSError) -> DataError:
-    return DataError("no process can be started on this machine ({why}); end other programs", error.strerror)
+    return DataError("no process can be started on this machine ({why}); end other programs", error)
 
 
 def _sweep(out: Path, rows: Mapping[str, BatchRow], tasks: Sequence[Task]) -> None:
@@ -197,9 +197,7 @@ def _make(out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise ConfigError(
-            "{folder}: cannot be made ({why}); choose another --out", out, error.strerror
-        ) from None
+        raise ConfigError("{folder}: cannot be made ({why}); choose another --out", out, error) from None
 
 
 def _planned(wanted: CampaignRequest) -> tuple[dict[str, BatchRow], list[Task]]:

@@ -94,7 +94,7 @@ def _source(source: str) -> Any:
             return [_ends(file) for file in _set_of(path)]
         return [dict(address.settings), [_stamp(file) for file in _pictures(path)]]
     except OSError as error:
-        raise DataError("{path}: cannot be read ({why}); check the path", source, error.strerror) from error
+        raise DataError("{path}: cannot be read ({why}); check the path", source, error) from error
 
 
 def _set_of(path: Path) -> list[Path]:
@@ -132,4 +132,4 @@ def _file(path: Any) -> str | None:
         check_regular(Path(path))
         return _hash(Path(path).read_bytes())
     except OSError as error:
-        raise DataError("{path}: cannot be read ({why}); check the path", path, error.strerror) from error
+        raise DataError("{path}: cannot be read ({why}); check the path", path, error) from error

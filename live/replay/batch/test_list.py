@@ -194,7 +194,7 @@ def _value(key: str, cell: str) -> Any:
 def _from_list(path: Path, number: int, row: Mapping[str, Any]) -> dict[str, Any]:
     unknown = [key for key in row if key not in _OWN and "." not in key]
     if unknown or not isinstance(row.get("source"), str):
-        what = Message("unknown: {keys}", ", ".join(unknown)) if unknown else "no source"
+        what = Message("unknown: {keys}", ", ".join(unknown)) if unknown else Message("no source")
         raise ConfigError(
             "{path}: test {number}: {what}; there are {known} and keys such as specimen.width_mm",
             path,

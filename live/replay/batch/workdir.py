@@ -54,7 +54,7 @@ def publish(staging: Path, folder: Path) -> None:
         raise DataError(
             "{folder}: the folder of the results cannot be renamed to this ({why}); nothing is overwritten",
             folder,
-            error.strerror,
+            error,
         ) from error
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text.message import joined, word
 from live.results.finished.findings import NO_FORCE, DataCheck, changes
 from live.results.finished.finished_test import FinishedTest
 from live.results.run_folder import SESSION
@@ -50,7 +50,7 @@ def checks_line(found: Sequence[DataCheck]) -> str:
     words = {
         "good": Message("good"), "doubt": Message("in doubt"), "not checked": Message("not possible"),
     }  # fmt: skip
-    names = {outcome: [one.name for one in found if one.outcome == outcome] for outcome in words}
+    names = {outcome: [word(one.name) for one in found if one.outcome == outcome] for outcome in words}
     without = [one for one in found if one.text == NO_FORCE]
     if without:
         names["not checked"] = [Message("{n} that need a force", len(without))]

@@ -70,7 +70,7 @@ class MapRequest:
         steps, times = Message("0 to {most} steps", MAX_STEPS), Message("0 to {most} times", MAX_SHARPENED)
         limit, low_pass, odd = self.limit, self.low_pass_px, self.median in range(1, MAX_MEDIAN + 1, 2)
         for what, value, well, allowed in (
-            ("limit", limit, limit is None or 0 < limit < math.inf, "a number above 0"),
+            ("limit", limit, limit is None or 0 < limit < math.inf, Message("a number above 0")),
             ("median", self.median, odd, Message("an odd number from 1 to {most}", MAX_MEDIAN)),
             ("low-pass", low_pass, 0 <= low_pass <= extent, whole),
             ("deconvolution", self.deconvolution, 0 <= self.deconvolution <= MAX_STEPS, steps),
@@ -179,7 +179,7 @@ def save(image: Image, path: Path) -> None:
         raise ConfigError("{path} exists and is not overwritten; choose another name", path) from None
     except OSError as error:
         raise DataError(
-            "{path}: cannot be written: {strerror}; look at the folder and the disk", path, error.strerror
+            "{path}: cannot be written: {strerror}; look at the folder and the disk", path, error
         ) from None
 
 

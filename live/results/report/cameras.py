@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from acquire.text import Message
+from acquire.text.message import word
 from analysis.evaluate import TensileFigures
 from live.config.cameras import BACK, FRONT
 from live.pipeline.measurement import AXIAL
@@ -58,9 +59,9 @@ def report_of_cameras(runs: Mapping[str, RunFolder], reports: Mapping[str, str])
     title, words, figures, by_strain, sections = (_of_sides if FRONT in runs else _of_fields)(runs, stresses)
     found = {name: headline(one, stresses=stresses) for name, one in by_strain.items()}
     heads = (Message("by the strain of"), *(row.name for row in next(iter(found.values()))))
-    rows = [(Message("{where}", name), *(row.text for row in one)) for name, one in found.items()]
+    rows = [(word(name), *(row.text for row in one)) for name, one in found.items()]
     links = (
-        element("p", element("a", Message("report of the {side}", Message("{side}", side)), href=name))
+        element("p", element("a", Message("report of the {side}", word(side)), href=name))
         for side, name in reports.items()
     )
     content = [
@@ -102,7 +103,7 @@ def _of_fields(runs: Mapping[str, RunFolder], stresses: bool) -> _Parts:
     first = next(iter(runs.values()))
     curves = {name: EvaluatedCurve.of(run) for name, run in runs.items()}
     axial: dict[str, tuple[Array, Array, None]] = {
-        Message("{side}", name): (np.asarray(runs[name].strain.time_s, np.float64), curve.axial, None)
+        word(name): (np.asarray(runs[name].strain.time_s, np.float64), curve.axial, None)
         for name, curve in curves.items()
     }
     return (
@@ -149,7 +150,7 @@ def _stress_strain(sides: SidesOfTest, stresses: bool) -> Plot:
     strains = {"mean": axial.mean, "front": axial.mean + axial.bending, "back": axial.mean - axial.bending}
     e = strain_unit(*strains.values())
     lines = tuple(
-        PlotLine(Message("{side}", side), strain * e.factor, load * unit.factor, colour=k)
+        PlotLine(word(side), strain * e.factor, load * unit.factor, colour=k)
         for k, (side, strain) in enumerate(strains.items())
     )
     title, up = load_labels(unit.name, stresses=stresses)

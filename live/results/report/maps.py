@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from acquire.frame import CameraInfo
 from acquire.text import Message
-from acquire.text.message import about
+from acquire.text.message import about, word
 from acquire.text.message import joined as texts
 from live.results.maps.colours import ticks
 from live.results.maps.painting import Levels, Painter, caption
@@ -79,7 +79,7 @@ def maps(
         )
     ends = Message(
         "{words}; values beyond the ends have the colour of the end; no colour: no value",
-        quantity_of(name).words,
+        word(quantity_of(name).words),
     )
     bar = captioned(_bar(name, scale), ends, "bar")
     return joined(
@@ -115,7 +115,7 @@ def statuses(run: RunFolder, row: int, pictures: MapPictures, longest: int) -> H
     lines = []
     for one in status_legend(run.strain.maps("status", row)[run.strain.grid.active]):
         key = Html(f'<span class="key" style="background:rgb{one.rgb}"></span>')
-        lines.append(Html(f"<p>{key}{one.count} {safe(about(one.name, one.text))}</p>"))
+        lines.append(Html(f"<p>{key}{one.count} {safe(about(one.name, word(one.text)))}</p>"))
     return joined([captioned(element("div", picture), caption(run.strain, row), "pair"), *lines])
 
 

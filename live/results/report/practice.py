@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from acquire.events import EventKind
 from acquire.frame import CameraInfo
 from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text.message import joined, word
 from analysis.evaluate import NoiseFloor
 from analysis.picture.pattern import describe_pattern
 from analysis.quality.pattern import FWHM_OF_RADIUS, SPECKLE_RADIUS_PX
@@ -52,7 +52,7 @@ class PracticeValues:
 def reporting_table(known: PracticeValues) -> Html:
     """Both halves of the table: hardware and analysis."""
     rows = [*_hardware(known), *_analysis(known)]
-    shown = [(Message("{what}", item), value if value else _open(key)) for item, key, value in rows]
+    shown = [(word(item), value if value else _open(key)) for item, key, value in rows]
     return table(("", Message("this test")), shown)
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.events import EventKind
+from acquire.events import named
 from acquire.text import Message
+from acquire.text.message import word
 from acquire.text.quantity import Amount
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.event_log import counted_text
@@ -104,7 +105,7 @@ def frame_counts(run: RunFolder) -> Html:
     if not found:
         return paragraph(Message("No frame counts were recorded."), "dim")
     counts = {name: Amount("count", one) if isinstance(one, int) else one for name, one in found.items()}
-    return facts({Message("{what}", name): Message("{what}", one) for name, one in counts.items()})
+    return facts({word(name): word(one) if isinstance(one, str) else one for name, one in counts.items()})
 
 
 def events(run: RunFolder) -> Html:
@@ -116,12 +117,10 @@ def events(run: RunFolder) -> Html:
     rows = [
         (
             Message("{t:.3f}", event.t - run.start_monotonic),
-            element("span", Message("{what}", event.level), class_=event.level),
-            Message("{what}", event.kind.value),
-            Message("{what}", event.source),
-            event.text
-            if event.kind is EventKind.NOTE
-            else Message("{what}", counted_text(event.text, count)),
+            element("span", word(event.level), class_=event.level),
+            word(event.kind.value),
+            named(event.source),
+            counted_text(event.text, count),
         )
         for event, count in found[:_MAX_EVENTS]
     ]
@@ -135,7 +134,7 @@ def events(run: RunFolder) -> Html:
 
 def remarks(run: RunFolder) -> Html:
     """What the summary of a replay said beside its figures, and what of the run cannot be read."""
-    told_then = [paragraph(Message("{what}", one)) for one in stored_remarks(run.path)]
+    told_then = [paragraph(one) for one in stored_remarks(run.path)]
     return joined([*told_then, *(paragraph(note, "warning") for note in run.notes)])
 
 
@@ -150,7 +149,7 @@ def definitions(run: RunFolder) -> Html:
     words += Message(
         "Strain measure: {name}. Strains are dimensionless in the files.", run.strain.strain_measure
     )
-    told_rows = [(name, unit, Message("{what}", what)) for name, unit, what in rows]
+    told_rows = [(name, unit, word(what)) for name, unit, what in rows]
     return joined([paragraph(words), table(("", Message("unit"), Message("definition")), told_rows)])
 
 
@@ -180,4 +179,4 @@ def _sha256(path: Path) -> str:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
-        return told(Message("cannot be read: {why}", error.strerror))
+        return told(Message("cannot be read: {why}", error))

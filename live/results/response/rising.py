@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 from analysis.evaluate import Curve, TensileFigures
 from analysis.evaluate.curve import Loading
 from analysis.evaluate.programme import KindOfTest
@@ -82,7 +83,7 @@ def check_channel(config: Config, *, forces: bool) -> None:
     """
     name = config.output.response or ""
     if name == STRESS and not (forces and config.specimen.area_m2):
-        what = "a section (--section W,T)" if forces else "forces (--load FILE.csv)"
+        what = Message("a section (--section W,T)") if forces else Message("forces (--load FILE.csv)")
         raise ConfigError("--response stress needs {what}; --response mean needs neither", what)
     if name not in ("", *CHANNELS, *config.gauges):
         known = ", ".join((*CHANNELS, *config.gauges))

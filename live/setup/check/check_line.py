@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from acquire.text import Message
+from acquire.text.message import joined, word
 from live.setup.check.check_list import CheckFigures
 from live.setup.check.sample import MIN_FRAMES
 
@@ -13,7 +14,8 @@ from live.setup.check.sample import MIN_FRAMES
 class CheckLine:
     """One figure of the check, whether it is good enough, and what to do if it is not.
 
-    A figure that the pictures do not give (not ``measured``) is neither good nor bad.
+    A figure that the pictures do not give (not ``measured``) is neither good nor bad. ``what`` and ``advice`` are words
+    of the program, ``value`` a message or what was read.
     """
 
     what: str
@@ -24,10 +26,9 @@ class CheckLine:
 
     def text(self) -> str:
         """The line as printed."""
-        mark = "ok  " if self.measured else "?   "
-        return f"{mark if self.good else 'LOOK'}  {self.what:<22} {self.value}" + (
-            "" if self.good or not self.advice else f"\n      -> {self.advice}"
-        )
+        mark = ("ok  " if self.measured else "?   ") if self.good else "LOOK"
+        line = Message("{mark}  {what:<22} {value}", mark, word(self.what), self.value)
+        return line if self.good else joined("\n      -> ", (line, word(self.advice)))
 
 
 def not_measured(f: CheckFigures, what: str) -> CheckLine:

@@ -49,7 +49,7 @@ def disk_lines(rate: float, config: Config) -> list[CheckLine]:
         return [
             CheckLine(
                 "disk",
-                Message("{folder}: cannot be asked ({strerror})", folder, error.strerror),
+                Message("{folder}: cannot be asked ({strerror})", folder, error),
                 False,
                 words,
             )

@@ -24,7 +24,9 @@ def motion_lines(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
         yield from (not_measured(f, what) for what in ("drift", "vibration"))
         return
     if not math.isfinite(s.drift_px):
-        yield CheckLine("drift", "not measured", f.zois.without_pattern < 1, "no ZOI can be followed")
+        yield CheckLine(
+            "drift", Message("not measured"), f.zois.without_pattern < 1, "no ZOI can be followed"
+        )
         return
     pulled = [one for one in (s.exx, s.eyy) if strain_drifts(one.drift, one.sigma_drift)]
     strain = max(pulled or (s.exx, s.eyy), key=lambda one: abs(one.drift))

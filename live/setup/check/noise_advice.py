@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from acquire.text import Message
+from acquire.text.message import joined
 from live.setup.check.check_list import CheckFigures
 from live.setup.check.noise_floor import ZoiFloor
 
@@ -28,7 +29,7 @@ def advice(figures: CheckFigures, target: float) -> str:
     """What to change for a strain noise of one ZOI of at most ``target`` (dimensionless)."""
     ways = list(_ways(figures, target))
     if ways:
-        return ", or ".join(ways)
+        return joined("; ", ways)
     if not figures.floors:
         return Message("the table of phasedic check shows what reaches it")
     return Message(
@@ -70,7 +71,7 @@ def _longer(floor: ZoiFloor, burst: int, noise: float, target: float) -> Iterato
 def _more_light(figures: CheckFigures, factor: float) -> str:
     """More light or contrast; with shot noise, twice the light gives 1.4 times the signal-to-noise ratio."""
     possible = FULL_LIGHT / max(figures.exposure.high, 1e-3)
-    times = "twice" if 1.8 < factor < 2.2 else Message("{factor:.1f} times", factor)
+    times = Message("twice") if 1.8 < factor < 2.2 else Message("{factor:.1f} times", factor)
     if factor <= possible:
         return Message("{times} the light or exposure", times)
     need = math.sqrt(factor / max(possible, 1.0))

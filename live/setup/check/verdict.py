@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from acquire.text import Message
+from acquire.text.message import joined
 from acquire.text.quantity import Amount
 from analysis.quality.pattern import SPECKLE_RADIUS_PX
 from analysis.quality.steadiness import aliased, mains_of
@@ -72,7 +73,7 @@ def _camera(f: CheckFigures) -> Iterator[CheckLine]:
     automatic = ", ".join(f.automatic)
     yield CheckLine(
         "automatic controls",
-        automatic or "none",
+        automatic or Message("none"),
         not automatic,
         Message("put on manual: {automatic}", automatic),
     )
@@ -208,7 +209,7 @@ def _pattern(f: CheckFigures) -> Iterator[CheckLine]:
     yield _sharpness(f)
     yield _sssig(f)
     share, n = z.without_pattern, z.grid.n_active
-    yield CheckLine("ZOIs without pattern", "all" if share == 1 else Message("{share:.1%} of {n}", share, n),
+    yield CheckLine("ZOIs without pattern", Message("all") if share == 1 else Message("{share:.1%} of {n}", share, n),
                share <= MAX_WITHOUT_PATTERN,
                Message("spray a pattern, set focus and exposure") if share == 1 else
                Message("restrict them with --roi or --mask, or take larger ZOIs"))  # fmt: skip
@@ -228,30 +229,30 @@ def _sharpness(f: CheckFigures) -> CheckLine:
     value = Message("{sharpness:.3f} 1/px", f.sharpness)
     if not of:
         return CheckLine(
-            "sharpness", "no pattern is visible", False, "spray a pattern, set focus and exposure"
+            "sharpness", Message("no pattern is visible"), False, "spray a pattern, set focus and exposure"
         )
     softest, sharpest = min(of, key=lambda k: of[k]), max(of, key=lambda k: of[k])
     even = of[softest] >= MIN_SHARPNESS_RATIO * of[sharpest]
     text = Message(
         "{value}, {softest} {of:.3f}, {sharpest} {of2:.3f}",
         value,
-        softest,
+        Message(softest),
         of[softest],
-        sharpest,
+        Message(sharpest),
         of[sharpest],
     )
     return CheckLine(
         "sharpness",
         text,
         even,
-        Message("softer at the {softest}: set the camera square, close the aperture", softest),
+        Message("softer at the {softest}: set the camera square, close the aperture", Message(softest)),
     )
 
 
 def _sssig(f: CheckFigures) -> CheckLine:
     known = f.zois.sssig[np.isfinite(f.zois.sssig)]
     if not known.any():
-        return CheckLine("SSSIG of a ZOI", "none", False, "spray a pattern")
+        return CheckLine("SSSIG of a ZOI", Message("none"), False, "spray a pattern")
     weak = float(np.percentile(known, 5))
     px = math.sqrt(2) * f.noise / math.sqrt(max(weak, 1e-9))
     value = Message(
@@ -271,7 +272,7 @@ def _load(f: CheckFigures) -> Iterator[CheckLine]:
             f.load.noise_N,
             f.load.mean_text,
         )
-        yield CheckLine("load cell", value, f.load.ready, "; ".join(f.load.remarks))
+        yield CheckLine("load cell", value, f.load.ready, joined("; ", f.load.remarks))
 
 
 def _floor(f: CheckFigures, target: float | None) -> CheckLine:

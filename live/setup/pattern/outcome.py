@@ -185,7 +185,7 @@ def save_new(drawn: Any, path: Path) -> None:
         raise ConfigError("{path} exists and is not overwritten; choose another name", path) from None
     except OSError as error:
         raise DataError(
-            "{path}: cannot be written: {strerror}; look at the folder and the disk", path, error.strerror
+            "{path}: cannot be written: {strerror}; look at the folder and the disk", path, error
         ) from None
 
 

@@ -105,6 +105,4 @@ def write_page(outcomes: list[ExperimentOutcome], target: Path, folder: Path, ty
         if verdicts := [v for outcome in outcomes for v in outcome.verdicts]:
             (folder / "verdicts.csv").write_text(_table(verdicts).csv(), encoding="utf-8")
     except OSError as error:
-        raise DataError(
-            "{path} cannot be written: {why}; give another --page", target, error.strerror
-        ) from error
+        raise DataError("{path} cannot be written: {why}; give another --page", target, error) from error

@@ -20,7 +20,7 @@ from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Level
 from acquire.frame import Frame, frozen
 from acquire.text import Message
-from acquire.text.message import about
+from acquire.text.message import about, word
 from acquire.text.quantity import Amount
 from analysis.evaluate import evaluate_test
 from live.config.gauges import gauge_colours, outlines
@@ -152,7 +152,7 @@ def _report_selection(shown: int, run: RunFolder, screen: Screen) -> None:
 
 
 def _notify(screen: Screen, text: str, level: Level) -> None:
-    screen.print(text if level == "info" else about(Message("{what}", level), text))
+    screen.print(text if level == "info" else about(word(level), text))
 
 
 def _announce(view: View, screen: Screen) -> None:

@@ -30,6 +30,7 @@ from acquire.system import (
     start_with_socket,
 )
 from acquire.text import Message
+from acquire.text.message import word
 from live.pipeline.latency import OUTPUT
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox
@@ -293,7 +294,7 @@ class Supervisor:
 
 def _reason(code: int, error: Exception) -> str:
     if isinstance(error, (Stuck, WireError)):
-        return Message("{why}", error.args[0])
+        return word(error.args[0])
     if code < 0:
         return Message("was ended by {name}", signal.Signals(-code).name)
     return Message("ended with {code}", code)

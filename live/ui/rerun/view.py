@@ -88,7 +88,10 @@ class View:
         self._supervisor = Supervisor(self._outbox, target, notify, lambda: on_serving(self))
         self._picture_t = self._load_t = -math.inf
         if os.environ.get("RERUN", "").lower() in _OFF:
-            notify("RERUN=off is set: the view stays empty, and view.rrd too; unset the variable", "warning")
+            notify(
+                Message("RERUN=off is set: the view stays empty, and view.rrd too; unset the variable"),
+                "warning",
+            )
         else:
             self._supervisor.start()
 

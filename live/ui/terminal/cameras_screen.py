@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from acquire.text import Message
 from acquire.text.message import about
 from live.pipeline.screen import Screen
 from live.ui.terminal.status_line import cameras_line
@@ -54,7 +55,7 @@ class _CameraScreen(Screen):
         return self._every.screen.is_due
 
     def print(self, text: str = "") -> None:
-        self._every.screen.print(about(self._name, text) if text else "")
+        self._every.screen.print(about(Message(self._name), text) if text else "")
 
     def bell(self) -> None:
         self._every.screen.bell()

@@ -19,7 +19,7 @@ from acquire.text.printable import duration, printable, share_text
 from acquire.text.quantity import IN_ASCII
 from live.pipeline.screen import Screen
 from live.ui.terminal.status_line import GAP, force_text, gauge_texts, status_line
-from live.words.language import said_here
+from live.words.language import told
 
 if TYPE_CHECKING:
     from live.pipeline.measurement import TimeStep
@@ -51,7 +51,7 @@ class TerminalScreen(Screen):
     def print(self, text: str = "") -> None:
         """Print a line that stays."""
         if not self._quiet:
-            self._write(" " * self._width + "\r" * (self._width > 0) + said_here(printable(text)) + "\n")
+            self._write(" " * self._width + "\r" * (self._width > 0) + told(printable(text)) + "\n")
             self._width = 0
             if self._prompt is not None:
                 self._renew(self._prompt)
@@ -79,11 +79,11 @@ class TerminalScreen(Screen):
         if self._terminal:
             self._renew(text)
         else:
-            self._write(said_here(printable(text)) + "\n")
+            self._write(told(printable(text)) + "\n")
 
     def _renew(self, text: str) -> None:
         """Renew the last line, cut to the width of the terminal: a line that wraps cannot be renewed."""
-        text = said_here(printable(text))[: self._columns()]
+        text = told(printable(text))[: self._columns()]
         self._write(text.ljust(self._width) + "\r")
         self._width = len(text)
 

@@ -8,12 +8,12 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text.message import joined, word
 from acquire.text.printable import duration, share_text
 from acquire.text.quantity import UNKNOWN, Amount
 from live.pipeline.snapshot import AXIAL, BURST, FORCE, STRESS
 from live.pipeline.timed.figure import BEYOND, LACKING, FigureState
-from live.words.language import said_here
+from live.words.language import told
 
 if TYPE_CHECKING:
     from analysis.evaluate import GaugeValue
@@ -58,7 +58,7 @@ def _each(cameras: Mapping[str, Snapshot]) -> Iterator[Item]:
     for name, s in cameras.items():
         axial = s.figure(AXIAL)
         if text := figure_text(axial, strain_text(axial.value, axial.sigma), strain_text(axial.last)):
-            yield 5, joined(" ", (name, text))
+            yield 5, joined(" ", (Message(name), text))
 
 
 def _both(both: Mapping[str, Sequence[float]]) -> Iterator[Item]:
@@ -71,13 +71,16 @@ def _both(both: Mapping[str, Sequence[float]]) -> Iterator[Item]:
 
 def _machines(cameras: Mapping[str, Snapshot]) -> Iterator[Item]:
     for name, s in cameras.items():
-        yield 8, joined(" ", (name, _zois(s.valid, s.zois) if s.time_step is not None else _frames(s)))
+        yield (
+            8,
+            joined(" ", (Message(name), _zois(s.valid, s.zois) if s.time_step is not None else _frames(s))),
+        )
         yield from (_item(row) for row in s.rows("terminal") if row.figure.name in _OF_CAMERA)
 
 
 def fitted(items: Sequence[Item], width: int) -> str:
     """The items that fit, in their order and in the language of the terminal; the last one left is cut."""
-    left = [(rank, said_here(text)) for rank, text in items if text]
+    left = [(rank, told(text)) for rank, text in items if text]
     while len(left) > 1 and len(GAP.join(text for _, text in left)) > width:
         left.remove(max(left, key=lambda item: item[0]))
     return GAP.join(text for _, text in left)[: max(width, 0)]
@@ -123,8 +126,8 @@ def _item(row: ShownFigure) -> Item:
     last = "" if row.now.why else joined("", [replace(row.amount, value=row.now.last)])
     amount = figure_text(row.now, joined("", [row.amount]), last)
     if row.matters:
-        return min(_MATTERS, row.figure.terminal), joined(" ", (said_here(row.figure.said).upper(), amount))
-    return row.figure.terminal, joined(" ", (row.figure.said, amount))
+        return min(_MATTERS, row.figure.terminal), joined(" ", (told(word(row.figure.said)).upper(), amount))
+    return row.figure.terminal, joined(" ", (word(row.figure.said), amount))
 
 
 def _zois(valid: int, zois: int) -> str:
@@ -143,9 +146,9 @@ def figure_text(figure: TimedFigure, live: str, last: str = "") -> str:
     if figure.known or figure.state is FigureState.NONE:
         return live if figure.known else ""
     if figure.state in BEYOND:
-        return figure.state.upper()
+        return word(figure.state.upper())
     if figure.state not in LACKING:
-        return Message("– ({why})", str(figure.state))
+        return Message("– ({why})", word(str(figure.state)))
     words = (
         Message("{last}, {age:.0f} s ago", last, figure.age)
         if last and math.isfinite(figure.age) and figure.last == figure.last

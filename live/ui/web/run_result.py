@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from acquire.text import Message
-from acquire.text.message import about, joined
+from acquire.text.message import about, joined, word
 from analysis.evaluate import TensileFigures
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import sentence
@@ -72,7 +72,7 @@ def cameras_result(
     results = {side: run_result(state, tests[side], folder / side, words) for side, state in states.items()}
     specimen = next(iter(tests.values())).specimen
     found = figures_of(states, specimen)
-    troubles = [about(side, text) for side, one in results.items() for text in one["troubles"]]
+    troubles = [about(word(side), text) for side, one in results.items() for text in one["troubles"]]
     first = next(iter(found), "")
     stresses = specimen.area_m2 is not None
     figures: list[dict[str, Any]] = [
@@ -117,7 +117,9 @@ def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str
 
 def _interval_of_e(figures: TensileFigures) -> dict[str, Any]:
     parts = (
-        figures.budget if len(figures.budget) > 1 else ("scatter", Message("no limits of error are stated"))
+        figures.budget
+        if len(figures.budget) > 1
+        else (Message("scatter"), Message("no limits of error are stated"))
     )
     text = joined("; ", parts)
     return {"name": Message("interval of E"), "text": text, "words": True}

@@ -75,11 +75,18 @@ class DeviceLists:
             self._busy.release()
 
     def _search(self) -> None:
-        self._finding = "searching …"
+        self._finding = Message("searching …")
         recorded = [CameraListing(address, Message("recorded session")) for address in self._sessions()]
-        simulated = [CameraListing("sim:", "simulated"), CameraListing("sim:hole", "simulated")]
+        simulated = [
+            CameraListing("sim:", Message("simulated")),
+            CameraListing("sim:hole", Message("simulated")),
+        ]
         self._cameras = [*self._list_cameras(), *recorded, *simulated]
-        others = [*recorded, CameraListing("sim:", "simulated"), CameraListing("none:", "none")]
+        others = [
+            *recorded,
+            CameraListing("sim:", Message("simulated")),
+            CameraListing("none:", Message("none")),
+        ]
         self._loads = [*(_port(one) for one in self._list_ports()), *map(_shown, others)]
         self._finding = ""
 

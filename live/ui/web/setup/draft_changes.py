@@ -52,7 +52,7 @@ def find(session: SetupSession, request: Request) -> None:
 
 def whole_picture(session: SetupSession, request: Request) -> None:
     """Measure the whole picture."""
-    session.region.replace(np.ones_like(session.region.known.mask), "the whole picture")
+    session.region.replace(np.ones_like(session.region.known.mask), Message("the whole picture"))
 
 
 def overlay(session: SetupSession, request: Request) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 from analysis.evaluate import inside_polygon
 
 TOOLS = ("rectangle", "polygon", "brush", "eraser")
@@ -159,7 +160,7 @@ class DrawnRegion:
         mask = self.mask
         for stroke in [Stroke.parse(one) for one in strokes]:
             mask = stroke.drawn_on(mask)
-        self.replace(mask, "as drawn")
+        self.replace(mask, Message("as drawn"))
 
     def replace(self, mask: Bools, origin: str) -> None:
         """Replace the mask by another of the same size."""

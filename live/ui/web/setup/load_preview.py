@@ -144,13 +144,17 @@ class LoadPreview:
     def lines(self, found: LoadReport | None) -> Iterator[CheckLine]:
         """What a check says beside the report ``found``: a recorded, missing or closed load cell, and none."""
         if self.address == NONE:
-            yield CheckLine("load cell", "none: force, stress and modulus are not measured", measured=False)
+            yield CheckLine(
+                "load cell", Message("none: force, stress and modulus are not measured"), measured=False
+            )
         elif self._recorded:
-            yield CheckLine("load cell", "recorded, with the pictures or for itself", measured=False)
+            yield CheckLine("load cell", Message("recorded, with the pictures or for itself"), measured=False)
         elif self.trouble:
             yield CheckLine("load cell", self.trouble, False, "choose the load cell under Camera")
         elif found is None:
-            yield CheckLine("load cell", "not open yet", False, "wait for the force, then check again")
+            yield CheckLine(
+                "load cell", Message("not open yet"), False, "wait for the force, then check again"
+            )
 
     @property
     def _recorded(self) -> bool:

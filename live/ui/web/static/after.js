@@ -5,7 +5,7 @@ import { drawGauges } from "./draw.js";
 import { icon, key, putIcon } from "./icons.js";
 import { setRatio, showLegend } from "./legend.js";
 import { quantity, strainText, time } from "./numbers.js";
-import { t } from "./words.js";
+import { t, told } from "./words.js";
 
 let result = null, chosen = { side: 0, time: "peak" };
 for (const kind of ["unit", "language"]) addEventListener(kind, () => { if (result) show(); });
@@ -25,7 +25,7 @@ function show() {
   showFold("unknown", others.filter((one) => one.text == null), unknown, `${t("Figures that are not known")}: `);
   showFold("gauge", result.gauges.map((one, k) => ({ ...one, k: one.colour ?? k })), gauge, `${t("Gauges")}, ${t(result.atpeak ?? "")}: `);
   put($("folder"), result.folder);
-  put($("ledger"), t(result.ledger));
+  put($("ledger"), told(result.ledger));
   put($("next"), result.next ?? "");
   put($("again"), result.again ?? "");
   finishCurve(result.lines ?? []);
@@ -37,40 +37,40 @@ function showBelief({ belief, words, troubles }) {
   const kind = words ? "bad" : (belief?.kind ?? "look");
   $("belief").className = `band ${kind}`;
   putIcon(document.querySelector("#belief .lamp"), { good: "check", look: "warn", bad: "error" }[kind]);
-  put($("believed"), t(words || belief?.words));
-  put($("ended"), [words && belief ? belief.words : "", troubles[0] ?? belief?.more ?? ""].map((one) => t(one)).filter(Boolean).join(" "));
+  put($("believed"), told(words || belief?.words));
+  put($("ended"), [words && belief ? belief.words : "", troubles[0] ?? belief?.more ?? ""].map(told).filter(Boolean).join(" "));
   $("troublefold").hidden = !troubles.length;
   put($("troublecount"), String(troubles.length));
-  fill($("troubles"), troubles, (text) => el("li", { text: t(text) }));
+  fill($("troubles"), troubles, (text) => el("li", { text: told(text) }));
 }
 
 const nameOf = (one) => `${typeof one.name === "string" && !one.name.includes(" ") ? one.name : t(one.name)}${one.side ? `, ${t(one.side)}` : ""}`;
 
 // Value, uncertainty and unit of a figure: a quantity, or a text as it is.
 function parts(one) {
-  if (typeof one.text === "string" || one.text?.say != null) return { value: t(one.text), sigma: "", unit: "" };
+  if (typeof one.text === "string" || one.text?.say != null) return { value: told(one.text), sigma: "", unit: "" };
   const found = quantity(one.text);
   return one.bound ? { ...found, value: `${t("at least")} ${found.value}` } : found;
 }
 
 function tile(one) {
   const isKnown = one.text != null, { value, sigma, unit } = isKnown ? parts(one) : { value: "–", sigma: "", unit: "" }, says = isKnown ? one.remark : one.why;
-  const reason = says ? [el("p", { class: `says ${isKnown ? "look" : ""}` }, icon(isKnown ? "warn" : "info"), el("span", { text: t(says), title: t(says) }))] : [];
+  const reason = says ? [el("p", { class: `says ${isKnown ? "look" : ""}` }, icon(isKnown ? "warn" : "info"), el("span", { text: told(says), title: told(says) }))] : [];
   const interval = sigma ? [el("span", { text: "95 %" }), el("span", { class: "num" }, "± ", el("b", { text: sigma }))] : [];
   return el("section", { class: `tile ${isKnown ? (says ? "look" : "") : "stale"}`.trim() }, el("h3", { text: nameOf(one) }), el("span", { class: "age" }),
     el("p", { class: "value" }, el("span", { class: "figure num", text: value }), el("span", { text: unit })), el("p", { class: "sigma" }, ...interval), ...reason);
 }
 
 function row(one) {
-  if (one.words) return el("li", { class: "row words" }, el("span", { text: nameOf(one) }), el("span", { class: "small", text: t(one.text) }));
-  const remark = one.remark ? [el("span", { class: "small", text: t(one.remark) })] : [], { value, sigma, unit } = parts(one);
+  if (one.words) return el("li", { class: "row words" }, el("span", { text: nameOf(one) }), el("span", { class: "small", text: told(one.text) }));
+  const remark = one.remark ? [el("span", { class: "small", text: told(one.remark) })] : [], { value, sigma, unit } = parts(one);
   return el("li", { class: "row" }, el("span", { text: nameOf(one) }), el("b", { class: "num" }, `${value} ${unit} `, el("small", { text: sigma && `± ${sigma}` })), ...remark);
 }
 
-const unknown = (one) => el("li", { class: "row words" }, el("span", { text: nameOf(one) }), el("span", { class: "small", text: t(one.why) }));
+const unknown = (one) => el("li", { class: "row words" }, el("span", { text: nameOf(one) }), el("span", { class: "small", text: told(one.why) }));
 
 function gauge(one) {
-  const text = one.value == null ? t(one.reason || "lost") : strainText(one.value, one.sigma);
+  const text = one.value == null ? told(one.reason) || t("lost") : strainText(one.value, one.sigma);
   return el("li", { class: "row" }, el("span", {}, key(one.k), " ", nameOf(one)), el("b", { class: "num", text }));
 }
 
@@ -124,5 +124,5 @@ function showReport(report) {
   const link = $("report"), isReady = report === true, words = { wait: "The report is being made …", ready: "Open the report", none: "No report" };
   put(link.querySelector("span"), t(report === null ? words.wait : isReady ? words.ready : words.none));
   link.setAttribute("aria-disabled", String(!isReady));
-  put($("whynoreport"), typeof report === "string" || report?.say ? t(report) : "");
+  put($("whynoreport"), typeof report === "string" || report?.say ? told(report) : "");
 }

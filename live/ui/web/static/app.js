@@ -2,7 +2,7 @@
 import { $, change, command, el, post, put } from "./base.js";
 import { addIcons } from "./icons.js";
 import { ask, pause } from "./press.js";
-import { isExpert, language, setExpert, setLanguage, t } from "./words.js";
+import { isExpert, language, setExpert, setLanguage, t, told } from "./words.js";
 import { themeChanged } from "./curves.js";
 import { fixed } from "./numbers.js";
 import { beginRun, linkLost, showRun } from "./run.js";
@@ -27,7 +27,7 @@ const handlers = {
     put($("specimen"), value.what?.specimen ?? "");
     if (value.stage !== "setup") put($("file"), value.what ? [value.what.material, sectionOf(value.what)].filter(Boolean).map((one) => `· ${one}`).join(" ") : "");
     $("failed").hidden = !value.words;
-    put($("whyfailed"), t(value.words));
+    put($("whyfailed"), told(value.words));
     if (!changed) return;
     if (!value.words) put($("answer"), "");
     pause();

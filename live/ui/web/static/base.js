@@ -1,11 +1,11 @@
 // Shared by all parts of the page: elements, and requests to phasedic.
-import { t } from "./words.js";
+import { t, told } from "./words.js";
 
 export const $ = (id) => document.getElementById(id);
 
 // Writes only a changed text, so that the layout is not computed again.
 export function put(element, text) {
-  const words = text?.say != null ? t(text) : text;
+  const words = text?.say != null ? told(text) : text;
   if (element.textContent !== words) element.textContent = words;
 }
 
@@ -14,7 +14,7 @@ export function el(tag, properties = {}, ...children) {
   const element = document.createElement(tag);
   for (const [key, value] of Object.entries(properties)) {
     if (key === "class") element.className = value;
-    else if (key === "text") element.textContent = value?.say != null ? t(value) : value;
+    else if (key === "text") element.textContent = value?.say != null ? told(value) : value;
     else if (key === "t") { if (value?.say == null) element.dataset.t = value; element.textContent = t(value); }
     else if (key.includes("-")) element.setAttribute(key, value);
     else element[key] = value;
@@ -37,11 +37,11 @@ export async function post(path, value) {
     const response = await fetch(path, {
       method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(value),
     });
-    answer = response.ok ? await response.json() : { text: await response.text(), refused: true };
+    answer = response.ok ? await response.json() : { text: t(await response.text()), refused: true };
   } catch {
-    answer = { text: "NO LINK", refused: true };
+    answer = { text: t("NO LINK"), refused: true };
   }
-  put($("answer"), answer.text ? t(answer.text) : `${t("done")} ✓`);
+  put($("answer"), answer.text ? told(answer.text) : `${t("done")} ✓`);
   $("answer").className = answer.refused ? "no" : "";
   return answer;
 }

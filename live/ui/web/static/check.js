@@ -2,7 +2,7 @@
 import { $, el, fill, put } from "./base.js";
 import { icon, putIcon } from "./icons.js";
 import { fixed, strainText } from "./numbers.js";
-import { t } from "./words.js";
+import { t, told } from "./words.js";
 
 const LABELS = { picture: "Picture", force: "Force", disk: "Disk" };
 const ICONS = { picture: "camera", force: "force", disk: "disk" };
@@ -33,12 +33,12 @@ function verdictOf(part, value) {
 }
 
 function verdict({ part, line: { what, value, good, advice }, figure }) {
-  const words = `${t(what)}: ${t(value)}${good || !advice ? "" : `. ${t(advice)}`}`;
+  const words = `${t(what)}: ${told(value)}${good || !advice ? "" : `. ${t(advice)}`}`;
   return el("section", { class: `verdict ${good ? "good" : "bad"}` }, icon(ICONS[part]), el("h3", { text: t(LABELS[part]) }), el("span", { class: "big num", text: figure }), el("p", { text: words }));
 }
 
 const line = (one) => el("li", { class: one.good ? (one.measured ? "" : "open") : "look" },
-  el("b", { text: t(one.what) }), el("span", { text: t(one.value) }), ...(one.good ? [] : [el("em", { text: t(one.advice) })]));
+  el("b", { text: t(one.what) }), el("span", { text: told(one.value) }), ...(one.good ? [] : [el("em", { text: t(one.advice) })]));
 
 // The verdict on all cameras. Without GO the button looks different and has to be pressed twice, with the reason.
 export function showStart(values) {
@@ -49,13 +49,13 @@ export function showStart(values) {
   putIcon($("go").firstChild, go == null ? "info" : go ? "check" : "error");
   const side = values.find((one) => one.lines.some((line) => !line.good)), worst = side?.lines.find((one) => !one.good);
   const whose = side?.side ? `${t(side.side)}: ` : "";
-  put($("reason"), worst ? `${whose}${t(worst.what)}: ${t(worst.value)}` : "");
+  put($("reason"), worst ? `${whose}${t(worst.what)}: ${told(worst.value)}` : "");
   if (!button.classList.contains("armed")) put(button.querySelector("span"), t(isReady ? "Start the test" : "Start without GO"));
   button.classList.toggle("doubtful", !isReady);
   button.classList.toggle("main", isReady);
   if (isReady) { delete button.dataset.ask; return; }
   button.dataset.ask = go === false ? "Start although the check says NO-GO?" : "Start without a check?";
-  button.dataset.because = worst ? `${t(worst.what)}: ${t(worst.value)}` : "Light, focus, noise and load cell have not been checked.";
+  button.dataset.because = worst ? `${t(worst.what)}: ${told(worst.value)}` : "Light, focus, noise and load cell have not been checked.";
   button.dataset.yes = "Start anyway";
 }
 

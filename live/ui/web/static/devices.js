@@ -2,9 +2,8 @@
 import { $, change, el, fill, put } from "./base.js";
 import { numberField, onEscape } from "./fields.js";
 import { fixed, short, withSigma } from "./numbers.js";
-import { t } from "./words.js";
+import { t, told } from "./words.js";
 
-const OTHER = "another address …", LABELS = { simulated: "simulated", session: "recorded session", none: "none", other: OTHER };
 let shown = {};
 
 // A choice with the mouse acts at once; with the keyboard on Enter or when the focus leaves, not on the way there.
@@ -39,8 +38,8 @@ export function showDevices(value) {
   rate.show(Number(query.get("fps")) || null);
   $("rate").placeholder = short(value.camera?.fps);
   fill($("rates"), value.camera?.rates ?? [], (rate) => el("option", { value: rate }));
-  fill($("camerawarnings"), value.camera?.warnings ?? [], (text) => el("li", { text: t(text) }));
-  put($("finding"), t(devices.finding));
+  fill($("camerawarnings"), value.camera?.warnings ?? [], (text) => el("li", { text: told(text) }));
+  put($("finding"), told(devices.finding));
   showLoad(load);
 }
 
@@ -49,8 +48,8 @@ function showLoad(load) {
   put($("setupforce"), none ? t("none") : load.force_N == null ? "–" : force);
   put($("forcenoise"), none || load.noise_N == null ? "" : `± ${noise || fixed(load.noise_N, 1)} N`);
   put($("forcerate"), load.rate == null ? "" : `${fixed(load.rate)} 1/s`);
-  put($("loadtrouble"), t(load.trouble));
-  put($("loadname"), none ? t("no load cell: no force, no stress, no modulus") : load.rate == null ? t(load.name) : `${t(load.name)}, ${fixed(load.rate)} 1/s`);
+  put($("loadtrouble"), told(load.trouble));
+  put($("loadname"), none ? t("no load cell: no force, no stress, no modulus") : load.rate == null ? told(load.name) : `${told(load.name)}, ${fixed(load.rate)} 1/s`);
   put($("zero"), load.zero_N ? `${t("zero")} ${fixed(load.zero_N, 1)} N` : "");
   $("setupforcetile").classList.toggle("stale", Boolean(load.trouble));
   $("setupforce").nextElementSibling.hidden = none;
@@ -74,8 +73,8 @@ function offerFormats(formats, now, asked) {
 function offer(select, found, address) {
   if (select === document.activeElement) return;
   const known = found.some((one) => one.address === address) ? found : [{ address, name: "", trouble: "" }, ...found];
-  fill(select, [...known, { address: "", name: OTHER }], (one) => {
-    const name = Object.values(LABELS).includes(one.name) ? t(one.name) : one.name, trouble = one.trouble ? ` (${t(one.trouble)})` : "";
+  fill(select, [...known, { address: "", name: "" }], (one) => {
+    const name = one.address ? told(one.name) : t("another address …"), trouble = one.trouble ? ` (${told(one.trouble)})` : "";
     return el("option", { value: one.address, text: `${one.address} ${name}${trouble}`.trim() });
   });
   select.value = address;

@@ -6,7 +6,7 @@ import { ask } from "./press.js";
 import { drawGauges, make, moved, position, showCross, zoomable } from "./draw.js";
 import { numberField, onEscape } from "./fields.js";
 import { fixed } from "./numbers.js";
-import { t } from "./words.js";
+import { t, told } from "./words.js";
 
 const svg = $("drawing"), LEAST_PX = 12, REACH_PX = 22, pointers = new Set();
 let state = {}, tool = "move", points = [], drag = null, pending = null, kinds = {}, cross = null;
@@ -251,7 +251,7 @@ const labelled = (input, words) => el("label", {}, el("span", { t: words }), inp
 function showScale() {
   if (scaled || asking) return;
   const s = state.scale;
-  put($("scale"), s?.px_per_mm ? `${fixed(s.px_per_mm, 2)} px/mm${s.sigma ? ` ± ${fixed(100 * s.sigma * s.px_per_mm, 2)} %` : ""}${state.remarks.map((one) => ` · ${t(one)}`).join("")}` : "");
+  put($("scale"), s?.px_per_mm ? `${fixed(s.px_per_mm, 2)} px/mm${s.sigma ? ` ± ${fixed(100 * s.sigma * s.px_per_mm, 2)} %` : ""}${state.remarks.map((one) => ` · ${told(one)}`).join("")}` : "");
 }
 
 // -- display -----------------------------------------------------------------------------------

@@ -5,7 +5,7 @@ import { key, putIcon } from "./icons.js";
 import { beginMap, showMap } from "./map.js";
 import { chooseStrainUnit, fixed, powered, quantityText, short, strainText, strainUnit, time, unitOf, withSigma } from "./numbers.js";
 import { beginViews, cameras, noteFailed, received } from "./views.js";
-import { nameOfRegion, setAlong, t } from "./words.js";
+import { nameOfRegion, setAlong, t, told } from "./words.js";
 
 const WORDS = {
   opening: "opening", reference: "reference: keep still", measuring: "measuring", paused: "paused", ended: "closing the files",
@@ -106,7 +106,7 @@ function showTile(id, one, unit, of) {
   if (isLive || isKept) grow(text);
   put($(`${id}unit`), isBeyond ? "" : unit.name);
   const age = (one?.age_s ?? 0) + (isLost ? silentS : 0), two = isLive ? withSigma(one.value, one.sigma, unit)[1] : "";
-  const since = state === "unknown" && one.why ? t(one.why) : isKept && one.age_s != null ? `${t("last value at")} ${time(state_s() - one.age_s)}` : t(LABELS[state] ?? "");
+  const since = state === "unknown" && one.why ? told(one.why) : isKept && one.age_s != null ? `${t("last value at")} ${time(state_s() - one.age_s)}` : t(LABELS[state] ?? "");
   put($(`${id}sigma`), isLive ? (two && `± ${two} ${unit.name}`) : since);
   put($(`${id}of`), isLive ? of : "");
   tile.className = ["tile", id === "axial" ? "strain" : "", isOld || state === "paused" ? "stale" : "", says === "beyond" ? "bad" : says === "near" ? "look" : ""].join(" ").trim();
@@ -150,7 +150,7 @@ function grow(text) {
 }
 
 // A value whose area lost a block stands for a part of it.
-const withPart = (text, part) => (part ? `${text} ${t(part)}` : text);
+const withPart = (text, part) => (part ? `${text} ${told(part)}` : text);
 
 function showGauges(value) {
   const gauges = (value.gauges ?? []).map((one, k) => ({ k: one.colour ?? k, ...one })), list = $("others");
@@ -159,7 +159,7 @@ function showGauges(value) {
   gauges.forEach((one, i) => {
     const number = list.children[i].lastChild;
     put(number, one.reason ? t("lost") : one.value == null ? "–" : withPart(strainText(one.value, one.sigma), one.part));
-    number.title = one.reason ? t(one.reason) : "";
+    number.title = told(one.reason);
     number.classList.toggle("bad", Boolean(one.reason));
   });
 }
@@ -197,7 +197,7 @@ function showRecording(recording, isEnded) {
 // Red and the cause: alarms, errors that are not over, figures that are old or unknown, until that is over. Amber near
 // a limit, and where an alarm was silenced beyond it.
 function showState(value) {
-  const troubles = (value.troubles ?? []).map((one) => t(one)), { force, axial } = value.figures;
+  const troubles = (value.troubles ?? []).map(told), { force, axial } = value.figures;
   const near = Object.keys(LABELLED).find((name) => value.figures[name]?.limit?.near || value.figures[name]?.limit?.beyond);
   const kind = troubles.length ? "alarm" : value.state === "paused" ? "paused" : near ? "near" : value.state === "measuring" ? "measuring" : "";
   for (const one of ["alarm", "paused", "near", "measuring"]) $("state").classList.toggle(one, one === kind);
@@ -218,14 +218,14 @@ function showMachine({ facts = [], zois, valid, part }) {
   fill($("strip"), shown.map(([label]) => label), (label) => el("span", {}, el("b"), " ", el("span", { t: label })));
   shown.forEach(([, text, matters, why], i) => {
     put($("strip").children[i].firstChild, text);
-    $("strip").children[i].title = t(why);
+    $("strip").children[i].title = told(why);
     $("strip").children[i].classList.toggle("matters", matters);
   });
 }
 
 function showEvents(list) {
   const newest = list.at(-1);
-  put($("lastevent"), newest ? `${time(newest.s)} ${t(newest.text)}` : "");
+  put($("lastevent"), newest ? `${time(newest.s)} ${told(newest.text)}` : "");
   put($("eventcount"), fixed(list.length));
-  fill($("events"), list.toReversed(), (one) => el("li", {}, el("time", { text: time(one.s) }), el("span", { text: t(one.text), class: one.level })));
+  fill($("events"), list.toReversed(), (one) => el("li", {}, el("time", { text: time(one.s) }), el("span", { text: told(one.text), class: one.level })));
 }

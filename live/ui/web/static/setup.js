@@ -8,7 +8,7 @@ import { icon, key, putIcon } from "./icons.js";
 import { setRatio } from "./legend.js";
 import { fixed, percent, short, strainText, strainUnit } from "./numbers.js";
 import { all, beginViews, received } from "./views.js";
-import { t } from "./words.js";
+import { t, told } from "./words.js";
 
 let busy = false, shownPicture = -1, edition = -1;
 
@@ -71,13 +71,13 @@ export function showSetup(state) {
   const value = received("setup", state), every = all("setup");
   showStart(every.length ? every : [state]);
   if (!value) return;
-  put($("trouble"), t(value.trouble || value.doubt));
-  put($("busy"), t(value.busy));
+  put($("trouble"), told(value.trouble || value.doubt));
+  put($("busy"), told(value.busy));
   showLive(value);
   const c = value.camera;
-  put($("camera"), c ? `${t(c.name)}, ${c.width} × ${c.height} px, ${c.bits} ${t("bits")}${c.fps ? `, ${short(c.fps)} 1/s` : ""}` : "");
+  put($("camera"), c ? `${told(c.name)}, ${c.width} × ${c.height} px, ${c.bits} ${t("bits")}${c.fps ? `, ${short(c.fps)} 1/s` : ""}` : "");
   put($("loadsum"), value.load.rate == null ? "" : `${t("Load cell")} ${fixed(value.load.rate)} 1/s`);
-  put($("region"), value.region ? `${t(value.region.words)}${value.zois == null ? "" : ` · ${fixed(value.zois)} ${t("ZOIs")}`}` : "");
+  put($("region"), value.region ? `${told(value.region.words)}${value.zois == null ? "" : ` · ${fixed(value.zois)} ${t("ZOIs")}`}` : "");
   put($("specimen"), value.metadata.specimen ?? "");
   put($("file"), `· ${value.file} · ${t(value.unsaved.length ? "not saved" : "saved")}`);
   showPicture(value);

@@ -1,7 +1,7 @@
 // Several cameras: a card for each, with its picture and what it does. The chosen one is shown large.
 import { $, el, fill, put } from "./base.js";
 import { fixed, strainText } from "./numbers.js";
-import { t } from "./words.js";
+import { t, told } from "./words.js";
 
 const latest = { setup: {}, run: {} }, failed = new Set();
 let redraw = () => {}, names = [""];
@@ -69,7 +69,7 @@ function showCard(button, stage, value) {
   picture.src = `/picture?side=${value.side}&n=${n}`;
 }
 
-const verdict = (value) => t(value.trouble) || (value.checking ? t("checking …") : value.go == null ? t("not checked") : value.go ? "GO" : "NO-GO");
+const verdict = (value) => told(value.trouble) || (value.checking ? t("checking …") : value.go == null ? t("not checked") : value.go ? "GO" : "NO-GO");
 
 function running(value) {
   if (failed.has(value.side)) return t("the camera has failed");

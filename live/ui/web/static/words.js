@@ -11,10 +11,13 @@ let chosen = "en", entries = {};
 export const missing = new Set();
 globalThis.untranslated = missing;
 
-export function t(text) {
+// A text of the page, or a word of the program that has an entry.
+export const t = (text) => (typeof text === "string" && text ? own(text) : told(text));
+
+// What the program tells: messages and quantities in the language of the operator; a name or a text of a user as it is.
+export function told(text) {
   if (text?.say != null) return filled(own(text.say), text.with);
-  if (text?.kind != null) return quantityText(text);
-  return text ? own(String(text)) : "";
+  return text?.kind == null ? String(text ?? "") : quantityText(text);
 }
 
 function own(code) {
@@ -63,7 +66,7 @@ function filled(template, values) {
 }
 
 function shown(value, format) {
-  if (typeof value !== "number") return typeof value === "boolean" ? String(value) : t(value);
+  if (typeof value !== "number") return told(value);
   return number(value, format).replace(".", decimalMark());
 }
 

@@ -9,7 +9,7 @@ import pytest
 from acquire.text import Message
 from acquire.text.message import about, formatted
 from acquire.text.quantity import Amount
-from live.words.language import said
+from live.words.language import told
 from tests.acquire.test_quantity import CASES, quantity_of
 from tests.live.ui.web.conftest import Start
 
@@ -17,8 +17,8 @@ pytestmark = pytest.mark.slow
 
 VALUES = (0.0, 1.0, -1.5, 3.14159265, 1234567.0, 0.00012345, 1.5e-7, 99.99, 70e9, -0.04, 12, -3, 0)
 FORMATS = ("", "g", ".3g", ".6g", ".0f", ".1f", ".4f", "+.0f", "+.4g", ".0%", ".1%", ".1e")
-FILL = """async ([language, message]) => { const { setLanguage, t } = await import("/static/words.js");
-    await setLanguage(language); return t(message); }"""
+FILL = """async ([language, message]) => { const { setLanguage, told } = await import("/static/words.js");
+    await setLanguage(language); return told(message); }"""
 NUMBERS = """async cases => { const { number } = await import("/static/words.js");
     return cases.map(([value, format]) => number(value, format)); }"""
 
@@ -59,12 +59,13 @@ def test_a_message_is_the_same_on_the_page_and_in_a_terminal(start: Start, langu
         text,
         drift,
         Message("{{a}} {b}", "<b>{c}</b>"),
-        "waiting",
-        "a name that nobody knows",
+        Message("waiting"),
+        about("file", Message("waiting")),
+        *("file", "Run", "stress", "a name that nobody knows"),
     ]
     for one in messages:
         sent = one.to_json() if isinstance(one, Message) else one
-        assert page.page.evaluate(FILL, [language, sent]) == said(one, language)
+        assert page.page.evaluate(FILL, [language, sent]) == told(one, language)
 
 
 def test_without_entries_the_page_stays_english(start: Start) -> None:
