@@ -25,6 +25,7 @@ from live.setup.pattern.outcome import (
 )
 from live.setup.pattern.page import comparison_summary, page, write_page
 from tests.acquire.session.fixtures import CAMERA, frame, writer
+from tests.live.screens import Terminal
 from tests.paper.__main__ import EXPERIMENTS, add_arguments, chosen, command, run
 
 
@@ -78,10 +79,6 @@ def test_a_run_takes_up_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_progress_is_a_bar_on_a_terminal_only() -> None:
-    class Terminal(io.StringIO):
-        def isatty(self) -> bool:
-            return True
-
     terminal, log = Terminal(), io.StringIO()
     for screen in (terminal, log):
         progress = ProgressBar("fig1", screen)

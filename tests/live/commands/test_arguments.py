@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,6 +24,7 @@ from live.replay.study import NO_WINDOW, StudyResult, StudySetting
 from live.setup.check.check_line import CheckLine
 from live.setup.check.quick_check import QuickCheck
 from live.ui.terminal.screen import TerminalScreen
+from tests.live.screens import Terminal
 
 
 def given(*words: str) -> Any:
@@ -129,11 +129,6 @@ def test_the_short_line_names_what_is_not_well() -> None:
     half = quick(0.15, 0.3, Blur(0.4, 0.02))
     assert short_line(half, [one, other]) == "sharpness 0.150, peak 0.300; LOOK: light"
     assert short_line(half, [other]) == "sharpness 0.150, peak 0.300; all well"
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
 
 
 def test_lines_are_renewed_over_as_many_as_there_were(monkeypatch: pytest.MonkeyPatch) -> None:

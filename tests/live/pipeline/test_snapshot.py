@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -21,6 +20,7 @@ from live.ui.terminal.status_line import status_line
 from live.ui.web.broadcaster import Broadcaster, json_bytes
 from live.ui.web.page_consumer import PageConsumer
 from tests.live.made_up import in_ascii, make_measurement
+from tests.live.screens import StatedRun
 
 
 def time_step(**more: Any) -> TimeStep:
@@ -37,16 +37,9 @@ def loaded(*forces: float, axis: str = "y") -> RunState:
     return run_state
 
 
-class Run:
-    paused, recording, live, folder = False, True, True, Path("run")
-
-    def __init__(self, run_state: RunState) -> None:
-        self.run_state = run_state
-
-
 def on_the_page(run_state: RunState) -> dict[str, Any]:
     page = PageConsumer(Broadcaster(), load_config(None, {"specimen.area_mm2": 40.0}), lambda: 5.0)
-    page.attach(Run(run_state))
+    page.attach(StatedRun(run_state))
     return page.state()
 
 

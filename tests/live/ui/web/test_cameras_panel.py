@@ -18,6 +18,7 @@ from live.ui.web.page_consumer import PageConsumer
 from live.ui.web.run_result import MAX_TROUBLES, cameras_result, run_result
 from tests.live.made_run import E_PA, PULLED, THICKNESS_MM, WIDTH_MM, finished, force_of
 from tests.live.made_up import START, make_measurement
+from tests.live.screens import StatedRun
 
 SPECIMEN = SpecimenConfig(width_mm=WIDTH_MM, thickness_mm=THICKNESS_MM, axis="y")
 WRONG = 0.1  # of the strain: what the front has too much of, and the back too little
@@ -84,15 +85,6 @@ def test_nothing_before_both_have_measured() -> None:
     assert math.isfinite(shown["cameras"][0]["valid"])
 
 
-class Run:
-    """A run with a state."""
-
-    paused, recording, live, folder = False, True, True, Path("run")
-
-    def __init__(self, state: RunState) -> None:
-        self.run_state = state
-
-
 def test_two_fields_have_figures_of_their_own_and_no_mean() -> None:
     states = {"first": side(WRONG), "second": side(-WRONG)}
     shown = CamerasPanel(states, SPECIMEN, lambda: START + 10).state()
@@ -107,7 +99,7 @@ def test_the_page_gets_both_sides() -> None:
     states = {"front": side(WRONG), "back": side(-WRONG)}
     consumer = PageConsumer(Broadcaster(), load_config(None, {}), lambda: START + 10)
     assert consumer.state()["sides"] is None
-    consumer.attach(Run(states["front"]), states)
+    consumer.attach(StatedRun(states["front"]), states)
     assert consumer.state()["sides"]["strains"][0]["mean"] == pytest.approx(PULLED[-1])
 
 
@@ -139,8 +131,8 @@ def test_a_camera_that_has_ended_says_so_while_others_go_on() -> None:
     states = {"front": side(WRONG), "back": side(-WRONG)}
     alone, front = (PageConsumer(Broadcaster(), load_config(None, {}), lambda: START + 10, side=name)
                     for name in ("", "front"))  # fmt: skip
-    alone.attach(Run(states["front"]))
-    front.attach(Run(states["front"]), states)
+    alone.attach(StatedRun(states["front"]))
+    front.attach(StatedRun(states["front"]), states)
     assert (alone.state()["state"], front.state()["state"]) == ("measuring", "measuring")
     states["front"].health.camera_ended = True
     assert (alone.state()["state"], front.state()["state"]) == ("measuring", "ended")
