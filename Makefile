@@ -50,9 +50,7 @@ test-all: test
 lint: $(VENV)/dev
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
-	@$(BIN)/mypy
-	@$(BIN)/mypy --platform win32
-	@$(BIN)/mypy --platform darwin
+	@printf '%s\n' linux win32 darwin | xargs -P 2 -I{} $(BIN)/mypy --platform {} --cache-dir .mypy_cache/{}
 
 format: $(VENV)/dev
 	@$(BIN)/ruff check --fix-only --quiet .
@@ -110,11 +108,11 @@ $(VENV)/pylon: $(VENV)/test
 pylon-test: $(VENV)/pylon
 	@PYTHONPATH=$(CURDIR)/$(VENV)/pylon PYLON_CAMEMU=2 $(BIN)/python -m tests.genicam.namespace --tests tests/pylon
 
-# In a bare Debian made on the spot: make bare-test SUITE=trixie ONLY=demo
+# In a bare Debian made on the spot, or kept in ROOT: make bare-test SUITE=trixie ONLY=demo
 SUITE ?= forky
 ONLY  ?= demo test
 bare-test:
-	@$(PYTHON) tests/bare/machine.py --suite $(SUITE) -- make $(ONLY)
+	@$(PYTHON) tests/bare/machine.py --suite $(SUITE) $(if $(ROOT),--root $(ROOT)) -- make $(ONLY)
 
 clean:
 	rm -rf $(VENV) $(VENV)-newest $(VENV)-lowest .pytest_cache .mypy_cache .ruff_cache

@@ -30,6 +30,11 @@ hypothesis.settings.load_profile("same examples")
 MEASURING = {"accuracy", "adversary", "analysis", "bench", "contracts", "live"}
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Browsers first: their files take longest, and the last file is waited for with one processor alone."""
+    items.sort(key=lambda item: "web" not in item.path.parts)
+
+
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Compile what the tests need; for the processes of ``-n``, ``pytest_xdist_setupnodes`` has done it."""
     tests = Path(__file__).parent

@@ -1,4 +1,4 @@
-"""Bursts that wait as exact sums: the same bits as an averaged burst, in the memory that is stated."""
+"""The memory of bursts: as exact sums, and pictures that are used again."""
 
 from __future__ import annotations
 
@@ -91,3 +91,59 @@ def test_a_gap_begins_the_sum_anew_and_is_counted() -> None:
 )
 def test_a_sum_takes_two_bytes_up_to_65535(bits: int, n: int, itemsize: int) -> None:
     assert sum_kind(bits, n).itemsize == itemsize
+
+
+SMALL = (6, 7)
+
+
+def bursts_of(memory: PictureMemory, n: int, *, held: int, total: int) -> list[tuple[Burst, float]]:
+    """Bursts of n frames of one level each, with that level; each is dropped after ``held`` more."""
+    accumulator = BurstAccumulator(n, memory=memory)
+    kept: list[tuple[Burst, float]] = []
+    for i in range(n * total):
+        level = 3 * (i // n)
+        image = frozen(np.full(SMALL, level, np.uint8))
+        burst = accumulator.add(Frame(image, i, i / 50, "device", 0, 8, i / 50))
+        if burst is not None:
+            kept = [*kept, (burst, float(level))][-held:]
+            assert all((b.mean == level).all() for b, level in kept)
+    return kept
+
+
+def test_a_picture_stays_as_it_is_for_as_long_as_anybody_has_it() -> None:
+    for n in (1, 2, 9):
+        kept = bursts_of(PictureMemory(), n, held=5, total=40)
+        assert [level for _, level in kept] == [105, 108, 111, 114, 117]
+
+
+def test_memory_is_used_again() -> None:
+    memory = PictureMemory()
+    first = memory.take(SMALL, np.float32)
+    place = first.ctypes.data
+    assert memory.take(SMALL, np.float32).ctypes.data != place  # somebody has it
+    first.flags.writeable = False
+    del first
+    again = memory.take(SMALL, np.float32)
+    assert again.ctypes.data == place and again.flags.writeable
+    del again
+    assert memory.take(SMALL, np.uint32).ctypes.data != place
+    assert memory.take((7, 6), np.float32).ctypes.data != place
+
+
+def test_a_view_alone_keeps_its_memory() -> None:
+    memory = PictureMemory()
+    part = memory.take(SMALL, np.float32)[2:, 1:].T
+    raw = memoryview(memory.take(SMALL, np.float32))
+    part[:] = 1
+    assert {memory.take(SMALL, np.float32).ctypes.data for _ in range(3)}.isdisjoint(
+        {part.base.ctypes.data, np.asarray(raw).ctypes.data}
+    )
+
+
+def test_what_was_prepared_is_enough() -> None:
+    memory = PictureMemory()
+    memory.prepare(4, SMALL, np.float32)
+    memory.prepare(4, SMALL, np.bool_)
+    ready = {id(array) for array in memory._arrays}
+    bursts_of(memory, 2, held=3, total=30)
+    assert {id(array) for array in memory._arrays} == ready

@@ -1,19 +1,25 @@
-"""The noise of means over overlapping ZOIs by value: summed up pixel by pixel."""
+"""Errors in common by value: means over overlapping ZOIs, of pictures, and of a motion during the burst."""
 
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
-from analysis.field import Window
+from analysis import KernelSettings, PhaseKernel, Roi, ZoiGrid
+from analysis.evaluate import AreaStrain
+from analysis.field import StrainField, Window
+from analysis.field.common import CommonError
+from analysis.field.picture_error import PictureError
 from analysis.field.uncertainty import variance_of_sum
 from analysis.fit.moments import CHANNELS
 from analysis.fit.sums import MONOMIALS, scatter, sum_of_squares
 from analysis.kernel.images import continue_rim, padded, with_second_differences
+from analysis.optics import BurstMotion
 from tests.analysis.speckle import picture
+from tests.live.made_up import START, make_grid
 
 SIZE, STEP = 12, 5
 GRID = ZoiGrid.cover(Roi(0, 0, SIZE + 5 * STEP, SIZE + 2 * STEP), SIZE, STEP)  # 3 rows, 6 columns
@@ -111,3 +117,113 @@ def test_what_a_zoi_takes_of_each_pixel_is_the_sum_of_its_channels_and_monomials
         for (x, y), share in zip(MONOMIALS, weight, strict=True):
             expected += np.outer(line, line) * share * channel[place] * xi**x * eta**y
     assert out == pytest.approx(expected, abs=1e-5)
+
+
+OVERLAPPING = ZoiGrid.cover(Roi(0, 0, 96, 64), 32, 16)
+RNG = np.random.default_rng(4)
+
+
+def error(count: int) -> CommonError:
+    half = RNG.normal(0, 1, (count, count))
+    return CommonError(RNG.normal(0, 1, (count, 6, *OVERLAPPING.shape)), half @ half.T)
+
+
+def test_two_errors_beside_each_other_add_their_variances() -> None:
+    one, other = error(2), error(3)
+    both = one.beside(other)
+    for name in ("u", "dv_dy", "exy"):
+        assert both.variance(name) == pytest.approx(one.variance(name) + other.variance(name))
+    weights = RNG.normal(0, 1, (6, *OVERLAPPING.shape))
+    assert both.variance_of_sum(weights) == pytest.approx(
+        one.variance_of_sum(weights) + other.variance_of_sum(weights)
+    )
+    assert one.beside(None) is one
+
+
+def test_a_part_has_the_error_of_its_rows_and_columns() -> None:
+    whole = error(2)
+    part = whole.part(slice(0, 2), slice(1, 4))
+    assert np.array_equal(part.variance("exx"), whole.variance("exx")[0:2, 1:4])
+
+
+def test_a_common_error_is_no_part_of_that_of_the_reference() -> None:
+    field = StrainField.from_values(OVERLAPPING, {"u": 1.0}, 1e-3)
+    more = replace(field, common=error(1))
+    assert np.array_equal(more.sigma("u", "reference"), field.sigma("u", "reference"))
+    variance = (
+        np.asarray(more.common.variance("u")) if more.common is not None else np.zeros(OVERLAPPING.shape)
+    )
+    assert more.sigma("u") ** 2 == pytest.approx(field.sigma("u") ** 2 + variance)
+
+
+@pytest.mark.parametrize("colour", [(4.0, 1.0), (1.0, 4.0)])
+def test_the_factor_of_a_picture_is_that_of_the_worse_of_u_and_v(colour: tuple[float, float]) -> None:
+    assert PictureError(1.5, colour).factor == pytest.approx(3.0)
+
+
+MADE_UP, RATE, PERIOD = make_grid(), 2e-4, 0.4
+SIGMA = 1e-8
+
+
+def measured(strain: float, sigma: float = SIGMA, large: float = 3.0) -> StrainField:
+    """Uniaxial, in one column of ZOIs ``large`` times as much, as beside a hole."""
+    x, y = np.meshgrid(MADE_UP.x, MADE_UP.y)
+    here = strain * np.where(np.arange(MADE_UP.shape[1]) == 2, large, 1.0)
+    values = {"u": -0.3 * here * x, "v": here * y, "du_dx": -0.3 * here, "dv_dy": here + 0 * y}
+    return StrainField.from_values(MADE_UP, values, sigma)
+
+
+def sigmas(strains: list[float], duration: float, sigma: float = SIGMA, large: float = 1.0) -> list[float]:
+    """Of eyy of the region, of bursts of these mean strains."""
+    motion, found = BurstMotion(), []
+    for k, strain in enumerate(strains):
+        field = motion.apply(measured(strain, sigma, large), START + PERIOD * k, duration)
+        area = AreaStrain.of(field)
+        assert area is not None
+        found.append(area.sigma("eyy"))
+    return found
+
+
+def of_frames(begins: float, k: int, frames: int = 4) -> tuple[float, float]:
+    """The mean strain of the frames of the k-th burst, and that at its time; the pull begins at a time."""
+    times = PERIOD * k + (np.arange(frames) - (frames - 1) / 2) * PERIOD / frames
+    return float(RATE * np.maximum(times - begins, 0).mean()), RATE * max(PERIOD * k - begins, 0.0)
+
+
+@pytest.mark.parametrize("begins", np.arange(1.05, 1.5, 0.05))
+def test_where_a_pull_begins_the_error_is_within_the_uncertainty(begins: float) -> None:
+    """Bursts of 0.4 s, in which the strain grows by 78 um/m: up to 8 um/m off, with a noise of hundredths of it."""
+    pairs = [of_frames(float(begins), k) for k in range(8)]
+    found = sigmas([mean for mean, _ in pairs], 0.3)
+    for (mean, true), sigma in zip(pairs, found, strict=True):
+        assert abs(mean - true) <= 1.05 * sigma + 1e-7
+    alone = sigmas([0.0], 0.3)[0]
+    assert found[:2] == pytest.approx([alone] * 2) and found[-2:] == pytest.approx([alone] * 2)
+
+
+def test_without_it_the_interval_would_be_too_small() -> None:
+    mean, true = of_frames(1.2, 3)
+    assert mean - true > 5e-6 > 100 * sigmas([0.0], 0.3)[0]
+
+
+def test_each_zoi_has_its_own_share_of_it() -> None:
+    motion = BurstMotion()
+    for k, strain in enumerate((0.0, 0.0, 1e-5)):
+        field = motion.apply(measured(strain), START + PERIOD * k, 0.3)
+    found = field.sigma("eyy")
+    assert found[2, 2] == pytest.approx(3e-5, rel=0.01) and found[2, 1] == pytest.approx(1e-5, rel=0.01)
+
+
+@pytest.mark.parametrize("duration", [0.0, 0.3])
+def test_a_single_frame_and_a_steady_pull_have_nothing_added(duration: float) -> None:
+    steady, alone = [RATE * PERIOD * k for k in range(6)], sigmas([0.0], duration)[0]
+    assert sigmas(steady, duration) == pytest.approx([alone] * 6)
+    begun = [0.0, 0.0, 0.0, *steady]
+    assert (max(sigmas(begun, duration)) > 5 * alone) is (duration > 0)
+
+
+def test_noise_is_no_motion() -> None:
+    rng, sigma = np.random.default_rng(1), 1e-5
+    area = sigmas([0.0], 0.3, sigma)[0]
+    found = np.array(sigmas(list(area * rng.standard_normal(300)), 0.3, sigma))
+    assert np.sqrt(np.mean(found**2)) < 1.05 * area and np.mean(found > 1.001 * area) < 0.02

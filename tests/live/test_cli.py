@@ -15,6 +15,7 @@ import pytest
 
 from acquire.errors import EXIT_INTERRUPTED, ConfigError, DataError, DeviceError
 from live import cli
+from tests.live.screens import Terminal
 
 
 def ended(error: BaseException | None, monkeypatch: pytest.MonkeyPatch) -> int:
@@ -123,13 +124,6 @@ def test_streams_that_are_lost_are_dropped(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(sys, "stderr", io.StringIO())
     cli._drop_lost_streams()
     assert moved == [(55, 77)]
-
-
-class Terminal(io.StringIO):
-    """A stream that is a terminal."""
-
-    def isatty(self) -> bool:
-        return True
 
 
 @pytest.mark.parametrize(("stream", "lead"), [(Terminal(), "\r\x1b[K"), (io.StringIO(), "")])

@@ -1,9 +1,11 @@
-"""The examples run, and print what their texts promise."""
+"""The examples run and print what their texts promise, and their guard stops a machine."""
 
 from __future__ import annotations
 
+import json
 import re
 import runpy
+import socket
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -12,10 +14,12 @@ import cv2
 import numpy as np
 import pytest
 
+from examples import stop_machine
 from examples.batch import main as batch
 from examples.documents import SETTINGS, Documents
 from examples.finished_run import main as finished_run
 from examples.plain_loop import main as plain_loop
+from examples.stop_machine import NotAlive, values
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main as phasedic
@@ -92,3 +96,48 @@ def test_a_batch_measures_all_compares_them_and_goes_on(
     assert (out / "all.html").is_file()
     batch(str(runs), str(out), "--zoi", "32", "--step", "16")
     assert capsys.readouterr().out.count("measured already") == 2
+
+
+def line(axial: float | None, force: float | None = 10.0, **more: Any) -> bytes:
+    return (
+        json.dumps({"axial": axial, "age_s": 0.1, "force_N": force, "state": "live", **more}).encode() + b"\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("last", "why"),
+    [
+        (line(None, state="old"), r"axial is not known any more \(old\)"),
+        (line(2e-3, None), "force_N is not known any more"),
+        (b"HOLD\n", "an alarm: HOLD"),
+        (b'{"axial":', "closed"),
+        (b"", "closed"),
+    ],
+)
+def test_it_stops_on_what_is_not_a_known_value(last: bytes, why: str) -> None:
+    here, there = socket.socketpair()
+    with here, there:
+        here.sendall(line(None, None) + line(None) + line(1e-3) + line(1e-3) + last)
+        here.shutdown(socket.SHUT_WR)
+        lines = values(there)
+        assert [next(lines)["axial"] for _ in range(2)] == [1e-3, 1e-3], "it waits for the first values"
+        with pytest.raises(NotAlive, match=why):
+            next(lines)
+
+
+def test_it_stops_on_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stop_machine, "SILENCE_S", 0.05)
+    here, there = socket.socketpair()
+    with here, there:
+        here.sendall(line(1e-3))
+        lines = values(there)
+        assert next(lines)["axial"] == 1e-3
+        with pytest.raises(NotAlive, match=r"no line for 0\.05 s"):
+            next(lines)
+
+
+def test_without_a_load_cell_there_is_no_force_to_wait_for() -> None:
+    here, there = socket.socketpair()
+    with here, there:
+        here.sendall(b'{"axial":0.001,"age_s":0.1}\n')
+        assert next(values(there))["axial"] == 1e-3

@@ -1,15 +1,19 @@
-"""The paper reproduced on rendered truth, and the commands characterise, on a picture of the user, and inspect."""
+"""The paper reproduced on rendered truth, its commands, and other people's programs where they are found."""
 
 from __future__ import annotations
 
 import argparse
 import io
+import os
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import tests.paper.others as others
+import tests.paper.peers as peers
 from acquire.errors import ConfigError, DataError
 from acquire.frame import frozen
 from hw_mocks.deformation import Affine
@@ -25,7 +29,9 @@ from live.setup.pattern.outcome import (
 )
 from live.setup.pattern.page import comparison_summary, page, write_page
 from tests.acquire.session.fixtures import CAMERA, frame, writer
+from tests.live.screens import Terminal
 from tests.paper.__main__ import EXPERIMENTS, add_arguments, chosen, command, run
+from tests.paper.peers import present
 
 
 def parsed(*words: str) -> argparse.Namespace:
@@ -78,10 +84,6 @@ def test_a_run_takes_up_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_progress_is_a_bar_on_a_terminal_only() -> None:
-    class Terminal(io.StringIO):
-        def isatty(self) -> bool:
-            return True
-
     terminal, log = Terminal(), io.StringIO()
     for screen in (terminal, log):
         progress = ProgressBar("fig1", screen)
@@ -237,3 +239,63 @@ def test_the_committed_tables_are_those_of_the_page_how_well() -> None:
     counts = [sum(row.startswith(f"{word},") for row in rows) for word in ("better", "equal", "worse")]
     assert f"Of {len(rows)} comparisons" in text
     assert "better in {}, equal in {}, worse in {}".format(*counts) in text
+
+
+def test_what_is_not_installed_is_left_out_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(others, "find_spec", lambda name: None)
+    assert others.installed() == {}
+    assert "pip install pyvale sun-dic" in present()
+    monkeypatch.setattr(others, "find_spec", lambda name: object() if name == "pyvale" else None)
+    assert list(others.installed()) == ["pyvale, 33 px"]
+    assert "left out: SUN-DIC" in present()
+
+
+def test_empty_rim_is_cut_off() -> None:
+    u = np.full((5, 6), np.nan)
+    u[1:4, 2:5] = 1.0
+    u[2, 3] = np.nan
+    inner = others._inner(u)
+    assert inner.shape == (3, 3)
+    assert np.count_nonzero(np.isnan(inner)) == 1
+
+
+def test_what_the_workers_inherit_is_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NUMBA_NUM_THREADS", "2")
+    monkeypatch.delenv("RAY_USAGE_STATS_ENABLED", raising=False)
+    with pytest.raises(RuntimeError, match="ray"), others._worker_environment():
+        assert os.environ["NUMBA_NUM_THREADS"] == "1"
+        raise RuntimeError("ray")
+    assert os.environ["NUMBA_NUM_THREADS"] == "2"
+    assert "RAY_USAGE_STATS_ENABLED" not in os.environ
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
+@pytest.mark.parametrize(("module", "program"), others.PROGRAMS.values())
+def test_a_known_shift(module: str, program: others.Program) -> None:
+    if find_spec(module) is None:  # not imported here: pyvale opens a log file wherever that is done
+        pytest.skip(f"{module} is not installed")
+    from hw_mocks.deformation import Affine
+    from tests.paper.truth import SensorModel, TrueScene
+
+    pair = TrueScene((160, 200), 2.25, 3).pair(Affine(0.25), SensorModel(8))
+    assert np.nanmean(program(*pair)) == pytest.approx(0.25, abs=5e-3)
+
+
+@pytest.mark.slow
+def test_a_program_that_fails_is_named_and_the_page_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken(reference: np.ndarray, deformed: np.ndarray) -> np.ndarray:
+        raise AttributeError("no such module")
+
+    monkeypatch.setattr(peers, "installed", lambda: {"pyvale, 33 px": broken})
+    monkeypatch.setattr(peers, "SHIFTS", np.array([0.25]))
+    outcome = peers.peers(ExperimentContext(tmp_path, quick=True))
+    assert "pyvale is installed but failed (AttributeError: no such module)" in outcome.text.replace(
+        "\n", " "
+    )
+    engines = [row[0] for row in outcome.tables[0].rows]
+    assert len(engines) == 4
+    assert "pyvale, 33 px" not in engines
+    assert "pyvale" in caplog.text

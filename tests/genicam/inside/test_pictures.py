@@ -1,13 +1,18 @@
-"""Frames are those that were sent, bit for bit, with the numbers and times of the camera."""
+"""Frames are those that were sent, bit for bit, with numbers and times; and the contract of cameras."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from inspect import signature
 
 import numpy as np
 import pytest
 
+from acquire.camera.contract import Camera
+from acquire.camera.opening import open_camera
 from acquire.genicam.device import GenicamDevice, Received, Take
+from tests.contracts import test_camera_contract as contract
 from tests.genicam.fake_camera import FIRST, PIXEL_FORMATS
 from tests.genicam.inside.fakes import FakeCameraProcess, FrameWatch
 from tests.genicam.packing import bits_of, picture
@@ -79,3 +84,28 @@ def test_a_region_of_the_sensor() -> None:
     controls = watch.camera.info.controls
     assert frame.image.shape == (80, 100)
     assert [controls[key] for key in ("OffsetX", "OffsetY", "Width", "Height")] == ["40", "30", "100", "80"]
+
+
+OF_ONE_CAMERA = {
+    name: test
+    for name, test in vars(contract).items()
+    if name.startswith("test_") and list(signature(test).parameters) == ["camera"]
+}
+globals().update(OF_ONE_CAMERA)
+
+
+@pytest.fixture(scope="module")
+def fake() -> Iterator[FakeCameraProcess]:
+    with FakeCameraProcess() as started:
+        yield started
+
+
+@pytest.fixture(params=["Mono8", "Mono12p"])
+def camera(request: pytest.FixtureRequest, fake: FakeCameraProcess) -> Iterator[Camera]:
+    opened = open_camera(f"genicam:127.0.0.1?format={request.param}&fps=50&width=64&height=48")
+    yield opened
+    opened.close()
+
+
+def test_the_whole_contract_is_here() -> None:
+    assert len(OF_ONE_CAMERA) >= 9

@@ -1,4 +1,4 @@
-"""Ctrl-C as a terminal sends it, to a command and all its processes, in its first moments: it ends soon, in words."""
+"""Ctrl-C and SIGTERM: what they do to a command and all its processes, in its first moments and later."""
 
 from __future__ import annotations
 
@@ -174,3 +174,30 @@ def test_the_share_that_is_compiled() -> None:
     compile_ahead(PICTURE_KINDS, phase=True)
     assert share_compiled(PICTURE_KINDS, 0.0, phase=True) == 1.0
     assert share_compiled(PICTURE_KINDS, time.time() + 3600, phase=True) == 0.0
+
+
+GIVEN = """
+import os, signal, sys
+from live.commands.signals import signals
+stops = []
+with signals(lambda: stops.append(1), lambda line: print(line, flush=True)):
+    for _ in range(int(sys.argv[1])):
+        signal.raise_signal(signal.SIGTERM)
+print(len(stops), "stops", flush=True)
+"""
+
+
+def given(times: int) -> tuple[int, str]:
+    done = subprocess.run(
+        [sys.executable, "-c", GIVEN, str(times)], env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    return done.returncode, done.stdout
+
+
+def test_the_first_two_signals_close_and_the_third_ends_at_once() -> None:
+    code, output = given(2)
+    assert (code, output.splitlines()[-1]) == (0, "2 stops")
+    assert "closing the files ..." in output and "a third signal ends it at once" in output
+    code, output = given(3)
+    assert code == -15 and "stops" not in output

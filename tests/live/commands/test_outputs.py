@@ -15,23 +15,13 @@ from live.commands import consumers
 from live.commands.consumers import OUTPUT_NAME, signals_of
 from live.config.loading import Config, load_config
 from live.pipeline.run_state import RunState
-from live.pipeline.screen import Screen
 from live.results.sides.channels import JointChannels
 from tests.live.made_run import UTC_START
 from tests.live.made_up import CAMERA, START, make_grid
+from tests.live.screens import RecordingScreen
 
 SAID = "an output: strains and forces to all; it takes no commands"
 LINE = {"gauges.mid": {"kind": "line", "start": [20, 20], "end": [20, 70]}}
-
-
-class Said(Screen):
-    """Keeps the lines."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-
-    def print(self, text: str = "") -> None:
-        self.lines.append(text)
 
 
 class Out:
@@ -55,7 +45,7 @@ def about(config: Config, **more: Any) -> Any:
 
 def test_no_outputs_of_a_replay() -> None:
     config = load_config(None, {"strain_out.udp": "127.0.0.1:5005"})
-    assert signals_of(about(config, end=None), RunState.new(1.0), Said(), None) == []
+    assert signals_of(about(config, end=None), RunState.new(1.0), RecordingScreen(), None) == []
 
 
 def test_each_output_is_opened_at_its_address(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -66,14 +56,17 @@ def test_each_output_is_opened_at_its_address(monkeypatch: pytest.MonkeyPatch) -
     )
     given = {"strain_out.udp": "127.0.0.1:5005", "strain_out.serial": "/dev/ttyUSB1?baud=9600",
              "strain_out.tcp": "127.0.0.1:5006", **LINE}  # fmt: skip
-    screen = Said()
+    screen = RecordingScreen()
     found: list[Any] = list(signals_of(about(load_config(None, given)), RunState.new(1.0), screen, None))
     tcp, udp, serial = found
     assert (tcp.made[0], tcp.made[1]) == ((OUTPUT_NAME, 5006), "")
     assert udp.made[:2] == ("127.0.0.1", 5005)
     assert serial.made[0] == LineSettings("/dev/ttyUSB1", 9600) and screen.lines == [SAID] * 3
     usual = signals_of(
-        about(load_config(None, {"strain_out.serial": "/dev/ttyUSB1"})), RunState.new(1.0), Said(), None
+        about(load_config(None, {"strain_out.serial": "/dev/ttyUSB1"})),
+        RunState.new(1.0),
+        RecordingScreen(),
+        None,
     )
     assert usual[0].made[0] == LineSettings("/dev/ttyUSB1", 115200)  # type: ignore[attr-defined]
 
@@ -83,7 +76,7 @@ def test_an_output_that_fails_closes_those_before(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(consumers, "UdpOut", lambda *given: made.append(Out(*given)) or made[-1])  # type: ignore[func-returns-value]
     given = {"strain_out.udp": "127.0.0.1:5005", "strain_out.serial": "/dev/ttyUSB1?bauds=9600"}
     with pytest.raises(ConfigError):
-        signals_of(about(load_config(None, given)), RunState.new(1.0), Said(), None)
+        signals_of(about(load_config(None, given)), RunState.new(1.0), RecordingScreen(), None)
     assert [one.ended for one in made] == [True]
 
 
@@ -115,7 +108,7 @@ def test_alarms_see_the_machine_and_both_sides(monkeypatch: pytest.MonkeyPatch) 
             return {"mean_axial": start}
 
     for joint in (None, Joint()):
-        signals_of(about(config), state, Said(), joint)
+        signals_of(about(config), state, RecordingScreen(), joint)
     (alone, nothing), (both, more) = made
     assert len(alone[0]) == len(both[0]) == 1 and not nothing
     assert alone[2](5.0) == {"disk_min": 5.0, "mean_axial": 0.0}
@@ -128,9 +121,9 @@ def test_the_view_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(consumers, "View", lambda setup, **more: made.append((setup, more)))
     given = {**LINE, "specimen.area_mm2": 40.0, "specimen.axis": "x", "view.light": True, "view.rrd": True,
              "load.address": "none:", "view.strain_range": 0.02, "view.scale": "symmetric"}  # fmt: skip
-    consumers._view(about(load_config(None, given)), RunState.new(1.0), Said())
+    consumers._view(about(load_config(None, given)), RunState.new(1.0), RecordingScreen())
     usual = {"load.address": "sim:", "view.port": 9999, "view.rrd": False}
-    consumers._view(about(load_config(None, usual)), RunState.new(1.0), Said())
+    consumers._view(about(load_config(None, usual)), RunState.new(1.0), RecordingScreen())
     (light, more), (plain, other) = made
     assert (light.width, light.height, light.bits, light.start_monotonic) == (128, 96, 12, START)
     assert (light.area_m2, light.axis, light.strain_range, light.scale) == (
@@ -159,7 +152,7 @@ def test_the_viewer_is_opened_or_how_to_is_told(
     monkeypatch: pytest.MonkeyPatch, spawn: bool, opens: bool, words: str
 ) -> None:
     monkeypatch.setattr(consumers, "spawn_viewer", lambda port, tell: object() if opens else None)
-    screen = Said()
+    screen = RecordingScreen()
     view: Any = SimpleNamespace(port=9876, instructions="watch: a\nlater: b")
     consumers._announce(view, spawn, screen, lambda text: None)
     assert words in screen.lines[0]

@@ -23,21 +23,11 @@ from live.commands.scale import _check as check_scale
 from live.commands.scale import _print_false_strain
 from live.commands.sides import _strains as side_lines
 from live.commands.study import _curve, _figures, _section
-from live.pipeline.screen import Screen
 from live.replay.study import StudySetting
 from live.results.run_folder import open_run
 from tests.live.made_run import make_run
 from tests.live.made_up import in_ascii
-
-
-class Said(Screen):
-    """Keeps the lines."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-
-    def print(self, text: str = "") -> None:
-        self.lines.append(text)
+from tests.live.screens import RecordingScreen
 
 
 def test_a_port_is_asked_question_after_question(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,7 +99,7 @@ def test_a_scale_is_taken_one_way_and_in_mm_above_zero() -> None:
     ):  # fmt: skip
         with pytest.raises(ConfigError):
             check_scale(scale_arguments(**given))
-    screen = Said()
+    screen = RecordingScreen()
     _print_false_strain(None, screen)
     _print_false_strain(500.0, screen)
     assert screen.lines[0].startswith("give --stand-off MM")

@@ -20,12 +20,8 @@ from live.run.control import ENDED, FORCED, UNDO
 from live.run.keyboard import HELP, LINES_HELP, Keyboard, Keys, listen
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.run.test_control import FakeLive
+from tests.live.screens import Terminal
 from tests.live.ui.waiting import LONG_S
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
 
 
 def test_what_nobody_knows_is_answered_with_the_orders() -> None:

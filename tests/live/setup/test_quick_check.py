@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import io
 import math
 import os
 import signal
@@ -38,6 +37,7 @@ from live.setup.check.sample import take
 from live.setup.region import Region
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.fakes import ListCamera, frame
+from tests.live.screens import Terminal
 
 STILL = "sim:uniform?bits=8&fps=50&width=224&height=192"
 SMALL = ["--zoi", "48", "--reference-burst", "8"]
@@ -187,13 +187,6 @@ def test_pictures_that_are_few_leave_their_table(tmp_path: Path, capsys: pytest.
     cv2.imwrite(str(tmp_path / "one.png"), take(config).frames[0])
     assert main(["check", "--watch", "--camera", f"files:{tmp_path}", "--no-view", *SMALL]) == 0
     assert "GO, as far as 1 picture can show" in capsys.readouterr().out
-
-
-class Terminal(io.StringIO):
-    """A stream that is a terminal."""
-
-    def isatty(self) -> bool:
-        return True
 
 
 def test_lines_are_renewed_in_place(monkeypatch: pytest.MonkeyPatch) -> None:

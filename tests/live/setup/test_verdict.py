@@ -1,4 +1,4 @@
-"""The words of a check for given figures, and the colours of its drawing."""
+"""A check: the words for given figures, the budget of E, the room on the disk, and the colours of its drawing."""
 
 from __future__ import annotations
 
@@ -10,12 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquire.frame import CameraInfo
 from analysis.quality.steadiness import Steadiness
+from live.config.loading import load_config
+from live.results.budget import CameraView, budget_rows
+from live.setup.check import disk
+from live.setup.check.budget import budget_lines
 from live.setup.check.check_line import CheckLine
 from live.setup.check.check_list import automatic_controls, table_lines
+from live.setup.check.disk import disk_lines, write_rate
 from live.setup.check.motion_lines import _vibration
 from live.setup.check.noise_advice import reaching
-from live.setup.check.noise_floor import StrainNoise, ZoiFloor
+from live.setup.check.noise_floor import GaugeNoise, StrainNoise, ZoiFloor
+from live.setup.check.sample import FrameStack
 from live.setup.check.stillness import PictureStillness
 from live.setup.check.verdict import _flicker, _sharpness
 from live.setup.region import Region
@@ -136,3 +143,124 @@ def test_zois_are_drawn_in_the_colour_of_their_noise() -> None:
 
     assert [colour(1, k) for k in range(6)] == [GOOD, FAIR, FAIR, POOR, POOR, GOOD]
     assert colour(0, 0) not in (GOOD, FAIR, POOR), "it is switched off"
+
+
+def lines(gauges: tuple[GaugeNoise, ...], **given: Any) -> dict[str, str]:
+    """Cause to the rest of its line."""
+    config = load_config(None, {key.replace("__", "."): value for key, value in given.items()})
+    figures: Any = SimpleNamespace(gauges=gauges)
+    return {line[2:24].strip(): line[24:].strip() for line in budget_lines(figures, config)[2:]}
+
+
+def test_the_figures_by_value() -> None:
+    gauges = GaugeNoise("axial", 5e-6), GaugeNoise("", 1e-6)
+    found = lines(
+        gauges, specimen__standard="iso527", specimen__area_mm2=10.0, specimen__force_error_percent=1.0,
+        scale__stand_off_mm=400.0,
+    )  # fmt: skip
+    assert found["scatter"].split() == ["5", "0.2"]  # of 2500 um/m, and of E
+    assert found["blur"] == "the test shows it"
+    share = 1 / math.sqrt(3)
+    assert [float(text) for text in found["load cell"].split()] == pytest.approx(
+        [share * 25, share], rel=4e-3
+    )
+    assert found["section"] == "not stated: specimen.section_error_percent"
+    assert found["motion off the plane"] == "not counted: 0.1 mm at 400 mm is 250 µm/m"
+    assert float(found["combined"].split()[1]) == pytest.approx(math.hypot(0.2, share), rel=4e-3)
+
+
+def test_in_gpa_where_a_modulus_is_expected() -> None:
+    gauges = (GaugeNoise("axial", 5e-6),)
+    found = lines(gauges, specimen__standard="iso527", specimen__modulus_GPa=70.0)
+    assert found["scatter"].split() == ["5", "0.2", "0.14"]
+    assert found["load cell"] == "not stated: specimen.force_error_percent"
+
+
+def test_the_mean_of_the_region_without_a_gauge_along_the_load() -> None:
+    found = lines((GaugeNoise("", 2e-6),), specimen__standard="iso6892")
+    assert found["scatter"].split() == ["2", "0.2"]  # of 0.1 %
+    assert "section" not in found
+    assert found["strain"] == "not stated: specimen.strain_error_um_m"
+
+
+def test_nothing_without_noise() -> None:
+    assert lines(()) == {}
+
+
+@pytest.mark.parametrize(
+    ("readout_ms", "words"),
+    [(None, "not stated: camera.readout_ms"), (0.0, "none"), (1.0, "removed"), (12.0, "removed")],
+)
+def test_the_rolling_shutter_is_removed_where_its_time_is_stated(
+    readout_ms: float | None, words: str
+) -> None:
+    rows = budget_rows({"scatter": 0.01}, 1e-3, 100.0, CameraView(readout_ms=readout_ms), stresses=True)
+    assert {row.cause: row.words for row in rows}["rolling shutter"] == words
+
+
+def test_shares_combine_as_independent_ones_in_strain_and_in_the_modulus() -> None:
+    shares = {"scatter": 0.03, "section": 0.04}
+    found = {row.cause: row for row in budget_rows(shares, 2e-3, 70.0, CameraView(500.0), stresses=True)}
+    assert (found["section"].strain, found["section"].modulus) == pytest.approx((8e-5, 2.8))
+    assert (found["combined"].strain, found["combined"].modulus) == pytest.approx((1e-4, 3.5))
+    assert found["motion off the plane"].words == "not counted: 0.1 mm at 500 mm is 200 µm/m"
+
+
+CAMERA = CameraInfo("v4l2:", "a camera", 640, 512, 12, live=True, clock="device", fps=30.0)
+FRAME = 640 * 512 * 2
+
+
+def stack(fps: float = 20.0, **camera: Any) -> FrameStack:
+    """Nine frames as they came, which may be fewer a second than the camera says."""
+    frames, times = np.zeros((9, 512, 640), np.uint16), np.arange(9) / fps
+    return FrameStack(frames, times, 0, replace(CAMERA, **camera))
+
+
+@pytest.mark.parametrize(
+    ("given", "bytes_a_frame"),
+    [
+        ({}, FRAME),
+        ({"record.mode": "every=5"}, FRAME / 5),
+        ({"record.mode": "bursts"}, 640 * 512 * (2 + 1 / 8) / 4),
+        ({"record.mode": "bursts", "measure.burst": 20}, 640 * 512 * (4 + 1 / 8) / 20),
+        ({"record.enabled": False}, 0),
+        ({"camera.back": "v4l2:other"}, 2 * FRAME),
+    ],
+)
+def test_what_is_written_is_that_of_the_frames_that_come(given: dict[str, Any], bytes_a_frame: float) -> None:
+    assert write_rate(stack(), load_config(None, given)) == pytest.approx(20 * bytes_a_frame)
+
+
+def test_a_folder_of_pictures_is_not_recorded() -> None:
+    assert write_rate(stack(live=False), load_config(None, {})) == 0
+    assert disk_lines(0.0, load_config(None, {})) == []
+
+
+@pytest.mark.parametrize(
+    ("free", "seconds", "good", "shown"),
+    [
+        (90e6, None, False, "room for 0.1 min at this rate (13.1 MB/s, 0.09 GB free)"),
+        (7.8e9, None, False, "room for 9.9 min at this rate"),
+        (7.9e9, None, True, "room for 10 min at this rate"),
+        (90e6, 6.0, True, "room for 0.1 min at this rate"),
+        (90e6, 8.0, False, "room for 0.1 min at this rate"),
+        (7.9e9, 3600.0, False, "room for 10 min at this rate"),
+    ],
+)
+def test_it_must_last_for_the_test_or_ten_minutes(
+    monkeypatch: pytest.MonkeyPatch, free: float, seconds: float | None, good: bool, shown: str
+) -> None:
+    config = load_config(None, {} if seconds is None else {"output.seconds": seconds})
+    monkeypatch.setattr(disk, "free_bytes", lambda folder: free)
+    (line,) = disk_lines(20 * FRAME, config)
+    assert line.good is good and line.value.startswith(shown)
+    assert f"for a test of {(seconds or 600) / 60:.3g} min: free some space" in line.advice
+
+
+def test_a_disk_that_is_gone_is_no_go(monkeypatch: pytest.MonkeyPatch) -> None:
+    def gone(folder: str) -> int:
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(disk, "free_bytes", gone)
+    (line,) = disk_lines(1e6, load_config(None, {"output.dir": "/mnt/usb/run"}))
+    assert not line.good and line.value == "/mnt/usb/run: cannot be asked (Input/output error)"

@@ -14,7 +14,6 @@ from typing import Any
 import pytest
 
 from acquire.errors import ConfigError, DataError
-from live.pipeline.screen import Screen
 from live.replay.batch import campaign as module
 from live.replay.batch.campaign import (
     CampaignRequest,
@@ -31,17 +30,8 @@ from live.replay.batch.scheduler import ChunkPlan
 from live.replay.batch.task import ROW_FILE, Task
 from live.replay.batch.test_list import BatchJob, find_tests
 from live.replay.batch.worker_processes import Pool
+from tests.live.screens import RecordingScreen
 from tests.live.ui.waiting import LONG_S
-
-
-class Lines(Screen):
-    """Keeps what is printed."""
-
-    def __init__(self) -> None:
-        self.printed: list[str] = []
-
-    def print(self, text: str = "") -> None:
-        self.printed.append(text)
 
 
 def sessions(folder: Path, names: str) -> list[BatchJob]:
@@ -66,7 +56,7 @@ class Made:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
         self.wanted = CampaignRequest(sessions(folder, "abc"), folder / "out", 2)
         store(_task(self.wanted, self.wanted.tests[0]))
-        self.screen, self.stopping, self.done = Lines(), threading.Event(), list[str]()
+        self.screen, self.stopping, self.done = RecordingScreen(), threading.Event(), list[str]()
         processes = SimpleNamespace(close=lambda: self.done.append("closed"))
         monkeypatch.setattr(module, "_processes", lambda wanted: processes)
         monkeypatch.setattr(module, "_work", self._work)
@@ -90,7 +80,7 @@ def test_only_what_is_missing_is_replayed_and_the_table_has_all(
     assert sorted(bench.done) == ["b", "c", "closed"] and bench.done[-1] == "closed"
     assert (found.new, found.exit_code, found.files) == (2, 0, (tmp_path / "out" / "summary.csv",))
     assert [row.values["test"] for row in found.rows] == ["a", "b", "c"]
-    assert bench.screen.printed == [f"3 tests: 1 done before, 2 to replay into {tmp_path / 'out'}"]
+    assert bench.screen.lines == [f"3 tests: 1 done before, 2 to replay into {tmp_path / 'out'}"]
     with (tmp_path / "out" / "summary.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["test"] for row in rows] == ["a", "b", "c"] and list(rows[0]) == list(COLUMNS)
@@ -145,10 +135,10 @@ def test_settings_of_a_test_come_before_those_of_all(tmp_path: Path) -> None:
 def test_those_that_cannot_be_cut_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     plans = {"a": ChunkPlan(why="pictures are not cut"), "b": ChunkPlan()}
     monkeypatch.setattr(module, "cut", lambda task: plans[task.name])
-    screen = Lines()
+    screen = RecordingScreen()
     tasks = [Task(name, "", name, chunk_s=None if name == "c" else 9.0) for name in "abc"]
     assert module._cuts(tasks, screen) == plans
-    assert screen.printed == ["a: done whole: pictures are not cut"]
+    assert screen.lines == ["a: done whole: pictures are not cut"]
 
 
 def test_a_table_is_written_whole_or_not_at_all(tmp_path: Path) -> None:

@@ -12,13 +12,13 @@ from typing import Any
 import pytest
 
 from acquire.errors import ConfigError, DataError
-from live.pipeline.screen import Screen
 from live.replay.batch import cluster
 from live.replay.batch.cluster import Cluster, advice, check, check_scheduler
 from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow
 from live.replay.batch.task import ROW_FILE, Task, TaskProgress
 from live.replay.batch.worker import NEEDED
+from tests.live.screens import RecordingScreen
 
 
 class Future:
@@ -92,16 +92,6 @@ def answer(host: str = "a", **more: Any) -> dict[str, Any]:
     }  # fmt: skip
 
 
-class Lines(Screen):
-    """Keeps what is printed."""
-
-    def __init__(self) -> None:
-        self.printed: list[str] = []
-
-    def print(self, text: str = "") -> None:
-        self.printed.append(text)
-
-
 class Running:
     """A cluster with these tasks and workers."""
 
@@ -109,7 +99,7 @@ class Running:
         self.client = Client(answers or {"one": answer()})
         self.rows: dict[str, BatchRow] = {}
         self.screen, self.progress, self.then = (
-            Lines(),
+            RecordingScreen(),
             list[tuple[str, TaskProgress]](),
             dict[str, list[Task]](),
         )
@@ -240,22 +230,22 @@ def test_where_nothing_ends_and_there_are_no_workers_a_note_comes_every_fifteen_
     bench.client.threads = {}
     for _ in range(3):
         bench.cluster.wait(5.0)
-    assert bench.screen.printed == []
+    assert bench.screen.lines == []
     bench.client.futures[0].end()
     bench.cluster.wait(5.0)
     for _ in range(3):
         bench.cluster.wait(5.0)
-    assert bench.screen.printed == [], "counted anew since a task has ended"
+    assert bench.screen.lines == [], "counted anew since a task has ended"
     bench.cluster.wait(0.1)
     note = "note: tcp://here:1 has no workers any more; waiting for some"
-    assert bench.screen.printed == [note]
+    assert bench.screen.lines == [note]
     for _ in range(4):
         bench.cluster.wait(5.0)
-    assert bench.screen.printed == [note] * 2
+    assert bench.screen.lines == [note] * 2
     bench.client.threads = {"w": 1}
     for _ in range(4):
         bench.cluster.wait(5.0)
-    assert len(bench.screen.printed) == 2
+    assert len(bench.screen.lines) == 2
     bench.cluster.close()
     assert bench.client.cancelled == [(f"{tmp_path}/b-key-b", True)] and bench.client.closed == 1
 
@@ -272,11 +262,11 @@ def test_workers_that_do_not_fit_end_it_before_any_task(
     task = Task("a", str(tmp_path), "a.h5")
     monkeypatch.setattr(cluster, "_connected", connected)
     with pytest.raises(ConfigError, match="does 2 tasks at once"):
-        Cluster([task], "tcp://here:1", print, print, Lines())  # type: ignore[arg-type]
+        Cluster([task], "tcp://here:1", print, print, RecordingScreen())  # type: ignore[arg-type]
     assert clients[0].closed == 1 and clients[0].futures == [] and list(tmp_path.iterdir()) == []
     monkeypatch.setattr(cluster, "_connected", lambda address: Client(ValueError("x")))  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match=r"a worker cannot run phasedic \(ValueError: x\)"):
-        Cluster([task], "tcp://here:1", print, print, Lines())  # type: ignore[arg-type]
+        Cluster([task], "tcp://here:1", print, print, RecordingScreen())  # type: ignore[arg-type]
 
 
 def test_what_is_asked_of_workers() -> None:

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from acquire.errors import DataError
-from live.pipeline.screen import Screen
 from live.replay.batch import scheduler as module
 from live.replay.batch.keys import key_of_chunk
 from live.replay.batch.row import BatchRow, failed, row_of_chunk
@@ -28,6 +27,7 @@ from live.replay.batch.scheduler import (
 )
 from live.replay.batch.task import FIELDS_FILE, Task, TaskProgress
 from live.replay.batch.workdir import _host, staging_dir
+from tests.live.screens import RecordingScreen
 
 
 def edges(times: Any, seconds: float) -> list[int]:
@@ -103,16 +103,6 @@ def test_what_is_not_cut(session: dict[str, Any]) -> None:
         assert cut(TASK) == ChunkPlan()
 
 
-class Printed(Screen):
-    """Keeps the lines."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-
-    def print(self, text: str = "") -> None:
-        self.lines.append(text)
-
-
 def done(name: str) -> BatchRow:
     return BatchRow.of({"test": name, "outcome": "done", "exit_code": 0})
 
@@ -123,7 +113,7 @@ class Plan:
     def __init__(self) -> None:
         self.short = Task("short", "/out", "session:/data/short/session.h5")
         chunks = [dataclasses.replace(TASK, name=f"{k:04d}", of="long", numbers=(k, k + 1)) for k in range(3)]
-        self.now, self.rows, self.screen = 100.0, dict[str, BatchRow](), Printed()
+        self.now, self.rows, self.screen = 100.0, dict[str, BatchRow](), RecordingScreen()
         self.progress = BatchProgress(2, lambda: self.now)
         cuts = {"long": ChunkPlan(tuple(chunks)), "short": ChunkPlan(why="pictures are not cut")}
         self.scheduler = Scheduler([TASK, self.short], cuts, self.rows, self.progress, self.screen)

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from acquire.errors import ConfigError, DataError
-from live.pipeline.screen import Screen
 from live.results.report import saving
 from live.results.report.saving import as_csv, save_figures, save_page, save_pdf, to_pdf, to_png
 from live.results.report.svg import Mark, Plot, PlotLine, draw
+from tests.live.screens import RecordingScreen
 
 
 def numbers(text: str) -> list[float]:
@@ -109,16 +109,6 @@ def test_only_long_lines_are_thinned() -> None:
         assert points == drawn if drawn else points <= 1602
 
 
-class Said(Screen):
-    """Keeps the lines."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-
-    def print(self, text: str = "") -> None:
-        self.lines.append(text)
-
-
 PLOT = Plot("f", "a title", "x, s", "y, N", (
     PlotLine('say "a"', np.array([1.0, 2.0]), np.array([3.0, 4.0]), np.array([0.5, 0.25])),
     PlotLine("b", np.array([1.0]), np.array([np.nan])),
@@ -180,7 +170,7 @@ def test_a_browser_that_fails_is_told(
 
 def test_without_a_browser_there_are_svg_and_csv(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(saving, "find_browser", lambda: None)
-    screen = Said()
+    screen = RecordingScreen()
     save_figures([PLOT], tmp_path / "figures", screen)
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {"f.svg", "f.csv"}
     assert 'fill="#fff"' in (tmp_path / "figures/f.svg").read_text()
@@ -190,7 +180,7 @@ def test_without_a_browser_there_are_svg_and_csv(tmp_path: Path, monkeypatch: py
 
 
 def test_with_a_browser_there_are_png_too(tmp_path: Path, browser: list[list[str]]) -> None:
-    screen = Said()
+    screen = RecordingScreen()
     save_figures([PLOT, replace(PLOT, name="g")], tmp_path / "figures", screen)
     assert {path.name for path in (tmp_path / "figures").glob("*.png")} == {"f.png", "g.png"}
     assert screen.lines == [] and len(browser) == 2

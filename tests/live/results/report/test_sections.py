@@ -32,6 +32,7 @@ from live.results.report.record import events, gauges, hashes, times, version_ta
 from live.results.report.report import ReportRequest, make_report, tensile
 from live.results.run_folder import RunFolder, open_run
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
+from tests.live.screens import RecordingScreen
 
 N = len(PULLED)
 
@@ -104,16 +105,11 @@ def test_the_files_with_size_and_hash(run: RunFolder, tmp_path: Path) -> None:
     copied.write_bytes(bytes(1_234_567))
     run.path = tmp_path
     (tmp_path / "notes.txt").write_text("not of the run")
-    shown: list[str] = []
-
-    class Shown(Screen):
-        def status(self, text: str) -> None:
-            shown.append(text)
-
-    found = plain(hashes(run, Shown()))
+    screen = RecordingScreen()
+    found = plain(hashes(run, screen))
     digest = hashlib.sha256(copied.read_bytes()).hexdigest()
     assert f"|session.h5|1\u202f234\u202f567|{digest}|" in found and "notes" not in found
-    assert shown == ["reading session.h5 for its hash"]
+    assert screen.statuses == ["reading session.h5 for its hash"]
     assert record._sha256(tmp_path / "gone.h5").startswith("cannot be read: No such file")
 
 

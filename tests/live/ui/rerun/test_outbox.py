@@ -14,7 +14,6 @@ import pytest
 from acquire.events import Event, EventKind
 from acquire.text.printable import printable
 from acquire.text.quantity import Amount
-from live.pipeline.screen import Screen
 from live.pipeline.snapshot import Snapshot
 from live.results.readings import Readings
 from live.results.run_folder import open_run
@@ -34,6 +33,7 @@ from live.ui.rerun.view import View, remote_access, url, viewer_failure
 from live.ui.rerun.wire import Kind, Parcel
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
 from tests.live.made_up import START, figures, make_field, make_frame, make_grid
+from tests.live.screens import RecordingScreen
 
 SETUP = ViewSetup("a test", 128, 96, 12, make_grid(), START, picture_hz=5.0)
 TARGET = ViewTarget(None, "v.rrd", "id")
@@ -260,19 +260,14 @@ def test_means_have_levels_of_the_camera() -> None:
 
 
 def test_what_is_missing_is_told() -> None:
-    lines: list[str] = []
-
-    class Said(Screen):
-        def print(self, text: str = "") -> None:
-            lines.append(text)
-
+    screen = RecordingScreen()
     run: Any = SimpleNamespace(strain=SimpleNamespace(n=5), pictures=None, notes=())
-    playback._report_selection(5, run, Said())
+    playback._report_selection(5, run, screen)
     run.notes = ("why",)
-    playback._report_selection(4, run, Said())
-    playback._notify(Said(), "a word", "info")
-    playback._notify(Said(), "a word", "warning")
-    first, second, third, *told = lines
+    playback._report_selection(4, run, screen)
+    playback._notify(screen, "a word", "info")
+    playback._notify(screen, "a word", "warning")
+    first, second, third, *told = screen.lines
     assert first.endswith("are not here any more; maps alone") and second.startswith(
         "4 of 5 instants are shown"
     )

@@ -15,7 +15,6 @@ from analysis.evaluate import GaugeValue
 from live.config.sections import SpecimenConfig
 from live.pipeline.consumer import ConsumerReport
 from live.pipeline.run_state import FrameCounts, RunState
-from live.pipeline.screen import Screen
 from live.pipeline.snapshot import Snapshot
 from live.results.summary import StatusCard, file_lines
 from live.ui.terminal.cameras_screen import CamerasScreen
@@ -24,26 +23,17 @@ from live.ui.terminal.status_line import cameras_line, fitted, gauge_texts, stat
 from live.ui.terminal.summary import print_summary, trouble_lines
 from tests.live.made_run import finished
 from tests.live.made_up import START, figures, in_ascii, make_loads, make_measurement
-from tests.live.ui.terminal.test_screen import Terminal, time_step
+from tests.live.screens import RecordingScreen, Terminal
+from tests.live.ui.terminal.test_screen import time_step
 
 
-class Said(Screen):
-    """Keeps the lines and the status lines."""
+class Said(RecordingScreen):
+    """Keeps the status lines among the lines."""
 
     width, is_due = 200, True  # type: ignore[assignment]
 
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-        self.rung = 0
-
-    def print(self, text: str = "") -> None:
-        self.lines.append(text)
-
     def status(self, text: str) -> None:
         self.lines.append(f"status: {text}")
-
-    def bell(self) -> None:
-        self.rung += 1
 
 
 def shot(valid: int = 30, **more: Any) -> Snapshot:

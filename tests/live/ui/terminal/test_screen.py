@@ -20,11 +20,7 @@ from live.results.figures import value_text
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.terminal.status_line import status_line
 from tests.live.made_up import figures, in_ascii
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
+from tests.live.screens import Terminal
 
 
 class ClosedTerminal(Terminal):

@@ -17,7 +17,6 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.consumer import ConsumerReport
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
-from live.pipeline.screen import Screen
 from live.results.finished.answers import MeasuredAgain, missing_lines
 from live.results.summary import summary_lines
 from live.ui.terminal.screen import TerminalScreen
@@ -25,22 +24,13 @@ from live.ui.terminal.summary import brief_lines, print_summary, trouble_lines
 from live.words.language import LANGUAGES
 from tests.live.made_run import PULLED, finished, force_of
 from tests.live.made_up import in_ascii, make_measurement
+from tests.live.screens import RecordingScreen
 
 SECTION = SpecimenConfig(width_mm=10.0, thickness_mm=2.0, axis="y")
 
 
 def lines_of(run_state: RunState) -> list[str]:
     return brief_lines(run_state, finished(run_state))
-
-
-class Said(Screen):
-    """Keeps the lines."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-
-    def print(self, text: str = "") -> None:
-        self.lines.append(text)
 
 
 def run_of(strains: Sequence[float], specimen: SpecimenConfig = SECTION, *, loads: bool = True) -> RunState:
@@ -57,7 +47,7 @@ def run_of(strains: Sequence[float], specimen: SpecimenConfig = SECTION, *, load
 
 
 def test_what_a_test_gave_in_a_dozen_lines(tmp_path: Path) -> None:
-    run_state, screen = run_of(PULLED), Said()
+    run_state, screen = run_of(PULLED), RecordingScreen()
     (tmp_path / "strain.h5").write_bytes(bytes(2_000_000))
     print_summary(screen, run_state, finished(run_state), tmp_path, [*trouble_lines(run_state, ())])
     text = "\n".join(screen.lines)
@@ -71,7 +61,7 @@ def test_what_a_test_gave_in_a_dozen_lines(tmp_path: Path) -> None:
 
 
 def test_verbose_has_all(tmp_path: Path) -> None:
-    run_state, screen = run_of(PULLED), Said()
+    run_state, screen = run_of(PULLED), RecordingScreen()
     print_summary(screen, run_state, finished(run_state), tmp_path, [], verbose=True)
     text = "\n".join(screen.lines)
     assert "last strain of the region: exx" in text and "lag of the load behind the frames" in text
@@ -165,7 +155,7 @@ def all_wrong() -> RunState:
 
 
 def test_where_everything_goes_wrong_a_dozen_lines_say_the_most_and_count_the_rest(tmp_path: Path) -> None:
-    state, screen = all_wrong(), Said()
+    state, screen = all_wrong(), RecordingScreen()
     reports = [ConsumerReport(f"output {k}", failed="a full disk") for k in range(4)]
     (tmp_path / "session.h5").write_bytes(b"x")
     test, troubles = finished(state, reference_N=500.0), [*trouble_lines(state, reports)]

@@ -21,7 +21,7 @@ from live.results.report.saving import find_browser
 from tests.live.ui.waiting import LONG_S
 
 ROOT = Path(__file__).parents[4]
-FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+FLAGS = ["--disable-gpu"]  # an emulated one takes twice the time, and nothing here draws with it
 TIMEOUT_S = 240.0
 
 

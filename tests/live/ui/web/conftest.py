@@ -31,6 +31,20 @@ def browser() -> Iterator[Any]:
         opened.close()
 
 
+@pytest.fixture(autouse=True)
+def no_page_stays_open(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Pages that a test opened go with it: each one that stays draws on and asks its program."""
+    if "browser" not in request.fixturenames:
+        yield
+        return
+    opened = request.getfixturevalue("browser")
+    before = opened.contexts
+    yield
+    for context in opened.contexts:
+        if context not in before:
+            context.close()
+
+
 @pytest.fixture
 def start(browser: Any, tmp_path: Path) -> Iterator[Start]:
     """Starts ``phasedic page`` and opens it; whatever happens, it does not run on."""

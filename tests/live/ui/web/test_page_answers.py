@@ -22,16 +22,7 @@ from live.ui.web import page_controller
 from live.ui.web.authorization import HttpError
 from live.ui.web.page_controller import PageController
 from live.ui.web.setup.config_draft import ConfigDraft
-
-
-class Said(Screen):
-    """Keeps the lines."""
-
-    def __init__(self) -> None:
-        self.lines: list[str] = []
-
-    def print(self, text: str = "") -> None:
-        self.lines.append(text)
+from tests.live.screens import RecordingScreen
 
 
 @pytest.fixture
@@ -219,7 +210,7 @@ def served(
     monkeypatch.setattr(page_command, "camera_configs", lambda config, given, others: {"": config})
     controller.others = []  # type: ignore[attr-defined]
     monkeypatch.setattr(page_command, "write_report", written)
-    page_command.serve(controller, {}, Said(), interrupted)  # type: ignore[arg-type]
+    page_command.serve(controller, {}, RecordingScreen(), interrupted)  # type: ignore[arg-type]
     return interrupted
 
 
@@ -237,7 +228,7 @@ def test_one_test_after_the_other_with_its_report(monkeypatch: pytest.MonkeyPatc
 def test_without_a_camera_the_page_opens_with_what_there_is(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    draft, said = ConfigDraft(load_config(None, {}), tmp_path / "rig.toml", {}), Said()
+    draft, said = ConfigDraft(load_config(None, {}), tmp_path / "rig.toml", {}), RecordingScreen()
 
     def nothing(given: dict[str, object], screen: Screen) -> None:
         raise DeviceError("no camera can be used (none is plugged in)")
@@ -263,7 +254,7 @@ def test_an_interrupted_test_ends_the_page(monkeypatch: pytest.MonkeyPatch, tmp_
 def test_two_cameras_are_put_together_at_the_end(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, code: int, fails: bool, found: int
 ) -> None:
-    screen, joined = Said(), list[Any]()
+    screen, joined = RecordingScreen(), list[Any]()
 
     def put(*given: Any) -> None:
         joined.append(given[:3])

@@ -7,7 +7,6 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -31,6 +30,7 @@ from live.ui.web.map_view import MapView, plate_shapes
 from live.ui.web.page_consumer import PageConsumer, elongation_length
 from live.ui.web.painting import RED, mark_saturated, shrunk, traffic_light
 from tests.live.made_up import make_frame, make_measurement
+from tests.live.screens import StatedRun
 from tests.live.streaming import record_of
 from tests.live.ui.waiting import until
 from tests.live.ui.web.page_texts import STATIC
@@ -62,13 +62,11 @@ def config() -> Config:
     return load_config(None, {"specimen.area_mm2": 40.0})
 
 
-class Run:
-    """A run with a state."""
-
-    paused, recording, live, folder = False, True, True, Path("run")
+class Run(StatedRun):
+    """Begun, and recording."""
 
     def __init__(self, config: Config) -> None:
-        self.run_state = RunState.new(1.0, specimen=config.specimen)
+        super().__init__(RunState.new(1.0, specimen=config.specimen))
         self.run_state.health.state, self.run_state.health.began_t = "REC", 0.0
 
 

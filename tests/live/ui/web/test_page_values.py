@@ -26,6 +26,7 @@ from live.ui.web.page_consumer import PageConsumer
 from live.ui.web.run_result import peaks, run_result
 from tests.live.made_run import E_PA, PULLED, THICKNESS_MM, WIDTH_MM, YIELD, finished, force_of
 from tests.live.made_up import START, make_frame, make_grid, make_measurement
+from tests.live.screens import StatedRun
 
 LINE = {"gauges.long": {"kind": "line", "start": [64, 20], "end": [64, 70]}}
 
@@ -33,13 +34,11 @@ LINE = {"gauges.long": {"kind": "line", "start": [64, 20], "end": [64, 70]}}
 STRIPS = {"gauges.axial": {"kind": "line", "start": [64, 20], "end": [64, 70]}}
 
 
-class Run:
-    """A run with a state."""
-
-    paused, recording, live, folder = False, True, True, Path("run")
+class Run(StatedRun):
+    """Begun, with a health that is given."""
 
     def __init__(self, config: Config, **more: Any) -> None:
-        self.run_state = RunState.new(1.0, specimen=config.specimen)
+        super().__init__(RunState.new(1.0, specimen=config.specimen))
         self.run_state.health.began_t = START
         for name, value in more.items():
             setattr(self.run_state.health, name, value)
