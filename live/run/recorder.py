@@ -6,6 +6,7 @@ measurement goes on.
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import math
 import threading
@@ -91,7 +92,7 @@ def _open_writer(path: Path, prepared: PreparedRun, mode: RecordMode) -> Session
         config=config.as_dict(),
         metadata=dict(config.metadata),
         versions=versions(),
-        mode=mode,
+        mode=dataclasses.replace(mode, cycles=0),  # the file has bursts, whichever were chosen
     )
     if rotate_MB is None:
         return SessionWriter(path, info)

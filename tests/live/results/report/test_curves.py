@@ -175,7 +175,7 @@ def test_the_lag_is_found_from_readings_since_the_start(
 ) -> None:
     given: list[Any] = []
     monkeypatch.setattr(
-        "live.results.finished.finished_test.find_lag",
+        "live.results.readings.find_lag",
         lambda *tracks: given.append(tracks) or Figure.none(""),
     )
     with open_run(run_dir) as run:
