@@ -22,13 +22,13 @@ from live.results.finished.figures_file import finished
 from live.results.finished.finished_test import reference_force
 from live.run.camera_source import CameraSource, GrabPlan
 from live.run.control import ControlRefused
-from live.run.cycle_pictures import CyclePictures
 from live.run.incoming_bursts import TAKING, IncomingBursts
 from live.run.measurer import Measurer
 from live.run.outcome import INTERRUPTED, TIME_IS_OVER, Outcome, StopSignal
-from live.run.pre_trigger import PreTriggerBuffer
 from live.run.prepared_run import PreparedRun
-from live.run.recorder import open_recording
+from live.run.recording.cycle_pictures import CyclePictures
+from live.run.recording.pre_trigger import PreTriggerBuffer
+from live.run.recording.recorder import open_recording
 from live.setup.devices import Rig
 from live.stream.adapted import Outputs
 from live.stream.record import Record, ReferenceWanted, Waiting

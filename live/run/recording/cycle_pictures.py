@@ -16,7 +16,7 @@ from acquire.frame import Burst
 from acquire.record_mode import RecordMode
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
-from live.run.pre_trigger import PreTriggerBuffer
+from live.run.recording.pre_trigger import PreTriggerBuffer
 from live.stream.record import Matched, Record
 from live.stream.stream import Subscriber
 
