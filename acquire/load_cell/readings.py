@@ -8,7 +8,7 @@ from bisect import bisect_left, bisect_right
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.block_file import BlockFile
+from acquire.files.block_file import BlockFile
 
 ROWS = 1 << 13
 """Readings of a block, which is read at once."""

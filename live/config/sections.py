@@ -191,7 +191,8 @@ class RecordConfig:
 
     enabled: bool = key(FLAG, True, "record the session", Option("no-record", off=True))
     mode: str = key(RECORD_MODE, "all",
-        "frames to record: all, bursts (sums only), or every=K (one in K)", Option("record", "MODE", expert=True))
+        "frames to record: all, bursts (sums only), every=K (one in K), or cycles=K (bursts at valley and peak of the"
+        " first K cycles, then of every 10th, 100th)", Option("record", "MODE", expert=True))
     armed: bool = key(FLAG, False,
         "measure at once, but record only after the start command", Option("armed", on=True))
     keep_s: float = key(number(0, 60), 2.0,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.block_file import BlockFile
+from acquire.files.block_file import BlockFile
 
 _ROWS = 1024  # of a block
 

@@ -10,7 +10,7 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.block_file import BlockFile
+from acquire.files.block_file import BlockFile
 from acquire.load_cell import LoadLog
 from acquire.text import Message
 from analysis.evaluate import Curve, GaugeValue, LoadAxis, load_axis

@@ -23,6 +23,7 @@ from acquire.errors import EXIT_INTERRUPTED, LOSS, ConfigError, DataError
 from acquire.events import Event, EventKind, EventSink
 from acquire.frame import Burst, Frame
 from acquire.hdf5 import FolderWatch
+from acquire.load_sample import LoadSample
 from acquire.opencv.images import picture_times
 from acquire.text import Message
 from acquire.text.message import about, joined
@@ -335,5 +336,5 @@ def _publish_recorded(source: ReplaySource, stream: Stream) -> None:
     for event in source.events:
         if event.kind is not EventKind.MEASURED:
             stream.publish(event)
-    for sample in source.samples:
+    for sample in source.samples if stream.wants(LoadSample) else ():
         stream.publish(sample)

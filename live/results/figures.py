@@ -33,7 +33,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
 from live.pipeline.measurement import AXIAL
 from live.results.budget import BudgetRow, CameraView, budget_rows
-from live.results.readings import Readings
+from live.results.finished.readings import Readings
 
 HEADLINE = ("E", "nu", "Rp02", "Rm")
 """The figures that are shown first, and compared between tests."""

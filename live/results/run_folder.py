@@ -32,9 +32,9 @@ from live.config.loading import from_dict
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import curve_of
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
+from live.results.finished.readings import Readings
 from live.results.pictures import Image, Pictures, of_images, of_session
 from live.results.reader import Strain
-from live.results.readings import Readings
 from live.results.row import gauge_columns
 from live.results.stored_fields import StoredPattern, length_between, read_field, stored_pattern
 

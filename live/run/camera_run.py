@@ -9,6 +9,7 @@ import time
 from acquire.errors import EXIT_INTERRUPTED, LOSS, exit_code_of
 from acquire.events import Event, EventKind
 from acquire.hdf5 import FolderWatch
+from acquire.record_mode import RecordMode
 from acquire.text import Message
 from live.pipeline.consumer import Compose, RunInfo
 from live.pipeline.latency import KernelWork, LatencyMonitor
@@ -24,9 +25,10 @@ from live.run.control import ControlRefused
 from live.run.incoming_bursts import TAKING, IncomingBursts
 from live.run.measurer import Measurer
 from live.run.outcome import INTERRUPTED, TIME_IS_OVER, Outcome, StopSignal
-from live.run.pre_trigger import PreTriggerBuffer
 from live.run.prepared_run import PreparedRun
-from live.run.recorder import open_recording
+from live.run.recording.cycle_pictures import CyclePictures
+from live.run.recording.pre_trigger import PreTriggerBuffer
+from live.run.recording.recorder import open_recording
 from live.setup.devices import Rig
 from live.stream.adapted import Outputs
 from live.stream.record import Record, ReferenceWanted, Waiting
@@ -78,6 +80,7 @@ class CameraRun(Subscriber):
         self._held = FolderWatch(self.folder)
         self._screen, self._stop, self._stream = screen, stop, stream
         self._recording: PreTriggerBuffer | None = None
+        self._chosen: CyclePictures | None = None
         self._has_recorded = self._hinted = False
         self._own_time_is_over = False
         rig = prepared.rig
@@ -121,7 +124,11 @@ class CameraRun(Subscriber):
         """Use ``recording``, None for none."""
         self._recording = recording
         if recording is not None:
-            self._stream.add(recording, self.name)
+            record = self._prepared.config.record
+            mode, room = RecordMode.parse(record.mode), int(record.buffer_MB * 5e5)
+            if mode.cycles:
+                self._chosen = CyclePictures(recording, mode, self._run_state, room)
+            self._stream.add(self._chosen or recording, self.name)
         self._has_recorded = self.recording
         self._run_state.event_log.add_listener(self._publish)
 
@@ -294,6 +301,8 @@ class CameraRun(Subscriber):
         self._run_state.loads.close()
         self.rig.camera.close()
         self.outputs.end()
+        if self._chosen is not None:
+            self._chosen.end()
         own = TIME_IS_OVER if self._own_time_is_over or self.source.time_is_over else Message("camera ended")
         reason = self._stop.reason or own
         self._run_state.event_log.emit(EventKind.STOP, "phasedic", Message("the test ends: {reason}", reason))

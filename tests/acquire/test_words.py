@@ -125,7 +125,7 @@ def test_a_time_without_a_zone_is_utc(text: str, utc: datetime, monkeypatch: pyt
 def test_a_mode_is_the_whole_word(text: str) -> None:
     with pytest.raises(ConfigError) as caught:
         RecordMode.parse(text)
-    assert "allowed: 'all', 'bursts' or 'every=K' with K from 1" in str(caught.value)
+    assert "allowed: 'all', 'bursts', 'every=K' or 'cycles=K' with K from 1" in str(caught.value)
 
 
 def test_a_mode_keeps_its_crop_and_the_first_frame() -> None:

@@ -13,7 +13,7 @@ ACQUIRE = {
     "acquire.files": "acquire acquire.text",
     "acquire.burst": "acquire acquire.text acquire.files",
     "acquire.camera": "acquire acquire.text",
-    "acquire.load_cell": "acquire acquire.text",
+    "acquire.load_cell": "acquire acquire.text acquire.files",
     "acquire.protocols": "acquire acquire.text",
     "acquire.opencv": "acquire acquire.text acquire.camera acquire.files",
     "acquire.v4l2": "acquire acquire.text acquire.camera acquire.opencv",

@@ -26,12 +26,15 @@ class CycleWatch:
     ----------
     channels : mapping of str to float
         ``CYCLE_CHANNELS`` of the last whole cycle; NaN before there are cycles.
+    newest : list of Cycle
+        Those that the newest burst has completed.
     """
 
     def __init__(self) -> None:
         import scipy.interpolate  # noqa: F401  takes half a second, which no burst is to wait for
 
         self.channels: Mapping[str, float] = NONE
+        self.newest: list[Cycle] = []
         self._counter: CycleCounter | None = None
         self._axis, self._readings, self._start_t = "", 0, math.nan
         self._all = {name: array("d") for name in CYCLE_CHANNELS}
@@ -45,7 +48,8 @@ class CycleWatch:
         self._readings += len(t)
         area = area_m2 or 1.0
         burst = BurstStrains(*(np.array([value]) for value in (step.t, step.axial(axis)[0], step.width_s)))
-        for cycle in self._counter.add(Track(t - loads.lag_s, force / area), burst):
+        self.newest = self._counter.add(Track(t - loads.lag_s, force / area), burst)
+        for cycle in self.newest:
             if cycle.number == 1:
                 self._all = {name: array("d") for name in CYCLE_CHANNELS}
             channels = _channels(cycle, area)

@@ -21,7 +21,7 @@ from analysis.evaluate.cyclic.loop import BurstStrains
 from analysis.evaluate.figure import quantile
 from live.config.new_files import new_file
 from live.results.figures import figure_text
-from live.results.readings import Readings
+from live.results.finished.readings import Readings
 
 Floats = NDArray[np.float64]
 FILE = "cycles.csv"

@@ -28,7 +28,7 @@ from live.pipeline.run_state import RunState
 from live.results.figures import lag_of, tensile_options
 from live.results.finished.creep import creep_lines
 from live.results.finished.cycles import Cycles
-from live.results.readings import Readings
+from live.results.finished.readings import Readings
 from live.results.run_folder import RunFolder
 
 NO_VALUE = Message("no ZOI has a value in the last burst")

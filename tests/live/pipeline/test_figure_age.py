@@ -23,7 +23,7 @@ from live.pipeline.run_state import RunState
 from live.pipeline.timed.figure import ARRIVALS, OLD_INTERVALS, OLD_S, Arrivals, FigureState, TimedFigure
 from live.pipeline.timed.force_watch import ForceWatch
 from live.run.alarms import ActionMeans, Alarm, AlarmWatch, actions_of
-from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
+from live.run.recording.pre_trigger import PreTrigger, PreTriggerBuffer
 from live.run.strain_output import LineFormat
 from live.ui.rerun.messages import LargeFigures
 from live.ui.terminal.status_line import status_line

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquire.block_file import BlockFile
 from acquire.events import Event, EventKind
+from acquire.files.block_file import BlockFile
 from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
 from analysis import StrainField

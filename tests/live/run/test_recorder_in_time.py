@@ -17,10 +17,10 @@ from live.config.loading import load_config
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import FrameCounts, RunState
 from live.pipeline.screen import Screen
-from live.run import recorder as module
 from live.run.control import STOP
 from live.run.outcome import StopSignal
-from live.run.recorder import Recorder, _announce_disk, open_recording
+from live.run.recording import recorder as module
+from live.run.recording.recorder import Recorder, _announce_disk, open_recording
 from tests.live.fakes import frame
 from tests.live.made_up import make_measurement
 from tests.live.run.test_recording import FakeBurstWriter, FakeWriter, RecordingSetup, recorder_of

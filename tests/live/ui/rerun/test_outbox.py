@@ -15,7 +15,7 @@ from acquire.events import Event, EventKind
 from acquire.text.printable import printable
 from acquire.text.quantity import Amount
 from live.pipeline.snapshot import Snapshot
-from live.results.readings import Readings
+from live.results.finished.readings import Readings
 from live.results.run_folder import open_run
 from live.ui.rerun import playback, view
 from live.ui.rerun.messages import (

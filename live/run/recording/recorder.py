@@ -6,6 +6,7 @@ measurement goes on.
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 import math
 import threading
@@ -31,8 +32,8 @@ from live.pipeline.timed.figure import TimedFigure
 from live.pipeline.timed.health import DISK_EVERY_S, Health
 from live.results.folder import versions
 from live.run.outcome import StopSignal
-from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
 from live.run.prepared_run import PreparedRun
+from live.run.recording.pre_trigger import PreTrigger, PreTriggerBuffer
 
 log = logging.getLogger(__name__)
 _SMALL = 512  # bytes counted for a sample or an event
@@ -91,7 +92,7 @@ def _open_writer(path: Path, prepared: PreparedRun, mode: RecordMode) -> Session
         config=config.as_dict(),
         metadata=dict(config.metadata),
         versions=versions(),
-        mode=mode,
+        mode=dataclasses.replace(mode, cycles=0),  # the file has bursts, whichever were chosen
     )
     if rotate_MB is None:
         return SessionWriter(path, info)

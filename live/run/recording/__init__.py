@@ -1,0 +1,1 @@
+"""The recording of a run: what is chosen, kept before the start, and written."""
