@@ -29,7 +29,10 @@ _CLEAR = 20.0  # standard deviations of the noise that strains must move to have
 _CLEAR_STRAIN, _CLEAR_RATIO = 1e-4, 1.5  # above vibration and warming; and over the strain across
 _UNEVEN_SIGMA, _UNEVEN_SHARE = 3.0, 0.02  # of a strain that is not uniform: over its noise, and of the strain
 _CLEAR_BLUR = 3.0  # standard uncertainties of the rise of that variance with the strain
-_END = 0.1  # of the points of the interval: read at each end of a chord
+_END, _BESIDE = (
+    0.1,
+    1.5,
+)  # of the points of the interval: read at each end of a chord; and of their usual distance
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +190,7 @@ def chord(loading: Loading, line: FittedLine, beyond: float = 0.0) -> Figure:
     ``beyond`` is a relative standard uncertainty that counts beside that of the ends.
     """
     (e0, e1), (s0, s1) = (
-        _ends(values, line, sigma)
+        _ends(values, loading.strain, line, sigma)
         for values, sigma in ((loading.strain, loading.noise_strain), (loading.stress, loading.noise_stress))
     )
     rise, run = s1.value - s0.value, e1.value - e0.value
@@ -383,9 +386,15 @@ def _turned(angle: Figure, at: float) -> Figure:
     return turned.minus(math.pi * round(turned.value / math.pi)) if turned.known else turned
 
 
-def _ends(values: Floats, line: FittedLine, min_sigma: float) -> tuple[UncertainValue, UncertainValue]:
+def _ends(
+    values: Floats, strain: Floats, line: FittedLine, min_sigma: float
+) -> tuple[UncertainValue, UncertainValue]:
     reach = max(3, round(_END * line.n))
-    first, last = (
-        reading(values, k, k - reach, k + reach + 1, min_sigma) for k in (line.first, line.last - 1)
-    )
-    return first, last
+    # Beyond the interval samples may lie farther apart, up to yield: those are not beside its end.
+    beside = _BESIDE * reach * float(strain[line.last - 1] - strain[line.first]) / (line.n - 1)
+    found = []
+    for k in (line.first, line.last - 1):
+        first = max(k - reach, 0)
+        near = first + np.flatnonzero(np.abs(strain[first : k + reach + 1] - strain[k]) <= beside)
+        found.append(reading(values, k, int(near[0]), int(near[-1]) + 1, min_sigma))
+    return found[0], found[1]

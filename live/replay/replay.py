@@ -234,7 +234,7 @@ def _run(
     chunks = len(request.parts)
     speed = Message("joined of {chunks} chunks", chunks) if chunks else speed_line(run_state.history, took)
     lines = [*_account(source, run_state), speed]
-    left_out = source.count.left_out if source.count else 0
+    left_out, repeats = (source.count.left_out, source.count.repeats) if source.count else (0, [])
     cut_off = [e.text for e in event_log.events("warning") if "missing" in e.data and not stopping.is_set()]
     stopped = [
         Message("{name} stopped: {why}", one.name, one.failed) for one in outputs.reports if one.failed
@@ -244,7 +244,7 @@ def _run(
         counted(failures.count, "burst"),
         folder / LOG,
     )
-    lines = [*[failed] * (failures.count > 0), *cut_off, *source.doubts, *stopped, *lines]
+    lines = [*[failed] * (failures.count > 0), *cut_off, *repeats, *source.doubts, *stopped, *lines]
     lossy = (
         outputs.failed
         or bool(source.doubts)

@@ -20,6 +20,7 @@ from acquire.events import Event
 from acquire.frame import Burst, CameraInfo, Frame
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
+from acquire.text import Message
 from live.pipeline.measure import NewReference
 
 
@@ -71,17 +72,36 @@ class PictureCount:
     ----------
     pictures, left_out, reference : int
         All; those that cannot be read or differ from the first in format; those of the reference.
+    repeated, first_repeated : int
+        Pictures that are the one before in every bit, as noise never makes them, and the number of the first, from 1.
     """
 
     def __init__(self) -> None:
-        self.pictures = self.left_out = self.reference = 0
+        self.pictures = self.left_out = self.reference = self.repeated = self.first_repeated = 0
 
     def passing(self, frames: Iterable[Frame]) -> Iterator[Frame]:
         """The same frames, counted."""
+        last: Frame | None = None
         for frame in frames:
             self.pictures += 1
             self.left_out += frame.damaged
+            if last and not frame.damaged and np.array_equal(last.image, frame.image) and np.ptp(frame.image):
+                self.repeated += 1
+                self.first_repeated = self.first_repeated or self.pictures
+            last = frame
             yield frame
+
+    @property
+    def repeats(self) -> list[str]:
+        """A line on the repeated pictures; nothing where there are none."""
+        words = Message(
+            "{n} of {all} pictures equal the one before in every bit, the first is number {first}: the camera or its"
+            " program repeats them, and their strain is that of before",
+            self.repeated,
+            self.pictures,
+            self.first_repeated,
+        )
+        return [words] * (self.repeated > 0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -100,3 +100,12 @@ def test_a_neck_beside_the_gauge_does_not_take_the_strain_at_the_top() -> None:
     stress = np.where(after > 0, STRESS[top] * (1 - 0.15 * after), test.stress)
     found = evaluate_test(replace(test, strain=strain, stress=stress)).Agt
     assert found.low < STRAIN[top] < found.high
+
+
+def test_a_chord_does_not_reach_beyond_its_interval_where_steps_grow() -> None:
+    """Pictures at 5 MPa from one another, and 50 MPa beyond 100 MPa, as of a test by hand."""
+    stress = 1e6 * np.r_[np.arange(0.0, 70.0, 5.0), 80, 100, 150, 200, 250, 285]
+    strain = stress / E_PA + 0.002 * (stress / PROOF_PA) ** 12
+    noisy = strain + np.random.default_rng(1).normal(0, 2e-6, len(strain))
+    found = evaluate_test(Curve(np.arange(20.0), noisy, stress)).E_chord
+    assert found.low < E_PA < found.high and found.high - found.low < 0.05 * E_PA

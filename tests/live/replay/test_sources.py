@@ -13,7 +13,7 @@ import pytest
 
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind
-from acquire.frame import Burst, CameraInfo
+from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
@@ -205,6 +205,35 @@ def test_pictures_that_were_left_out_are_counted_and_some_named(
     assert lines[6:] == ([more] if more else [])
     count.left_out = 0
     assert _account(source, state) == [] and _account(SimpleNamespace(count=None), state) == []  # type: ignore[arg-type]
+
+
+def test_pictures_that_are_the_one_before_in_every_bit_are_told() -> None:
+    noise = np.random.default_rng(1)
+    images = [frozen(noise.integers(1, 99, (8, 8)).astype(np.uint8)) for _ in range(4)]
+    damaged, black = frozen(images[3] * 0), frozen(images[0] * 0)
+    shown = [
+        images[0],
+        images[1],
+        images[2],
+        images[2].copy(),
+        images[2],
+        images[3],
+        damaged,
+        damaged,
+        black,
+        black,
+    ]
+    frames = [
+        Frame(frozen(image), k, float(k), "nominal", 0, 8, float(k), damaged=image is damaged)
+        for k, image in enumerate(shown)
+    ]
+    count = PictureCount()
+    assert list(count.passing(frames)) == frames
+    assert (
+        len(count.repeats) == 1 and "2 of 10 pictures" in count.repeats[0] and "number 4:" in count.repeats[0]
+    )
+    few = PictureCount()
+    assert list(few.passing(frames[:3])) and few.repeats == []
 
 
 def test_results_name_the_folder_where_they_will_be() -> None:
