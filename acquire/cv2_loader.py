@@ -7,8 +7,11 @@ that comes first leaves it without them.
 from __future__ import annotations
 
 import os
+import unicodedata
 from functools import cache
 from typing import Any
+
+from acquire.text.quantity import GAP, IN_ASCII
 
 # No damaged header may ask for gigabytes: 268 million pixels are more than any camera has.
 _LIMITS = {
@@ -26,6 +29,14 @@ def load_cv2() -> Any:
 
     log_settings(cv2).setLogLevel(LOG_SILENT)
     return cv2
+
+
+def drawn_letters(text: str) -> str:
+    """The text in letters that ``putText`` has: most of Unicode since OpenCV 5, before it ASCII (um/m, +-)."""
+    text = text.replace(GAP, " ")
+    if hasattr(load_cv2(), "FontFace"):
+        return text
+    return unicodedata.normalize("NFKD", text.translate(IN_ASCII)).encode("ascii", "ignore").decode()
 
 
 LOG_SILENT, LOG_WARNING = 0, 3

@@ -1,8 +1,9 @@
-"""Opening a device in a thread of its own, since a driver or a network may take as long as it likes."""
+"""Opening and closing devices in threads of their own, since a driver or a network may take as long as it likes."""
 
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
@@ -62,40 +63,68 @@ class Opening(Generic[Opened]):
             self._close(self._opened.pop())
 
 
-def open_again(
-    attempt: Callable[[], Opened],
-    close: Callable[[Opened], object],
-    stopped: threading.Event,
-    errors: tuple[type[Exception], ...],
-    failed: Callable[[Exception], object] = lambda error: None,
-) -> Opened | None:
-    """Try in a thread until it works; None once ``stopped`` is set, however long the attempt still blocks.
+class Reopening(Generic[Opened]):
+    """A lost device that is opened again: one attempt after the other, until one works.
 
     Parameters
     ----------
-    attempt : callable
-        Opens and returns the device.
-    close : callable
-        Closes what was opened too late.
-    stopped : threading.Event
+    attempt, close : callable
+        As of ``Opening``.
     errors : tuple of exceptions
-        After which it is tried again; any other ends it, and is raised here.
+        After which it is tried again; any other ends it.
+    sleep : callable
+        Waits so many seconds, less when nobody waits for the device any more.
     failed : callable taking an exception, optional
         Called after each such error.
+    after_s : float, s
+        Until the first attempt.
+    clock : callable giving monotonic s
     """
 
-    def until_it_works() -> Opened | None:
-        while not stopped.is_set():
-            try:
-                return attempt()
-            except errors as error:
-                failed(error)
-            stopped.wait(RETRY_S)
-        return None
+    def __init__(
+        self,
+        attempt: Callable[[], Opened],
+        close: Callable[[Opened], object],
+        errors: tuple[type[Exception], ...],
+        sleep: Callable[[float], object],
+        failed: Callable[[Exception], object] = lambda error: None,
+        *,
+        after_s: float = 0.0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._attempt, self._close, self._errors = attempt, close, errors
+        self._sleep, self._failed, self._clock = sleep, failed, clock
+        self._next = clock() + after_s
+        self._opening: Opening[Opened] | None = None
 
-    opening = Opening(until_it_works, lambda opened: opened is not None and close(opened))
-    while not stopped.is_set():
-        if opening.done(LOOK_S):
+    def look(self) -> Opened | None:
+        """The device once it is open; waits ``LOOK_S`` at most. Raises what an attempt raised beside ``errors``."""
+        if self._opening is None:
+            left = self._next - self._clock()
+            if left > 0:
+                self._sleep(min(left, LOOK_S))
+                return None
+            self._opening = Opening(self._attempt, self._close)
+        if not self._opening.done(LOOK_S):
+            return None
+        opening, self._opening = self._opening, None
+        try:
             return opening.take()
-    opening.abandon()
-    return None
+        except self._errors as error:
+            self._failed(error)
+            self._next = self._clock() + RETRY_S
+            return None
+
+    def abandon(self) -> None:
+        """Nobody waits for it any more, however long an attempt still blocks."""
+        if self._opening is not None:
+            self._opening.abandon()
+            self._opening = None
+
+
+def close_within(seconds: float, close: Callable[[], object]) -> threading.Thread:
+    """Close in a thread, and wait so long for it: a device that is gone may block for seconds."""
+    thread = threading.Thread(target=close, name="closing", daemon=True)
+    thread.start()
+    thread.join(seconds)
+    return thread

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import copy
 import errno
 import logging
 import os
@@ -86,9 +87,12 @@ class _StatusLineHandler(logging.StreamHandler[TextIO]):
 
 
 class _PrintableFormatter(logging.Formatter):
-    """Makes messages printable; they may contain text of a file or a device."""
+    """Says messages in the language of the terminal, and printable: they may contain text of a file or a device."""
 
     def format(self, record: logging.LogRecord) -> str:
+        if isinstance(record.args, tuple):
+            record = copy.copy(record)
+            record.args = tuple(told(one) if isinstance(one, Message) else one for one in record.args or ())
         return printable(super().format(record))
 
 

@@ -22,7 +22,7 @@ from acquire.camera.timing import FrameCounter, StallWatch, StampOf, longest_pau
 from acquire.errors import DeviceError, PhasedicError, Spoken
 from acquire.events import EventSink, Level, RateLimiter, device_event
 from acquire.frame import CameraInfo, Clock, Frame
-from acquire.opening_thread import open_again
+from acquire.opening_thread import Reopening, close_within
 from acquire.text import Message
 
 log = logging.getLogger(__name__)
@@ -154,7 +154,7 @@ class LiveCamera(CameraBase):
         with self._guard:
             driver, self._driver = self._driver, None
         if driver is not None:
-            _closing(driver, 0.0 if self._stall.stalled else CLOSE_S)
+            close_within(0.0 if self._stall.stalled else CLOSE_S, driver.close)
 
     # -- frames ---------------------------------------------------------------------------------
 
@@ -166,7 +166,7 @@ class LiveCamera(CameraBase):
                 frame = self._next()
             except DeviceFault as fault:
                 if not self.stopped.is_set():
-                    self._recover(str(fault))
+                    self._recover(fault.text)
             else:
                 if frame is not None:
                     yield frame
@@ -279,9 +279,8 @@ class LiveCamera(CameraBase):
             before, self._driver = self._driver, None
         if before is None:
             return
-        closing = _closing(
-            before, SLICE_S
-        )  # first: an open handle makes a replugged camera take another name
+        # First: an open handle makes a replugged camera take another name.
+        closing = close_within(SLICE_S, before.close)
         if not self._stall.stalled:
             self._report(Message("{why}; looking for it again", why), "error")
 
@@ -289,11 +288,13 @@ class LiveCamera(CameraBase):
             closing.join()
             return _opened_alike(self._opener, before)
 
-        driver = open_again(
-            attempt, lambda late: late.close(), self.stopped, (DeviceFault, PhasedicError), self._not_back
-        )
-        if driver is not None:
-            self._resume(driver)
+        errors = DeviceFault, PhasedicError
+        again = Reopening(attempt, lambda late: late.close(), errors, self.stopped.wait, self._not_back)
+        while not self.stopped.is_set():
+            if (driver := again.look()) is not None:
+                self._resume(driver)
+                return
+        again.abandon()
 
     def _not_back(self, error: Exception) -> None:
         """A camera that answers and cannot be used is told, once; one that is away has been already."""
@@ -322,14 +323,6 @@ class LiveCamera(CameraBase):
         device_event(
             self._on_event, self._address, Message("{name}: {text}{last}", self._name, text, last), level
         )
-
-
-def _closing(driver: Driver, wait_s: float) -> threading.Thread:
-    """Close it in a thread, and wait so long for it: requests to a camera that is gone may block for seconds."""
-    closing = threading.Thread(target=driver.close, name="closing", daemon=True)
-    closing.start()
-    closing.join(wait_s)
-    return closing
 
 
 def _opened(opener: Opener, address: str) -> Driver:

@@ -22,6 +22,7 @@ from acquire.events import EventSink, ignore_event
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.record_mode import Crop, RecordMode
 from acquire.text import Message
+from acquire.text.message import joined
 
 log = logging.getLogger(__name__)
 
@@ -93,7 +94,8 @@ class CameraListing:
             else ""
         )
         lines = (line for line in (self.trouble, stays, *self.details) if line)
-        return "\n      ".join((f"  {self.address}  {self.name}".rstrip(), *lines))
+        head = Message("  {address}  {name}", self.address, self.name) if self.name else f"  {self.address}"
+        return joined("\n      ", (head, *lines))
 
 
 def list_cameras() -> list[CameraListing]:

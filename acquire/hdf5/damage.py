@@ -30,6 +30,7 @@ import h5py
 from acquire.errors import DataError
 from acquire.system import python_command, python_environment
 from acquire.text import Message
+from acquire.text.message import word
 
 DAMAGE = (
     OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, MemoryError, OverflowError,
@@ -99,7 +100,7 @@ def reason(error: Exception) -> str:
     text = " ".join(str(error).split())
     _, _, words = text.partition("error message = '")
     plain = error.strerror if isinstance(error, OSError) else ""
-    return words.partition("'")[0] or (plain or text)[:200]
+    return word(words.partition("'")[0] or (plain or text)[:200])
 
 
 log = logging.getLogger(__name__)

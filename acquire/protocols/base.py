@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import importlib
+import tomllib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 from acquire.addresses import Options
 from acquire.errors import ConfigError
@@ -151,3 +153,25 @@ def find_protocol(name: str) -> Protocol:
         )
     protocol: Protocol = importlib.import_module(PROTOCOLS[name]).PROTOCOL
     return protocol
+
+
+def table_of(what: str, name: str, ours: Path) -> dict[str, Any]:
+    """A table of the file ``ours`` by its name, or a TOML file of the user's; ``what`` it is, for messages.
+
+    Raises
+    ------
+    ConfigError
+        There is no such table, or the file cannot be read.
+    """
+    known = tomllib.loads(ours.read_text(encoding="utf-8"))
+    if name in known:
+        return dict(known[name])
+    if not name.endswith(".toml"):
+        raise ConfigError(
+            "no {what} is called {name}; there are: {listed}, or give a .toml file",
+            *(what, repr(name), ", ".join(known)),
+        )
+    try:
+        return tomllib.loads(Path(name).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ConfigError("{what} {name}: {error}", what, name, error) from error

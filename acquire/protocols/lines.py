@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +22,7 @@ from typing import Any
 from acquire.addresses import Options
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.base import Parser, Protocol, Reading, table_of
 from acquire.protocols.buffers import Line, LineBuffer, LineParser, bad, number
 from acquire.text import Message
 
@@ -128,19 +127,7 @@ def load_preset(name: str) -> dict[str, Any]:
     ------
     ConfigError
     """
-    known = tomllib.loads(PRESETS.read_text(encoding="utf-8"))
-    if name in known:
-        return dict(known[name])
-    if not name.endswith(".toml"):
-        raise ConfigError(
-            "no preset is called {name}; there are: {listed}, or give a .toml file",
-            repr(name),
-            ", ".join(known),
-        )
-    try:
-        rules = tomllib.loads(Path(name).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ConfigError("preset {name}: {error}", name, error) from error
+    rules = table_of(Message("preset"), name, PRESETS)
     unknown = set(rules) - set(KEYS)
     if unknown:
         raise ConfigError(

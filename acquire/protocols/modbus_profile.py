@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,8 @@ from typing import Any
 from acquire.bounds import NotAllowed, as_integer
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
+from acquire.protocols.base import table_of
+from acquire.text import Message
 
 PROFILES = Path(__file__).with_name("modbus_profiles.toml")
 TYPES = {"i16": 1, "u16": 1, "i32": 2, "u32": 2, "f32": 2}  # registers of each
@@ -84,20 +85,7 @@ def load_profile(name: str) -> Profile:
     ConfigError
         Unknown name, unreadable file, or a key that is missing, unknown or impossible.
     """
-    known = tomllib.loads(PROFILES.read_text(encoding="utf-8"))
-    if name in known:
-        return profile_from(known[name], name)
-    if not name.endswith(".toml"):
-        raise ConfigError(
-            "no profile is called {name}; there are: {listed}, or give a .toml file",
-            repr(name),
-            ", ".join(known),
-        )
-    try:
-        table = tomllib.loads(Path(name).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ConfigError("profile {name}: {error}", name, error) from error
-    return profile_from(table, name)
+    return profile_from(table_of(Message("profile"), name, PROFILES), name)
 
 
 def profile_from(table: Mapping[str, Any], name: str) -> Profile:

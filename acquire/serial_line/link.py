@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from acquire.errors import ConfigError, DeviceError
 from acquire.load_sample import LoadFlag, LoadSample
-from acquire.opening_thread import Opening
+from acquire.opening_thread import RETRY_S, Opening, Reopening, close_within
 from acquire.serial_line.byte_ports import Port
 from acquire.serial_line.echo import Echo
 from acquire.serial_line.ports import PORT_ERRORS, LineSettings, find_again, identity_of
@@ -25,9 +25,8 @@ from acquire.text import Message
 log = logging.getLogger(__name__)
 
 OPEN_S = 10.0  # that the first opening may take
-RETRY_S, SELDOM_S = 0.5, 8.0
+SELDOM_S = 8.0
 STEADY_S = 5.0  # a connection that lasts so long is one
-STEP_S = 0.1  # of one look
 CLOSE_S = 0.5
 
 Opener = Callable[[LineSettings], Port]
@@ -45,9 +44,7 @@ def close_port(port: Port | None) -> None:
         except PORT_ERRORS as error:
             log.debug("closing: %s", error)
 
-    thread = threading.Thread(target=work, name="closing", daemon=True)
-    thread.start()
-    thread.join(CLOSE_S)
+    close_within(CLOSE_S, work)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +104,7 @@ class Link:
         self._echo, self.arrived = echo, -math.inf
         self._opener, self._clock = context.opener, context.clock
         self._sleep, self._stopped = context.sleep, context.stopped
-        first = self._opening_at(lambda: line)
+        first = Opening(lambda: self._open(line), self._close)
         if not first.done(OPEN_S):
             first.abandon()
             raise DeviceError(
@@ -115,9 +112,9 @@ class Link:
             )
         self._url, port = first.take()
         self._port: Port | None = port
-        self._opening: Opening[tuple[str, Port]] | None = None
+        self._again: Reopening[tuple[str, Port]] | None = None
         self.identity = "" if "://" in line.url else identity_of(line.url)
-        self._since, self._next_try = context.clock(), 0.0
+        self._since = context.clock()
         self._short = 0  # connections in a row that did not last
         self._missed = False  # reported as lost, and not yet as back
 
@@ -178,7 +175,15 @@ class Link:
         now = self._clock()
         self._short = self._short + 1 if now - self._since < STEADY_S else 1
         delay = min(RETRY_S * 2 ** (self._short - 1), SELDOM_S)
-        self._next_try = now + delay
+        self._again = Reopening(
+            lambda: self._open(self._where()),
+            self._close,
+            (DeviceError, ConfigError),
+            self._sleep,
+            lambda error: log.debug("%s", error),
+            after_s=delay,
+            clock=self._clock,
+        )
         if self._short == 1:
             self._report(
                 "error",
@@ -198,32 +203,19 @@ class Link:
 
     def again(self) -> bool:
         """Whether the lost port is back now; waits for a tenth of a second at most."""
-        if self._opening is None:
-            left = self._next_try - self._clock()
-            if left > 0:
-                self._sleep(min(left, STEP_S))
-                return False
-            self._opening = self._opening_at(self._where)
-        if not self._opening.done(STEP_S):
+        found = self._again.look() if self._again else None
+        if found is None:
             return False
-        opening, self._opening = self._opening, None
-        try:
-            self._url, self._port = opening.take()
-        except (DeviceError, ConfigError) as error:
-            log.debug("%s", error)
-            self._next_try = self._clock() + RETRY_S
-            return False
+        (self._url, self._port), self._again = found, None
         self._since = self._clock()
         return True
 
-    def _opening_at(self, where: Callable[[], LineSettings]) -> Opening[tuple[str, Port]]:
-        """Opens a port; ``where`` it is asked by the thread, since looking for a port takes time too."""
+    def _open(self, line: LineSettings) -> tuple[str, Port]:
+        return line.url, self._opener(line)
 
-        def opened() -> tuple[str, Port]:
-            line = where()
-            return line.url, self._opener(line)
-
-        return Opening(opened, lambda found: close_port(found[1]))
+    @staticmethod
+    def _close(found: tuple[str, Port]) -> None:
+        close_port(found[1])
 
     def _where(self) -> LineSettings:
         return dataclasses.replace(self._line, url=find_again(self._line.url, self.identity))
@@ -239,9 +231,9 @@ class Link:
 
     def close(self) -> None:
         """Close the port, and the one that may be about to open."""
-        if self._opening is not None:
-            self._opening.abandon()
-            self._opening = None
+        if self._again is not None:
+            self._again.abandon()
+            self._again = None
         port, self._port = self._port, None
         close_port(port)
 

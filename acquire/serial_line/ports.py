@@ -14,6 +14,7 @@ from acquire.errors import ConfigError, DeviceError
 from acquire.serial_line.byte_ports import WRITE_S, Port, Rfc2217Port, TcpPort, TtyPort, line_settings
 from acquire.system import TERMINAL_ERRORS, group_of
 from acquire.text import Message
+from acquire.text.message import joined
 
 LINE_ERRORS: tuple[type[Exception], ...] = (OSError, *TERMINAL_ERRORS)
 PORT_ERRORS: tuple[type[Exception], ...] = (*LINE_ERRORS, TypeError, ValueError)
@@ -44,7 +45,8 @@ class PortInfo:
         """One line for a person."""
         words = [word for word in (self.description, self.identity) if word and word != "n/a"]
         denied = "" if self.accessible else Message("  (this user may not open it: see docs/load-cells.md)")
-        return f"  {self.device}  {'  '.join(words)}{denied}".rstrip()
+        line = f"  {self.device}  {'  '.join(words)}".rstrip()
+        return joined("", (line, denied)) if denied else line
 
 
 def list_serial_ports() -> list[PortInfo]:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.text import Message
+from acquire.text.message import word
 
 
 class Oddities:
@@ -41,7 +42,7 @@ class Oddities:
 
     def words(self) -> tuple[str, ...]:
         """A sentence each, for a person."""
-        words, what = [], self._what
+        words, what = [], word(self._what)
         if not self._closed and self._rows and not self._kept:
             words.append(Message("none of {rows} {what} has a time, so all are left out", self._rows, what))
         if self.left_out:

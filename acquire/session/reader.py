@@ -35,7 +35,7 @@ from acquire.session.layout import SessionInfo
 from acquire.session.part import SessionPart
 from acquire.session.writer import SessionWriter
 from acquire.text import Message
-from acquire.text.message import about
+from acquire.text.message import about, word
 
 _NUMBERED = re.compile(r"^(?P<stem>.+)\.(?P<number>\d{3,})$")
 
@@ -251,7 +251,11 @@ class Session(Closing):
     def _locate(self, lengths: list[int], number: int, what: str) -> tuple[SessionPart, int]:
         if not 0 <= number < sum(lengths):
             raise DataError(
-                "{path}: no {what} {number}; there are {sum}, from 0", self.path, what, number, sum(lengths)
+                "{path}: no {what} {number}; there are {sum}, from 0",
+                self.path,
+                word(what),
+                number,
+                sum(lengths),
             )
         starts = [0, *accumulate(lengths)]
         at = bisect_right(starts, number) - 1

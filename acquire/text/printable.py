@@ -27,8 +27,9 @@ def printable(text: object) -> str:
 
 def _changed(text: object, change: Callable[[str], str]) -> str:
     text = getattr(text, "text", text) if isinstance(text, Exception) else text
-    if not isinstance(text, Message):
-        return change(str(text))
+    if not isinstance(text, Message) or not text.values:
+        words = change(str(text))
+        return text if words == text else words
     values = {
         key: one if isinstance(one, Number | Amount) else _changed(one, change)
         for key, one in text.values.items()

@@ -16,8 +16,10 @@ GAP, MINUS, PLUS_MINUS, UNKNOWN = "\u202f", "−", "±", "–"
 LIVE_DIGITS = 5
 """Digits of a live figure at most: more cannot be read while they change."""
 MOST_DECIMALS = 6
-IN_ASCII = str.maketrans({"µ": "u", PLUS_MINUS: "+-", UNKNOWN: "-", MINUS: "-", GAP: ""})
-"""For a terminal that shows no others."""
+IN_ASCII = str.maketrans(
+    {"µ": "u", PLUS_MINUS: "+-", UNKNOWN: "-", MINUS: "-", GAP: "", "×": "x", "σ": "sigma"}
+)
+"""For a terminal that shows no others, and for pictures where OpenCV draws no others."""
 _COMMA = ("de", "fr")
 _WHOLE = 1e15
 """From here on not every whole number is a float: four digits and a power of ten."""

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquire.text import Message
+from acquire.text.message import joined
 from acquire.v4l2.api import Kernel
 from acquire.v4l2.device import Identity, NotACamera, V4L2Device
 
@@ -114,4 +115,8 @@ def cameras_here(kernel: Kernel) -> str:
         Message("{node} ({card})", node, identity.card)
         for node, identity in identities(kernel, kernel.nodes()).items()
     ]
-    return Message("cameras here: ") + (", ".join(found) or "none") + Message("; see phasedic devices")
+    return (
+        Message("cameras here: ")
+        + (joined(", ", found) if found else Message("none"))
+        + Message("; see phasedic devices")
+    )

@@ -67,4 +67,4 @@ def _open(address: str, screen: Screen) -> None:
     with contextlib.suppress(webbrowser.Error):
         if webbrowser.open(address):
             return
-    screen.print("no browser opens here; open the address of the page in yours")
+    screen.print(Message("no browser opens here; open the address of the page in yours"))

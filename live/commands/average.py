@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from acquire.text import Message
 from live.commands.options import add_options
 from live.ui.terminal.screen import TerminalScreen
 
@@ -35,6 +36,9 @@ def command(arguments: argparse.Namespace) -> int:
             "{camera}: gave fewer than {n} frames without a gap", arguments.camera, arguments.frames
         )
     save_mean(burst.mean, Path(arguments.out))
-    noise = f", noise of one frame {burst.noise:.2f} GL" if burst.n > 1 else ""
-    screen.print(f"{arguments.out}: {burst.n} frames, mean {burst.mean.mean():.1f} GL{noise}")
+    noise = Message(", noise of one frame {noise:.2f} GL", burst.noise) if burst.n > 1 else ""
+    mean = float(burst.mean.mean())
+    screen.print(
+        Message("{path}: {n} frames, mean {mean:.1f} GL{noise}", arguments.out, burst.n, mean, noise)
+    )
     return 0

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from acquire.errors import EXIT_WORDS, LOSS, ConfigError
 from acquire.system import cores
+from acquire.text import Message
 from live.commands.options import (
     FORCES,
     OF_PICTURES,
@@ -90,9 +91,11 @@ def command(arguments: argparse.Namespace) -> int:
     for path in done.files:
         screen.print(f"  {path}")
     if done.exit_code == LOSS:
-        screen.print("exit code 5: tests failed or have losses; see the column error")
+        screen.print(Message("exit code 5: tests failed or have losses; see the column error"))
     elif done.exit_code in EXIT_WORDS:
-        screen.print("exit code 130: interrupted; finished tests are kept, the same call does the rest")
+        screen.print(
+            Message("exit code 130: interrupted; finished tests are kept, the same call does the rest")
+        )
     return done.exit_code
 
 

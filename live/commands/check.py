@@ -14,6 +14,7 @@ from acquire.files.picture import write_picture
 from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
 from acquire.text import Message
+from acquire.text.message import about, word
 from live.commands.check_watch import watch
 from live.commands.options import (
     MEASURE,
@@ -84,7 +85,9 @@ def command(arguments: argparse.Namespace) -> int:
     if arguments.watch:
         first, one = next(iter(cameras.items()))
         if first:
-            screen.print(f"--watch looks at the {first} only; without it all cameras are checked")
+            screen.print(
+                Message("--watch looks at the {first} only; without it all cameras are checked", word(first))
+            )
         with interrupts() as stop:
             figures = watch(one, target, screen, stop.is_set)
         rate = write_rate(figures.stack, config)
@@ -96,7 +99,7 @@ def command(arguments: argparse.Namespace) -> int:
     load, every, ready = _load(config), list[CheckFigures](), True
     for name, one in cameras.items():
         if name:
-            screen.print(f"{name}: {one.camera.address}")
+            screen.print(about(word(name), one.camera.address))
         every.append(examine(stacks[name], one, load))
         ready &= _shown(every[-1], one, target, snapshots[name], screen, rate)
         if name:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from acquire.addresses import parse_address, with_setting
 from acquire.errors import LOSS
 from acquire.frame import Frame
+from acquire.text import Message
 from analysis import PICTURE_KINDS
 from analysis.evaluate import AreaStrain
 from analysis.field import Status, StrainField, Sums
@@ -311,7 +312,7 @@ def compare(
             errors.append(error)
             last = (elapsed, m)
     print_line("")
-    print_line("against the simulated truth (elastic part; exx, eyy, exy):")
+    print_line(Message("against the simulated truth (elastic part; exx, eyy, exy):"))
     # Without a measured instant nothing is wrong: the machine was too slow, and E is not known.
     agreed = _print_strain(np.array(ratios), np.array(errors), print_line) or not ratios
     _print_force(outcome, specimen, print_line)
@@ -352,7 +353,7 @@ def _print_modulus(
 def _print_strain(ratios: Array, errors: Array, print_line: Callable[[str], None]) -> bool:
     """``ratios`` (N, 2, 3): the error of each of the three in units of 0.05 % + 3 sigma, and of 0.05 % + 5 sigma."""
     if not ratios.size:
-        print_line("  no instant of the elastic part was measured")
+        print_line(Message("  no instant of the elastic part was measured"))
         return False
     within, rms = ratios[:, 0] <= 1, np.sqrt(np.mean(errors**2, axis=0)) * 1e6
     beyond = int(np.sum(~(ratios[:, 1] <= 1)))

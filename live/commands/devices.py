@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from acquire.text import Message
 from live.ui.terminal.screen import print_line
 
 
@@ -30,22 +31,17 @@ def command(arguments: argparse.Namespace) -> int:
         return _settings()
     from acquire.camera import list_cameras
     from acquire.serial_line.ports import list_serial_ports
-    from acquire.text.printable import printable
     from analysis import threads
 
     cameras, ports = list_cameras(), list_serial_ports()
-    print_line(
-        "cameras:"
-        if cameras
-        else "cameras: none found (V4L2: /dev/video*; GigE and USB3 Vision: docs/machine-vision.md)"
-    )
+    none = Message("cameras: none found (V4L2: /dev/video*; GigE and USB3 Vision: docs/machine-vision.md)")
+    print_line(Message("cameras:") if cameras else none)
     for camera in cameras:
-        for line in camera.text().splitlines():
-            print_line(printable(line))
-    print_line("serial ports:" if ports else "serial ports: none found")
+        print_line(camera.text())
+    print_line(Message("serial ports:") if ports else Message("serial ports: none found"))
     for port in ports:
         print_line(port.text())
-    print_line(f"threads that measure: {threads()}")
+    print_line(Message("threads that measure: {threads}", threads()))
     return 0
 
 
@@ -73,5 +69,5 @@ def _report(arguments: argparse.Namespace) -> int:
         kept.append(without_names(line))
         print_line(kept[-1])
     path.write_text("\n".join(kept) + "\n", encoding="utf-8")
-    print_line(f"written: {path}; read it, then send it with what you saw")
+    print_line(Message("written: {path}; read it, then send it with what you saw", path))
     return 0

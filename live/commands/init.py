@@ -123,7 +123,7 @@ def find_devices(given: dict[str, object], screen: Screen) -> FoundDevices:
     load, load_words = str(given.get("load.address") or ""), ""
     if not load:
         load, load_words = _load(camera, screen)
-        screen.print(f"load cell: {load}  {load_words}".rstrip())
+        screen.print(Message("load cell: {address}  {words}", load, load_words))
     return FoundDevices(camera, printable(descriptions), load, printable(load_words), others)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquire.errors import ConfigError, DataError
+from acquire.text import Message
 from live.config.values import numbers_of
 from live.ui.terminal.screen import print_line
 
@@ -59,7 +60,7 @@ def command(arguments: argparse.Namespace) -> int:
     print_line(
         f"{title}\nu = {spectrum.u:.4f} px, v = {spectrum.v:.4f} px from {spectrum.used.sum()} frequencies"
     )
-    print_line(f"figure: {out}")
+    print_line(Message("figure: {path}", out))
     return 0
 
 

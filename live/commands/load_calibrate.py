@@ -12,7 +12,10 @@ from acquire.errors import NOT_READY, ConfigError, DataError
 from acquire.load_cell import calibration, check, stillness
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.text import Message
+from acquire.text.message import about, word
 from live.setup.devices import open_load
+from live.ui.terminal.screen import print_line
+from live.words.language import told
 
 PrintLine = Callable[[str], None]
 Ask = Callable[[str], str]
@@ -48,7 +51,7 @@ def _agree(question: str) -> str:
     return "yes"
 
 
-def command(arguments: argparse.Namespace, print_line: PrintLine = print, ask: Ask = _asked) -> int:
+def command(arguments: argparse.Namespace, print_line: PrintLine = print_line, ask: Ask = _asked) -> int:
     """``phasedic load-calibrate --load ADDRESS (--mass KG | --force N) --out FILE [--seconds 3]``.
 
     Asks before each of the three readings and before it saves the result; 6 if the result is not accepted. A simulated
@@ -60,21 +63,26 @@ def command(arguments: argparse.Namespace, print_line: PrintLine = print, ask: A
     known_N = arguments.force if arguments.mass is None else arguments.mass * GRAVITY
     simulated = parse_address(arguments.load).scheme == "sim"
     if simulated:
-        print_line("simulated: the known load is put on and taken off by the simulation")
+        print_line(Message("simulated: the known load is put on and taken off by the simulation"))
 
     def read(force_N: float, what: str) -> calibration.Point:
         for _ in range(MAX_TRIES):
-            ask(f"{what}, wait until it is still, then press Enter ")
+            ask(told(Message("{what}, wait until it is still, then press Enter ", what)))
             address = _raw(arguments.load)
             address = with_setting(address, "weight_N", force_N) if simulated else address
-            cell = open_load(address, lambda event: print_line(f"{event.level}: {event.text}"))
+            cell = open_load(address, lambda event: print_line(about(word(event.level), event.text)))
             received = check.listen(cell, arguments.seconds)
             why_not = _unfit(received.samples)
             if not why_not:
                 found = calibration.point(force_N, [sample.force for sample in received.samples])
-                print_line(f"  {found.value:.8g} on the line (noise {found.noise:.3g}, {found.n} readings)")
+                print_line(
+                    Message(
+                        "  {value:.8g} on the line (noise {noise:.3g}, {n} readings)",
+                        *(found.value, found.noise, found.n),
+                    )
+                )
                 return found
-            print_line(f"  not taken: {why_not}")
+            print_line(Message("  not taken: {why}", why_not))
         raise DataError(
             "{load}: {n} times {why}; look at it with 'phasedic load-check'",
             arguments.load,
@@ -82,15 +90,23 @@ def command(arguments: argparse.Namespace, print_line: PrintLine = print, ask: A
             why_not,
         )
 
-    points = [read(0.0, "take off all load"), read(known_N, f"put on {known_N:.6g} N")]
-    points.append(read(0.0, "take off all load again"))
+    points = [
+        read(0.0, Message("take off all load")),
+        read(known_N, Message("put on {force:.6g} N", known_N)),
+    ]
+    points.append(read(0.0, Message("take off all load again")))
     found = calibration.fit(points)
-    print_line(f"gain {found.gain:.8g} N per unit, zero {found.zero:.8g}, residual {found.residual_N:.3g} N")
-    if ask("accept? (yes/no) ").strip().lower() not in ("y", "yes"):
-        print_line("not kept")
+    print_line(
+        Message(
+            "gain {gain:.8g} N per unit, zero {zero:.8g}, residual {residual:.3g} N",
+            *(found.gain, found.zero, found.residual_N),
+        )
+    )
+    if ask(told(Message("accept? (yes/no) "))).strip().lower() not in ("y", "yes"):
+        print_line(Message("not kept"))
         return NOT_READY
     calibration.save(found, Path(arguments.out), arguments.load)
-    print_line(f"kept in {arguments.out}; use it with calibration={arguments.out} in the address")
+    print_line(Message("kept in {path}; use it with calibration={path} in the address", arguments.out))
     return 0
 
 

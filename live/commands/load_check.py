@@ -7,7 +7,10 @@ from collections.abc import Callable
 
 from acquire.errors import NOT_READY
 from acquire.load_cell import check
+from acquire.text import Message
+from acquire.text.message import about, word
 from live.setup.devices import open_load
+from live.ui.terminal.screen import print_line
 
 PrintLine = Callable[[str], None]
 
@@ -20,12 +23,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def command(arguments: argparse.Namespace, print_line: PrintLine = print) -> int:
+def command(arguments: argparse.Namespace, print_line: PrintLine = print_line) -> int:
     """``phasedic load-check``; 0 if ready for a test, else 6."""
-    cell = open_load(arguments.load, lambda event: print_line(f"{event.level}: {event.text}"))
-    print_line(f"listening to {cell.info.name} for {arguments.seconds:g} s ...")
+    cell = open_load(arguments.load, lambda event: print_line(about(word(event.level), event.text)))
+    print_line(Message("listening to {name} for {seconds:g} s ...", cell.info.name, arguments.seconds))
     found = check.report(check.listen(cell, arguments.seconds), cell.info)
     for line in check.report_lines(found):
         print_line(line)
-    print_line("ready" if found.ready else "not ready")
+    print_line(Message("ready") if found.ready else Message("not ready"))
     return 0 if found.ready else NOT_READY

@@ -35,7 +35,10 @@ def command(arguments: argparse.Namespace) -> int:
     found = _of_motion(arguments, screen) if arguments.lamp is None else _of_lamp(arguments)
     changes = rounded_ms(found)
     screen.print(
-        f"readout: {found.seconds * 1e3:.4g} ± {found.sigma * 1e3:.2g} ms from the first line to the last"
+        Message(
+            "readout: {ms:.4g} ± {sigma:.2g} ms from the first line to the last",
+            *(found.seconds * 1e3, found.sigma * 1e3),
+        )
     )
     if arguments.config:
         write_rig(Path(arguments.config), changes)

@@ -10,6 +10,7 @@ from typing import Any
 
 from acquire.errors import ConfigError
 from acquire.text import Message
+from acquire.text.quantity import Amount
 from live.commands.options import add_options, add_verbose, configured
 from live.config.loading import Config
 from live.config.rig_file import write_rig
@@ -69,7 +70,10 @@ def command(arguments: argparse.Namespace) -> int:
     stand_off = arguments.stand_off or config.scale.stand_off_mm
     scale = _scale(arguments, config, stand_off, screen)
     screen.print(
-        f"scale: {scale.mm_per_px:.6g} ± {scale.sigma:.2g} mm/px ({scale.relative:.2%}), {scale.method}"
+        Message(
+            "scale: {scale:.6g} ± {sigma:.2g} mm/px ({relative:.2%}), {method}",
+            *(scale.mm_per_px, scale.sigma, scale.relative, scale.method),
+        )
     )
     for remark in scale.remarks:
         screen.print(Message("LOOK  {what}", remark))
@@ -150,11 +154,14 @@ def _numbers(text: str, mark: str, count: int, kind: type[Number], option: str, 
 
 
 def _print_false_strain(stand_off: float | None, screen: Screen) -> None:
-    moved = f"{OUT_OF_PLANE_MM:g} mm toward the camera"
+    moved = Message("{distance:g} mm toward the camera", OUT_OF_PLANE_MM)
     if stand_off is None:
-        screen.print(f"give --stand-off MM for the false strain of {moved}")
+        screen.print(Message("give --stand-off MM for the false strain of {moved}", moved))
         return
-    strain = false_strain(stand_off) * 1e6
+    strain = Amount("strain", false_strain(stand_off))
     screen.print(
-        f"{moved} at a stand-off of {stand_off:g} mm gives a false strain of {strain:.0f} µm/m (exx and eyy)"
+        Message(
+            "{moved} at a stand-off of {distance:g} mm gives a false strain of {strain} (exx and eyy)",
+            *(moved, stand_off, strain),
+        )
     )

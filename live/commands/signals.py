@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 
 from acquire.system import HANGUP, signal_handler
+from acquire.text import Message
 
 
 @contextlib.contextmanager
@@ -22,7 +23,8 @@ def signals(stop: Callable[[], None], print_line: Callable[[str], None]) -> Iter
         if times > 2:
             signal.signal(number, signal.SIG_DFL)
             signal.raise_signal(number)
-        print_line("closing the files ..." if times == 1 else "still closing; a third signal ends it at once")
+        again = Message("still closing; a third signal ends it at once")
+        print_line(Message("closing the files ...") if times == 1 else again)
         stop()
 
     with signal_handler(handle, signal.SIGINT, signal.SIGTERM), signal_handler(signal.SIG_IGN, *HANGUP):

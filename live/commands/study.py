@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.errors import ConfigError
-from acquire.text.printable import counted
+from acquire.text import Message
 from live.commands.arguments import bad_value
 from live.commands.options import (
     add_config_file,
@@ -97,8 +97,12 @@ def command(arguments: argparse.Namespace) -> int:
             picture_kinds(material.camera), phase=config.measure.estimator == "phase", show=screen.status
         )
         windows = take_windows(material, arguments.static, arguments.loaded)
-        n = f"{len(windows.still)} still and {counted(len(windows.loaded), 'loaded burst')}"
-        screen.print(f"{counted(len(settings), 'setting')} on {n} of {arguments.source}")
+        screen.print(
+            Message(
+                "settings: {n}; bursts of {source}: {still} still, {loaded} loaded",
+                *(len(settings), arguments.source, len(windows.still), len(windows.loaded)),
+            )
+        )
         screen.print(_HEAD)
         for one in study(material, windows, config, settings):
             found.append(one)
@@ -108,7 +112,7 @@ def command(arguments: argparse.Namespace) -> int:
         (part / "study.csv").write_text(_csv(found), encoding="utf-8")
         (part / "measure.toml").write_text(_section(advice), encoding="utf-8")
         save_figures(_figures(found), part / "figures", screen)
-    screen.print(f"take {advice.found.setting.words}: {advice.why}")
+    screen.print(Message("take {setting}: {why}", advice.found.setting.words, advice.why))
     screen.print(_section(advice).rstrip())
     screen.print(f"  {out}")
     return 0

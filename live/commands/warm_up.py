@@ -27,5 +27,5 @@ def command(arguments: argparse.Namespace) -> int:
     with on_fit_machine():
         for settings in (KernelSettings(), KernelSettings(order=2), KernelSettings(estimator="phase")):
             check_machine(settings, SELF_TEST_ZOI)
-    screen.print("self-test: a known pattern is measured right")
+    screen.print(Message("self-test: a known pattern is measured right"))
     return 0

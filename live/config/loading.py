@@ -109,7 +109,9 @@ def load_config(path: Path | None, overrides: Mapping[str, Any], text: str | Non
         Missing or malformed file, unknown key, wrong type, impossible value.
     """
     return _overlaid(
-        {} if path is None else _read_toml(path, text), overrides, str(path or Message("command line"))
+        {} if path is None else _read_toml(path, text),
+        overrides,
+        str(path) if path else Message("command line"),
     )
 
 

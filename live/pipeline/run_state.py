@@ -239,7 +239,7 @@ class RunState:
             figures[STRESS] = figures[FORCE].scaled(1 / self.specimen.area_m2)
         return Snapshot(
             t=now,
-            state="ENDED" if ended else health.state or "REPLAY",
+            state=Message("ENDED") if ended else health.state or Message("REPLAY"),
             paused=health.paused and not ended,
             elapsed_s=t - health.began_t,
             figures=figures,

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from acquire.text import Message
+from acquire.text.message import word
 from acquire.text.quantity import Amount
 from live.config.figures import CYCLE_CHANNELS, FIGURES, LIVE, LiveFigure, figure_of
 from live.pipeline.measurement import TimeStep
@@ -127,7 +128,7 @@ class Snapshot:
     @property
     def doing(self) -> str:
         """What is done with the frames, and whether measuring is paused."""
-        return Message("{state}, PAUSED", self.state) if self.paused else self.state
+        return Message("{state}, PAUSED", word(self.state)) if self.paused else word(self.state)
 
     @property
     def troubles(self) -> tuple[str, ...]:

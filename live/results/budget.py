@@ -69,12 +69,12 @@ class CameraView:
     readout_ms: float | None = None
     plates: bool = False
     both_sides: bool = False
-    sharpness: str = "not known"
+    sharpness: str = Message("not known")
 
     @classmethod
     def of(cls, camera: CameraConfig, scale: ScaleConfig, *, plates: bool) -> CameraView:
         """As configured, before a test."""
-        return cls(scale.stand_off_mm, camera.readout_ms, plates, sharpness="the test shows it")
+        return cls(scale.stand_off_mm, camera.readout_ms, plates, sharpness=Message("the test shows it"))
 
 
 def budget_rows(

@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.text import Message
+from acquire.text.message import word
 from acquire.text.quantity import Amount
 from live.config.figures import OF_LOAD, OF_SECTION, figure_of, is_joint
 from live.config.loading import Config
@@ -148,8 +149,8 @@ def in_words(channel: str, value: float, limit: float) -> str:
     one = figure_of(channel)
     if one.kind:
         value_of, limit_of = Amount(one.kind, value * one.one), Amount(one.kind, limit * one.one)
-        return Message("{channel} {value}, limit {limit}", one.said, value_of, limit_of)
-    return Message("{label} {value:.6g} {UNITS}", one.said, value, one.unit).rstrip() + Message(
+        return Message("{channel} {value}, limit {limit}", word(one.said), value_of, limit_of)
+    return Message("{label} {value:.6g} {UNITS}", word(one.said), value, one.unit).rstrip() + Message(
         ", limit {limit:.6g}", limit
     )
 
@@ -306,10 +307,10 @@ class AlarmWatch(Consumer):
             if alarm.config.of_cycle is not None:
                 value /= self._values.now.at_cycle(channel, alarm.config.of_cycle) or math.nan
             figure = self._values.now.of_channel(channel)
-            changed, words = alarm.judge(figure, value), channel.replace("_", " ")
-            instead = figure.trouble(figure_of(channel).said)
+            changed, words = alarm.judge(figure, value), word(channel.replace("_", " "))
+            instead = figure.trouble(word(figure_of(channel).said))
             if not (instead or figure.known or figure.state is FigureState.NONE):
-                instead = Message("{words}: {state}", words, figure.state)
+                instead = Message("{words}: {state}", words, word(str(figure.state)))
             text = alarm.message(value, instead)
             if changed:
                 t = self._clock() - figure.age if stamp is None and figure.known else stamp
@@ -322,7 +323,7 @@ class AlarmWatch(Consumer):
         for alarm in self._alarms:
             channel = alarm.config.channel
             if why and is_joint(channel) and alarm.lose():
-                words = Message("{channel} is not known, {why}", channel.replace("_", " "), why)
+                words = Message("{channel} is not known, {why}", word(channel.replace("_", " ")), why)
                 self._changed(alarm, None, math.nan, alarm.message(math.nan, words))
 
     def _changed(self, alarm: Alarm, value: float | None, stamp: float, text: str) -> None:

@@ -177,9 +177,9 @@ class CameraRun(Subscriber):
     def state(self) -> str:
         """What is done with the frames: "REC", "ARMED" ..."""
         if self.recording:
-            return "REC"
+            return Message("REC")
         if self._recording is not None:
-            return Message("NOT RECORDING") if self._has_recorded else "ARMED"
+            return Message("NOT RECORDING") if self._has_recorded else Message("ARMED")
         return Message("not recorded")
 
     def command(self, kind: EventKind, note: str = "") -> str:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from acquire.burst import SummedBurst
 from acquire.frame import Burst, CameraInfo
+from acquire.text import Message
 from live.pipeline.measure import NewReference
 from live.pipeline.queues import LatestQueue
 from live.pipeline.reference import ReferenceBurst
@@ -17,7 +18,7 @@ from live.stream.record import CameraEnded, Record, ReferenceWanted, Waiting
 from live.stream.stream import Stream, Subscriber
 
 POLL_S = 0.2
-TAKING = "taking the reference"
+TAKING = Message("taking the reference")
 
 
 class IncomingBursts(Subscriber):
@@ -117,7 +118,7 @@ class IncomingBursts(Subscriber):
             burst, self._held = self._held or self._bursts.get(POLL_S), None
             self.count_skipped()
             if burst is None:
-                self._wait_for("waiting for frames")
+                self._wait_for(Message("waiting for frames"))
             elif self.paused or burst.first_index <= self._reference_end:
                 self._skip(burst)
             elif self._references.empty():

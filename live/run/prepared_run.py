@@ -62,11 +62,13 @@ class PreparedRun:
     def announcement(self) -> Iterator[str]:
         """The lines on the devices, their warnings, and the folder of the files."""
         c, cell = self.rig.camera.info, self.rig.load.info
-        fps = f", {c.fps:g} fps" if c.fps else ""
-        yield f"camera: {c.name}, {c.width} x {c.height} px, {c.bits} bits{fps}"
-        yield f"load cell: {cell.name}"
+        fps = Message(", {fps:g} frames/s", c.fps) if c.fps else ""
+        yield Message(
+            "camera: {name}, {width} x {height} px, {bits} bits{fps}", c.name, c.width, c.height, c.bits, fps
+        )
+        yield Message("load cell: {name}", cell.name)
         yield from (Message("warning: {what}", warning) for warning in (*c.warnings, *cell.warnings))
-        yield f"files: {self.folder}"
+        yield Message("files: {folder}", self.folder)
 
 
 def new_run_state(config: Config, screen: Screen, *, both_sides: bool = False) -> RunState:

@@ -1,22 +1,32 @@
-"""Opening again in a thread: until it works, or until nobody waits any more."""
+"""Opening again in threads: until it works, or until nobody waits any more."""
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 
 from acquire import opening_thread
-from acquire.opening_thread import open_again
+from acquire.opening_thread import LOOK_S, Reopening, close_within
 
 
-@pytest.fixture(autouse=True)
+def opened_again(again: Reopening[str], looks: int = 600) -> str | None:
+    return next(filter(None, (again.look() for _ in range(looks))), None)
+
+
+def tried(attempt: Callable[[], str], **more: Any) -> Reopening[str]:
+    return Reopening(attempt, print, (OSError,), lambda seconds: None, **more)
+
+
+@pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(opening_thread, "RETRY_S", 0.0)
 
 
-def test_it_is_tried_until_it_works() -> None:
-    failures, stopped = iter((OSError("away"), OSError("busy"))), threading.Event()
+def test_it_is_tried_until_it_works(at_once: None) -> None:
+    failures = iter((OSError("away"), OSError("busy")))
     failed: list[str] = []
 
     def attempt() -> str:
@@ -24,8 +34,7 @@ def test_it_is_tried_until_it_works() -> None:
             raise error
         return "open"
 
-    opened = open_again(attempt, print, stopped, (OSError,), lambda error: failed.append(str(error)))
-    assert opened == "open"
+    assert opened_again(tried(attempt, failed=lambda error: failed.append(str(error)))) == "open"
     assert failed == ["away", "busy"]
 
 
@@ -34,28 +43,48 @@ def test_any_other_error_comes_out() -> None:
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        open_again(attempt, print, threading.Event(), (OSError,))
+        opened_again(tried(attempt))
 
 
-def test_it_ends_between_two_attempts() -> None:
-    stopped = threading.Event()
-
-    def attempt() -> str:
-        stopped.set()
-        raise OSError
-
-    assert open_again(attempt, print, stopped, (OSError,)) is None
-
-
-def test_it_ends_during_an_attempt_and_what_was_opened_too_late_is_closed() -> None:
-    go, stopped, closed = threading.Event(), threading.Event(), threading.Event()
+def test_it_is_tried_twice_a_second_and_no_look_waits_long() -> None:
+    now, tries, waits = 100.0, [], []
 
     def attempt() -> str:
-        stopped.set()
+        tries.append(round(now, 3))
+        if len(tries) < 3:
+            raise OSError
+        return "open"
+
+    def sleep(seconds: float) -> None:
+        nonlocal now
+        waits.append(seconds)
+        now += seconds
+
+    again = Reopening(attempt, print, (OSError,), sleep, after_s=2.0, clock=lambda: now)
+    assert opened_again(again) == "open"
+    assert tries == [102.0, 102.5, 103.0] and max(waits) <= LOOK_S
+
+
+def test_what_was_opened_too_late_is_closed() -> None:
+    go, begun, closed = threading.Event(), threading.Event(), threading.Event()
+
+    def attempt() -> str:
+        begun.set()
         go.wait(60)
         return "open"
 
-    assert open_again(attempt, lambda opened: closed.set(), stopped, (OSError,)) is None
+    again = Reopening(attempt, lambda opened: closed.set(), (OSError,), lambda seconds: None)
+    assert again.look() is None and begun.wait(60)
+    again.abandon()
     assert not closed.is_set()
     go.set()
     assert closed.wait(60)
+
+
+def test_a_close_that_blocks_is_left_to_its_thread() -> None:
+    go = threading.Event()
+    thread = close_within(0.0, lambda: go.wait(60))
+    assert thread.is_alive()
+    go.set()
+    thread.join(60)
+    assert not thread.is_alive()

@@ -159,7 +159,10 @@ def run_campaign(wanted: CampaignRequest, screen: Screen, stopping: threading.Ev
         _sweep(wanted.out, rows, tasks)
         ready = len(wanted.tests) - len(tasks)
         screen.print(
-            f"{counted(len(wanted.tests), 'test')}: {ready} done before, {len(tasks)} to replay into {wanted.out}"
+            Message(
+                "{tests}: {ready} done before, {left} to replay into {folder}",
+                *(counted(len(wanted.tests), "test"), ready, len(tasks), wanted.out),
+            )
         )
         if tasks:
             _work(wanted, longest_first(tasks), rows, screen, stopping, processes)
@@ -289,5 +292,5 @@ def _cuts(tasks: Sequence[Task], screen: Screen) -> dict[str, ChunkPlan]:
     found = {task.name: cut(task) for task in tasks if task.chunk_s is not None}
     for name, one in found.items():
         if one.why:
-            screen.print(f"{name}: done whole: {one.why}")
+            screen.print(Message("{name}: done whole: {why}", name, one.why))
     return found

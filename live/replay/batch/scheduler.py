@@ -18,6 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DEFECT, PhasedicError
+from acquire.text import Message
+from acquire.text.message import joined
 from acquire.text.printable import duration
 from live.pipeline.screen import Screen
 from live.replay.batch.keys import is_session, key_of_chunk
@@ -141,9 +143,10 @@ class BatchProgress:
             time_steps = sum(progress.done for progress in self._last.values())
             zois = sum(progress.zois for progress in self._last.values())
             share = sum(share * self._part(title) for title, share in self._shares.items()) / self._tests
-        left = f"  {duration(took * (1 - share) / share)} left" if 0 < share < 1 else ""
-        rate = f"  {zois / took:,.0f} ZOI/s" if took > 0 else ""
-        return f"{self._ended} of {self._tests} tests  {time_steps} instants{rate}{left}"
+        left = Message("{time} left", duration(took * (1 - share) / share)) if 0 < share < 1 else ""
+        rate = Message("{rate:.0f} ZOI/s", zois / took) if took > 0 else ""
+        tests = Message("{done} of {tests} tests", self._ended, self._tests)
+        return joined("  ", (tests, Message("{n} instants", time_steps), rate, left))
 
     def _part(self, title: str) -> float:
         """The share of a task that is done."""

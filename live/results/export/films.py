@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
+
+# Codec of the encoders in OpenCV's wheel, and the programs that do not play it.
+from acquire.text import Message
 from live.config.new_files import new_file, new_folder
 from live.results.export.job import ExportJob
 from live.results.maps.painting import Levels, Painter, caption
@@ -20,7 +23,6 @@ from live.results.maps.scale import ColourScale
 from live.results.pictures import Pictures
 from live.results.response.words import response_title
 
-# Codec of the encoders in OpenCV's wheel, and the programs that do not play it.
 _CODECS = {
     ".mp4": ("mp4v", "MPEG-4 part 2: web browsers do not play it; give --to gif or --out NAME.webm for them"),
     ".webm": (
@@ -116,7 +118,7 @@ def _frames(job: ExportJob, longest: int = 1280) -> Iterator[tuple[int, NDArray[
     (name,) = job.fields
     pictures = job.run.pictures if job.options.picture else None
     if pictures is None and job.options.picture:
-        job.screen.print("the pictures are not here any more; maps are painted on plain grey")
+        job.screen.print(Message("the pictures are not here any more; maps are painted on plain grey"))
     scale = None
     if name != "status":
         display = job.display

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.cv2_loader import load_cv2
+from acquire.cv2_loader import drawn_letters, load_cv2
 from acquire.text import Message
 from analysis.field import ZoiGrid
 from live.results.maps.colours import ticks
@@ -244,18 +243,8 @@ def _write(
 ) -> None:
     """Text from ``origin`` on its base line; smaller where it is wider than ``max_width``."""
     cv2 = load_cv2()
-    text, font = _letters(words), cv2.FONT_HERSHEY_SIMPLEX
+    text, font = drawn_letters(words), cv2.FONT_HERSHEY_SIMPLEX
     (wide, _), _ = cv2.getTextSize(text, font, size, 1)
     if max_width is not None and wide > max_width:
         size *= max_width / wide
     cv2.putText(full, text, origin, font, size, _INK, 1, cv2.LINE_AA)
-
-
-def _letters(text: str) -> str:
-    """The text in letters that OpenCV has: most of Unicode from version 5, before it ASCII."""
-    text = text.replace("\u202f", " ")
-    if hasattr(load_cv2(), "FontFace"):
-        return text
-    for letter, plain in (("µ", "u"), ("±", "+-"), ("−", "-"), ("×", "x"), ("σ", "sigma")):
-        text = text.replace(letter, plain)
-    return unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()

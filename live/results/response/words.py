@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from acquire.text import Message
+from acquire.text.message import word
 from analysis.evaluate import Figure
 from analysis.evaluate.response.departures import FIRST, WINDOW
-from live.pipeline.timed.response import STRESS, TIME, leaves_name, slope_name
+from live.pipeline.timed.response import CHANNELS, STRESS, TIME, leaves_name, slope_name
 from live.results.maps.scale import shown_unit
 from live.results.quantities import quantity_of
 from live.results.reader import Strain
@@ -22,7 +23,11 @@ def response_title(strain: Strain, name: str) -> str:
     if found is None or name not in found.names:
         return ""
     side = _side(strain, found)
-    return Message("{name} over {channel}, {n} instants, {side}", name, found.channel, found.instants, side)
+    return Message("{name} over {channel}, {n} instants, {side}", name, _channel(found), found.instants, side)
+
+
+def _channel(found: StoredResponse) -> str:
+    return word(found.channel) if found.channel in CHANNELS else found.channel
 
 
 def response_lines(strain: Strain) -> list[str]:
@@ -39,7 +44,7 @@ def response_lines(strain: Strain) -> list[str]:
     known = slope[np.isfinite(slope)] * factor
     if not known.size:
         none = Message(
-            "response over {channel}: no place has one in {n} instants", found.channel, found.instants
+            "response over {channel}: no place has one in {n} instants", _channel(found), found.instants
         )
         return [none]
     low, high = np.percentile(known, (5, 95))
@@ -51,7 +56,7 @@ def response_lines(strain: Strain) -> list[str]:
     first = Message(
         "response over {channel}, {n} instants{span}: {name} {median:.4g}{unit} (median; 5 to 95 %: {low:.4g} to "
         "{high:.4g})",
-        found.channel, found.instants, _span(found), name, np.median(known), f" {unit}".rstrip(), low, high,
+        _channel(found), found.instants, _span(found), word(name), np.median(known), f" {unit}".rstrip(), low, high,
     )  # fmt: skip
     then = Message(
         ", one place ± {sigma:.2g}{beside}; chi2 {chi2:.2f}, {side}{across}",

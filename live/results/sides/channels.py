@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from acquire.text import Message
+from acquire.text.message import word
 from live.config.cameras import FRONT
 from live.pipeline.measurement import AXIAL, TimeStep
 from live.pipeline.run_state import RunState
@@ -55,9 +56,9 @@ class JointChannels:
         """Why there is no mean of both any more; empty while there is, and before both have measured."""
         for side, state in self._states.items():
             if state.health.camera_failed:
-                return Message("the camera of the {side} has failed", side)
+                return Message("the camera of the {side} has failed", word(side))
             if state.snapshot(self._clock()).figure(BURST).state in LACKING:
-                return Message("the {side} gives no strains", side)
+                return Message("the {side} gives no strains", word(side))
         steps = {side: state.history.time_steps for side, state in self._states.items()}
         if not self._live or not all(steps.values()):
             return ""
@@ -65,7 +66,7 @@ class JointChannels:
         late, ahead = sorted(ends, key=lambda side: ends[side])
         limit = max(LATE_S, *(longest_gap(np.array([s.t for s in one[-3:]])) for one in steps.values()))
         if _went_on(steps[ahead], ends[late]) > limit:
-            return Message("the {late} gives no strains", late)
+            return Message("the {late} gives no strains", word(late))
         joint = newest(self._states, self._clock())
         if AXIAL in joint:
             self._last_t = joint[AXIAL].t

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from acquire.text import Message
+from acquire.text.message import joined
 from live.config.loading import Config
 from live.pipeline.measurement import AXIAL
 from live.results.budget import CameraView, budget_cells, budget_rows
@@ -33,8 +34,10 @@ def budget_lines(figures: CheckFigures, config: Config) -> list[str]:
     return [head, *(_line(*cells) for cells in budget_cells(rows, "GPa", 1.0))]
 
 
-def _line(cause: str, first: str, second: str, *more: str) -> str:
-    return f"  {cause:<22} " + (" ".join(f"{one:>8}" for one in (first, second, *more)) if second else first)
+def _line(cause: str, *cells: str) -> str:
+    if not cells[1]:
+        return Message("  {cause:<22} {words}", cause, cells[0])
+    return joined(" ", (Message("  {cause:<22}", cause), *(Message("{cell:>8}", cell) for cell in cells)))
 
 
 def _noise(figures: CheckFigures) -> float:

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
+from acquire.text import Message
+from acquire.text.message import joined, word
 from acquire.text.printable import share_text
 from acquire.text.quantity import PLUS_MINUS, Amount
 from analysis.field import Measure, StrainField, ZoiGrid
@@ -22,7 +24,7 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
 from live.pipeline.timed.figure import BEYOND, LACKING, FigureState, TimedFigure
 from live.ui.rerun.wire import Kind, Parcel, WireError
-from live.words.language import told
+from live.words.language import of_terminal, told
 
 STRAINS = ("exx", "eyy", "exy")
 MAPS = (*STRAINS, "e1", "e2", "sigma", "residual", "status")
@@ -101,7 +103,7 @@ For 20 megapixels, slicing takes 0.7 ms of the test, sending them whole 4 ms, an
 COLUMNS = {Kind.MEANS: 1 + 2 * len(STRAINS), Kind.LOADS: 2, Kind.POINTS: 2, Kind.GAUGE: 3}
 """Columns: t and mean, sigma of each strain; t and N; strain and N; t and strain, sigma of a gauge."""
 
-_LARGE = {"STRAIN": AXIAL, "FORCE": FORCE, "STRESS": STRESS}
+_LARGE = {Message("STRAIN"): AXIAL, Message("FORCE"): FORCE, Message("STRESS"): STRESS}
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,35 +131,44 @@ class LargeFigures:
     @classmethod
     def of(cls, s: Snapshot) -> LargeFigures:
         """Those of a test."""
-        state = "PAUSED" if s.paused else s.state
-        cells = [("STATE", state, state), *(_cell(label, s.figure(name)) for label, name in _LARGE.items())]
+        state = Message("PAUSED") if s.paused else s.state
+        figures = (_cell(label, s.figure(name)) for label, name in _LARGE.items())
+        cells = [(told(Message("STATE")), told(word(state)), str(state)), *figures]
         return cls(s.t, cells, _line(s), bool(s.troubles))
 
 
 def _cell(name: str, figure: TimedFigure) -> tuple[str, str, str]:
     """Label, value and tone; without a value what is there instead: the last one, with its age in the label."""
-    shown = Amount(name.lower(), figure.last, figure.sigma).printed()
-    label = f"{name} {shown.unit}"
+    shown, said = Amount(name.lower(), figure.last, figure.sigma).printed(of_terminal()), told(name)
+    label = f"{said} {shown.unit}"
     if figure.known:
         sigma = f"{PLUS_MINUS} {shown.sigma} " if shown.sigma else ""
-        return f"{name} {sigma}{shown.unit}", shown.value, "live"
+        return f"{said} {sigma}{shown.unit}", shown.value, "live"
     if figure.state in BEYOND:
-        return label, figure.state.upper(), "beyond"
+        return label, told(word(figure.state.upper())), "beyond"
     if figure.state in LACKING and figure.last == figure.last:
-        return f"{label}  {figure.age:.0f} s old", shown.value, "old"
-    return label if figure.state is FigureState.NONE else f"{label}  {figure.state}", "-", "old"
+        old = Message("{age:.0f} s old", figure.age)
+        return f"{label}  {told(old)}", shown.value, "old"
+    return (
+        label if figure.state is FigureState.NONE else f"{label}  {told(word(str(figure.state)))}",
+        "-",
+        "old",
+    )
 
 
 def _line(s: Snapshot) -> str:
     if s.alarms:
-        return "ALARM  " + "   ".join(s.alarms)
+        return told(Message("ALARM {text}", joined("   ", s.alarms)))
     if s.troubles:
-        return "   ".join(s.troubles)
+        return "   ".join(map(told, s.troubles))
     if not s.zois:
-        return "nothing measured yet"
+        return told(Message("nothing measured yet"))
     lost, part = s.zois - s.valid, share_text(s.area_share)
-    words = f"{s.valid} of {s.zois} ZOIs" + f", {lost} LOST" * (lost > 0) + f"; strain {part}" * bool(part)
-    return "   ".join((words, *(f"{row.figure.said} {row.amount}" for row in s.rows("display"))))
+    words = Message("{valid} of {zois} ZOIs", s.valid, s.zois)
+    words += Message(", {lost} LOST", lost) * (lost > 0) + Message("; strain {part}", part) * bool(part)
+    return told(
+        joined("   ", (words, *(joined(" ", (word(r.figure.said), r.amount)) for r in s.rows("display"))))
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,7 +15,6 @@ from acquire.camera.opening import without_v4l2
 from acquire.errors import ConfigError
 from acquire.events import ignore_event
 from acquire.frame import CameraInfo, Frame, frozen
-from acquire.opening_thread import open_again
 
 
 @pytest.mark.parametrize(
@@ -117,22 +115,3 @@ def test_without_v4l2_other_cameras_are_named() -> None:
         ConfigError, match=r"/dev/video0: .*need Linux \(V4L2\); choose opencv:0, genicam: or"
     ):
         without_v4l2(parse_address("/dev/video0"), ignore_event)
-
-
-def test_a_device_that_does_not_open_is_tried_twice_a_second() -> None:
-    waits: list[float | None] = []
-
-    class Stopped(threading.Event):
-        def wait(self, timeout: float | None = None) -> bool:
-            waits.append(timeout)
-            return False
-
-    failures = iter((OSError("away"), OSError("busy")))
-
-    def attempt() -> str:
-        for error in failures:
-            raise error
-        return "open"
-
-    assert open_again(attempt, print, Stopped(), (OSError,)) == "open"
-    assert waits == [0.5, 0.5]

@@ -141,7 +141,7 @@ def test_one_that_has_lasted_is_tried_after_half_a_second() -> None:
     tries = Tries(60, 60, 60)
     assert tries.steps(3) == pytest.approx([6.5] * 3, abs=0.02)
     assert [level for level, _ in tries.told][:3] == ["error", "info", "error"]
-    assert tries.told[0][1] == "lost ([Errno 5] out); no sample; trying to reach it again"
+    assert tries.told[0][1] == "lost (out); no sample; trying to reach it again"
 
 
 def test_one_that_does_not_open_is_tried_twice_a_second() -> None:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acquire.cv2_loader import drawn_letters
 from acquire.errors import ConfigError
 from analysis import Roi, ZoiGrid
 from hw_mocks.deformation import Affine
@@ -221,7 +222,7 @@ def test_a_title_fits_however_long_it_is_and_whatever_is_in_it(results: Path, tm
 
 def test_letters_that_an_older_opencv_has_not_are_written_plainly(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(cv2, "FontFace", raising=False)
-    assert painting._letters("Prüfung, −3 ± 1 µm/m, 2×2") == "Prufung, -3 +- 1 um/m, 2x2"
+    assert drawn_letters("Prüfung, −3 ± 1 µm/m, 2×2") == "Prufung, -3 +- 1 um/m, 2x2"
 
 
 def test_cells_of_a_coarse_overlay_lie_where_their_zois_have_moved() -> None:

@@ -44,7 +44,7 @@ def test_devices_are_announced_with_their_warnings() -> None:
     rig: Any = SimpleNamespace(camera=SimpleNamespace(info=camera), load=SimpleNamespace(info=cell))
     prepared = PreparedRun(rig, None, (4, 2), "run", None)  # type: ignore[arg-type]
     assert list(prepared.announcement()) == [
-        "camera: a list of frames, 6 x 4 px, 8 bits, 12.5 fps", "load cell: a cell",
+        "camera: a list of frames, 6 x 4 px, 8 bits, 12.5 frames/s", "load cell: a cell",
         "warning: its gain is automatic", "warning: old", "files: run",
     ]  # fmt: skip
 

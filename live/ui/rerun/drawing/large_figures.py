@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.cv2_loader import load_cv2
-from acquire.text.quantity import GAP, IN_ASCII
+from acquire.cv2_loader import drawn_letters, load_cv2
 from live.ui.rerun.messages import LargeFigures
 
 WIDTH, HEIGHT = 1600, 168
@@ -62,7 +61,7 @@ def _write(
     """Write text of ``height`` px on a base line, smaller where it would be wider than ``width``."""
     cv2 = load_cv2()
     font, thick = cv2.FONT_HERSHEY_SIMPLEX, 1 if is_thin else max(2, height // 12)
-    text = text.replace(GAP, " ").translate(IN_ASCII).encode("ascii", "replace").decode()
+    text = drawn_letters(text)
     scale = cv2.getFontScaleFromHeight(font, height, thick)
     (wide, _), _ = cv2.getTextSize(text, font, scale, thick)
     if wide > width:
