@@ -72,6 +72,7 @@ def choice(*allowed: str) -> Check:
 
 
 FLAG: Check = yes_or_no
+TEXT: Check = str
 
 
 def setting(check: Check, default: Any, words: str, unit: str = "") -> Any:
@@ -108,7 +109,15 @@ def read_settings(kind: type[Settings], address: Address) -> Settings:
     ConfigError
         An impossible value; an unknown one, unless all others are taken.
     """
-    options, found = Options(address), dict[str, Any]()
+    options = Options(address)
+    found = take_settings(kind, options)
+    options.done()
+    return found
+
+
+def take_settings(kind: type[Settings], options: Options) -> Settings:
+    """The settings ``kind`` of an address that may have more; raises ConfigError for an impossible value."""
+    address, found = options.address, dict[str, Any]()
     for one in fields(kind):  # type: ignore[arg-type]
         if "setting" in one.metadata:
             found[one.name] = options.read(one.name, one.default, one.metadata["setting"][0])
@@ -116,5 +125,4 @@ def read_settings(kind: type[Settings], address: Address) -> Settings:
         if OTHERS in one.metadata:
             keys = [key for key, _ in address.settings if key not in found]
             found[one.name] = {key: options.read(key, "", one.metadata[OTHERS][0]) for key in keys}
-    options.done()
     return kind(**found)
