@@ -117,9 +117,9 @@ def _described(path: str, one: Declared) -> Row:
 
 
 TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
+    **{name or "v4l2": partial(settings_table, name) for name in camera_settings()},
     "session": session_layout, "flags": flags, "means": means, "status": statuses,
     "response": response, "cycles": cycles, "channels": channels,
-    **{name or "v4l2": partial(settings_table, name) for name in camera_settings()},
 })  # fmt: skip
 PAGES = tuple(
     DOCS / f"{name}.md"
