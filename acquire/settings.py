@@ -50,10 +50,16 @@ class Setting:
         return ""
 
     @property
+    def plain_default(self) -> str:
+        """Its default as an address has it; "" where there is none."""
+        if isinstance(self.default, bool):
+            return "yes" if self.default else "no"
+        return "" if self.default is None else str(self.default)
+
+    @property
     def stands(self) -> str:
         """Its default in words; "" where there is none."""
-        shown = self.default if not isinstance(self.default, bool) else "yes" if self.default else "no"
-        return "" if shown in (None, "") else f"default {shown}"
+        return f"default {self.plain_default}" if self.plain_default else ""
 
 
 def number(low: float = -math.inf, high: float = math.inf) -> Check:

@@ -13,12 +13,14 @@ import pytest
 from babel.messages.extract import extract
 
 from acquire.events import EventKind
+from acquire.settings import settings_of
 from acquire.text import Message
 from acquire.text.message import FIELD, about, fields
 from analysis.evaluate import GAUGE_KINDS
 from live.results.maps.field_maps import FIELD_MAPS
 from live.results.quantities import KNOWN as QUANTITIES
 from live.results.report.record import FIGURES
+from live.setup.devices import camera_settings
 from live.words import language
 from live.words.language import LANGUAGES, entries, parsed, said
 from tests.live.ui.web.browser import ROOT
@@ -151,6 +153,7 @@ def test_every_text_of_the_page_is_translated(name: str) -> None:
     served = {word for kind in GAUGE_KINDS.values() for word in (kind.label, kind.hint)}
     served |= {str(kind) for kind in EventKind}
     served |= {one.words for one in QUANTITIES.values() if not isinstance(one.words, Message)}
+    served |= {one.words for kind in camera_settings().values() for one in settings_of(kind)}
     served |= {words for _, _, words in FIGURES} | {item for item, _, _ in practice_rows()}
     assert not {text for text in {*of_the_page(), *FIELD_MAPS, *served} if text not in entries(name)}
 
