@@ -195,7 +195,12 @@ class Options:
 
     def read(self, key: str, default: Value, check: Callable[[str], Value]) -> Value:
         """What ``check`` makes of the setting, or ``default``; the ``NotAllowed`` that it raises names the setting."""
-        word = self.text(key)
+        self.text(key)
+        return self.again(key, default, check)
+
+    def again(self, key: str, default: Value, check: Callable[[str], Value]) -> Value:
+        """As ``read``, of a setting that was taken: for a check that depends on others."""
+        word = dict(self.address.settings).get(key)
         if word is None:
             return default
         try:

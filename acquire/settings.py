@@ -50,10 +50,16 @@ class Setting:
         return ""
 
     @property
+    def plain_default(self) -> str:
+        """Its default as an address has it; "" where there is none."""
+        if isinstance(self.default, bool):
+            return "yes" if self.default else "no"
+        return "" if self.default is None else str(self.default)
+
+    @property
     def stands(self) -> str:
         """Its default in words; "" where there is none."""
-        shown = self.default if not isinstance(self.default, bool) else "yes" if self.default else "no"
-        return "" if shown in (None, "") else f"default {shown}"
+        return f"default {self.plain_default}" if self.plain_default else ""
 
 
 def number(low: float = -math.inf, high: float = math.inf) -> Check:
@@ -72,6 +78,7 @@ def choice(*allowed: str) -> Check:
 
 
 FLAG: Check = yes_or_no
+TEXT: Check = str
 
 
 def setting(check: Check, default: Any, words: str, unit: str = "") -> Any:
@@ -108,7 +115,15 @@ def read_settings(kind: type[Settings], address: Address) -> Settings:
     ConfigError
         An impossible value; an unknown one, unless all others are taken.
     """
-    options, found = Options(address), dict[str, Any]()
+    options = Options(address)
+    found = take_settings(kind, options)
+    options.done()
+    return found
+
+
+def take_settings(kind: type[Settings], options: Options) -> Settings:
+    """The settings ``kind`` of an address that may have more; raises ConfigError for an impossible value."""
+    address, found = options.address, dict[str, Any]()
     for one in fields(kind):  # type: ignore[arg-type]
         if "setting" in one.metadata:
             found[one.name] = options.read(one.name, one.default, one.metadata["setting"][0])
@@ -116,5 +131,4 @@ def read_settings(kind: type[Settings], address: Address) -> Settings:
         if OTHERS in one.metadata:
             keys = [key for key, _ in address.settings if key not in found]
             found[one.name] = {key: options.read(key, "", one.metadata[OTHERS][0]) for key in keys}
-    options.done()
     return kind(**found)

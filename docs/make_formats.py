@@ -14,7 +14,6 @@ from types import MappingProxyType
 
 import numpy as np
 
-from acquire.camera import CAMERAS
 from acquire.events import EventKind
 from acquire.frame import CameraInfo
 from acquire.hdf5 import NO_UNIT, Declared
@@ -27,6 +26,7 @@ from live.results.finished.cycles import COLUMNS as CYCLES
 from live.results.quantities import quantity_of
 from live.results.response import stored
 from live.results.strain_csv import COLUMNS
+from live.setup.devices import camera_settings
 
 DOCS = Path(__file__).parent
 HEIGHT, WIDTH, ZOIS = 64, 80, (3, 5)
@@ -93,7 +93,7 @@ def flags() -> str:
     return f"Bits of `load/flags`: {bits}.\n\nKinds of events: {', '.join(EventKind)}."
 
 
-def camera_settings(scheme: str) -> str:
+def settings_table(scheme: str) -> str:
     """The settings of an address of a kind of camera."""
     rows = (
         (
@@ -102,7 +102,7 @@ def camera_settings(scheme: str) -> str:
             one.allowed,
             one.words + f"; {one.stands}" * bool(one.stands),
         )
-        for one in settings_of(dict(CAMERAS.settings())[scheme])
+        for one in settings_of(camera_settings()[scheme])
     )
     return table(("setting", "unit", "allowed", "meaning"), rows)
 
@@ -117,9 +117,9 @@ def _described(path: str, one: Declared) -> Row:
 
 
 TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
+    **{name or "v4l2": partial(settings_table, name) for name in camera_settings()},
     "session": session_layout, "flags": flags, "means": means, "status": statuses,
     "response": response, "cycles": cycles, "channels": channels,
-    **{name or "v4l2": partial(camera_settings, name) for name, _ in CAMERAS.settings()},
 })  # fmt: skip
 PAGES = tuple(
     DOCS / f"{name}.md"

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from acquire.addresses import Options
+from acquire.addresses import Address
 from acquire.errors import ConfigError
 from hw_mocks.machine import Array, FlowCurve, Programme
+from hw_mocks.sim_settings import CyclicSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,24 +53,14 @@ class Cyclic(Programme):
         return np.asarray(1 - self.fall * done / max(self.n - 1, 1))
 
 
-def take_cyclic(options: Options, material: FlowCurve) -> Cyclic:
-    """Take hz, r, n, fall, hold, end, seconds (at least) and max_strain out of the settings of an address.
-
-    Raises
-    ------
-    ConfigError
-        An impossible value, or a highest strain beyond yield.
-    """
-    hz, n = options.number("hz", 1.0, minimum=1e-4, maximum=1000), options.integer("n", 10, minimum=1)
-    fall = options.number("fall", 0.0, minimum=0, maximum=0.9)
-    top = options.number("max_strain", 1e-3, minimum=0, maximum=0.5)
+def take_cyclic(address: Address, given: CyclicSettings, material: FlowCurve) -> Cyclic:
+    """The programme of an address; raises ConfigError for a highest strain beyond yield."""
+    hz, n, top, fall = given.hz, int(given.n), given.max_strain, given.fall
     if top / (1 - fall) > material.yield_strain:
         raise ConfigError(
             "{text}: a cyclic test is elastic here; give max_strain below {strain:.3g}, or yield_MPa",
-            options.address.text,
+            address.text,
             material.yield_strain * (1 - fall),
         )
-    hold, end = options.number("hold", 2.0, minimum=0.1), options.number("end", 1 / hz, minimum=0)
-    ratio = options.number("r", 0.1, minimum=-10, maximum=0.99)
-    end = max(end, options.number("seconds", 0.1, minimum=0.1) - hold - n / hz)
-    return Cyclic(hold, n / hz, end, top / 2, top, n=n, ratio=ratio, fall=fall)
+    end = max(1 / hz if given.end is None else given.end, given.seconds - given.hold - n / hz)
+    return Cyclic(given.hold, n / hz, end, top / 2, top, n=n, ratio=given.r, fall=fall)

@@ -18,7 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from acquire.addresses import Options
 from acquire.errors import ConfigError
+from acquire.settings import number, take_settings
 from hw_mocks.deformation import Deformation, Gradient, SpecimenDeformation
+from hw_mocks.sim_settings import ViewSettings
 from hw_mocks.specimen import VirtualSpecimen
 
 Array = NDArray[np.float64]
@@ -281,33 +283,29 @@ def take_optics(options: Options) -> Optics:
     ConfigError
         An impossible value.
     """
-    stand_off = options.number("stand_off_mm", math.inf, minimum=1)
+    given = take_settings(ViewSettings, options)
+    stand_off = math.inf if given.stand_off_mm is None else given.stand_off_mm
     return Optics(
         stand_off_mm=stand_off,
-        distortion=options.number("distortion", 0.0, minimum=-10, maximum=10) / 100,
-        still=PlaneMotion(0.0, *_tilts(options, "tilt_x_deg", "tilt_y_deg")),
+        distortion=given.distortion / 100,
+        still=PlaneMotion(0.0, math.radians(given.tilt_x_deg), math.radians(given.tilt_y_deg)),
         settling=PlaneMotion(
-            options.number("settle_mm", 0.0, minimum=-0.5 * stand_off, maximum=0.5 * stand_off),
-            *_tilts(options, "settle_x_deg", "settle_y_deg"),
+            options.again("settle_mm", 0.0, number(-0.5 * stand_off, 0.5 * stand_off)),
+            math.radians(given.settle_x_deg),
+            math.radians(given.settle_y_deg),
         ),
-        plates=_plates(options),
-        plate_strain=options.number("plate_strain", 0.0, minimum=-1, maximum=2),
-        readout_s=options.number("readout_ms", 0.0, minimum=0, maximum=1000) * 1e-3,
-        flicker=options.number("flicker", 0.0, minimum=0, maximum=50) / 100,
-        lamp_Hz=options.number("lamp_hz", 100.0, minimum=1, maximum=1e5),
-        behind=options.choice("side", ("front", "back"), "front") == "back",
-        bending=options.number("bending", 0.0, minimum=-100, maximum=100) / 100,
+        plates=_plates(options, given.plates),
+        plate_strain=given.plate_strain,
+        readout_s=given.readout_ms * 1e-3,
+        flicker=given.flicker / 100,
+        lamp_Hz=given.lamp_hz,
+        behind=given.side == "back",
+        bending=given.bending / 100,
     )
 
 
-def _tilts(options: Options, *keys: str) -> tuple[float, float]:
-    first, second = (math.radians(options.number(key, 0.0, minimum=-30, maximum=30)) for key in keys)
-    return first, second
-
-
-def _plates(options: Options) -> tuple[Box, ...]:
+def _plates(options: Options, text: str) -> tuple[Box, ...]:
     """``x,y,width,height`` of each plate, px, with a semicolon between two."""
-    text = options.text("plates", "")
     try:
         found = [tuple(float(side) for side in plate.split(",")) for plate in text.split(";") if plate]
     except ValueError:

@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 
 from acquire.addresses import Options
 from acquire.frame import frozen
+from acquire.settings import take_settings
 from hw_mocks.optics import Optics
+from hw_mocks.sim_settings import SensorSettings
 from hw_mocks.specimen import VirtualSpecimen
 from hw_mocks.speckle import Hole, Speckle
 
@@ -79,7 +81,6 @@ def _travel(specimen: VirtualSpecimen, optics: Optics) -> float:
     return max(float(np.max(np.hypot(u, v))) for u, v in ways)
 
 
-BITS = (8, 10, 12, 16)
 READ_SHARE = 0.04  # of the noise variance at mid-grey, where only the total is given
 
 
@@ -148,11 +149,9 @@ class Sensor:
 
 def take_sensor(options: Options) -> Sensor:
     """Take the keys of the sensor out of an address's settings; raises ConfigError for an impossible value."""
+    given = take_settings(SensorSettings, options)
     return Sensor.with_noise(
-        int(options.choice("bits", tuple(map(str, BITS)), "12")),
-        options.number("noise", 0.5, minimum=0, maximum=20) / 100,
-        fixed_pattern=options.number("fpn", 0.0, minimum=0, maximum=20) / 100,
-        brightness=options.number("brightness", 1.0, minimum=0.01, maximum=10),
+        int(given.bits), given.noise / 100, fixed_pattern=given.fpn / 100, brightness=given.brightness
     )
 
 

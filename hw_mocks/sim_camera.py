@@ -25,10 +25,12 @@ from acquire.closing import Closing
 from acquire.errors import DeviceError
 from acquire.events import EventSink, device_event
 from acquire.frame import CameraInfo, CameraSetting, Clock, Frame
+from acquire.settings import number, take_settings
 from acquire.text import Message
 from hw_mocks.faults import CAMERA_FAULTS, FaultPlan, Planned, parse_faults, plan_frames
 from hw_mocks.optics import Optics, take_optics
 from hw_mocks.scene import Exposer, Scene, Sensor, rendered_fps, take_sensor, upper_half
+from hw_mocks.sim_settings import PictureSettings
 from hw_mocks.specimen import VirtualSpecimen, take_specimen
 
 log = logging.getLogger(__name__)
@@ -322,16 +324,7 @@ class SimCamera(Closing):
 
 
 def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpecimen) -> SimCamera:
-    """Open ``sim:KIND?key=value...`` on a specimen made by ``specimen_from`` of the same address.
-
-    Keys, beside those of the specimen (width, height, seconds, hold, end, max_strain, E_GPa, nu,
-    yield_MPa, yield2_MPa (of halves), section_mm2, px_per_mm, n, r, neck, axis, hole, cell, overstrain, drift_x,
-    drift_y, rotation_deg, lockstep, machine, waits, programme=cyclic with hz, r, n and fall): fps (a number, or auto:
-    what this machine renders with ease), bits, noise (% of full scale at mid-grey), fpn (%), brightness, exposure_us,
-    radius (px), contrast (%), seed, buffers, offset (s), faults. Of the view (``hw_mocks.optics``): stand_off_mm
-    (none: telecentric), distortion (% at the corner), tilt_x_deg, tilt_y_deg, settle_mm, settle_x_deg, settle_y_deg
-    (reached at the largest load), plates (x,y,width,height;...), plate_strain, readout_ms, flicker (%), lamp_hz, side,
-    bending (%, of the front).
+    """Open ``sim:KIND?key=value...`` (``SimSettings``) on a specimen made by ``specimen_from`` of the same address.
 
     Raises
     ------
@@ -361,20 +354,18 @@ def _automatic(options: Options) -> bool:
 
 
 def _take_camera(options: Options) -> SimCameraSettings:
-    if _automatic(options):
-        fps = AUTO_FPS[0]
-        options.text("fps")
-    else:
-        fps = options.number("fps", 60.0, minimum=0.1, maximum=10_000)
+    given = take_settings(PictureSettings, options)
+    fps = given.fps or AUTO_FPS[0]
+    exposure_us = options.again("exposure_us", min(2000.0, 5e5 / fps), number(0, 1e6 / fps))
     return SimCameraSettings(
         sensor=take_sensor(options),
         fps=fps,
-        exposure_s=options.number("exposure_us", min(2000.0, 5e5 / fps), minimum=0, maximum=1e6 / fps) * 1e-6,
-        radius_px=options.number("radius", 2.0, minimum=0.7, maximum=64),
-        contrast=options.number("contrast", 18.0, minimum=1, maximum=20) / 100,
-        seed=options.integer("seed", 0, minimum=0),
-        buffers=options.integer("buffers", 4, minimum=1, maximum=1000),
-        offset_s=options.number("offset", 0.0, minimum=0),
-        faults=parse_faults(options.text("faults", ""), CAMERA_FAULTS, options.address.text),
+        exposure_s=exposure_us * 1e-6,
+        radius_px=given.radius,
+        contrast=given.contrast / 100,
+        seed=given.seed,
+        buffers=given.buffers,
+        offset_s=given.offset,
+        faults=parse_faults(given.faults, CAMERA_FAULTS, options.address.text),
         optics=take_optics(options),
     )

@@ -28,7 +28,8 @@ from hw_mocks.indicator import AsciiIndicator, Indicator, Style
 from hw_mocks.indicator_output import Sensing
 from hw_mocks.indicator_server import IndicatorServer
 from hw_mocks.sim_indicators import INDICATORS, HbmAedIndicator
-from hw_mocks.specimen import SPECIMEN_KEYS, VirtualSpecimen, take_specimen
+from hw_mocks.sim_settings import SPECIMEN_KEYS
+from hw_mocks.specimen import VirtualSpecimen, take_specimen
 
 log = logging.getLogger(__name__)
 STYLES: tuple[Style, ...] = ("millis", "plain", "label", "openscale")

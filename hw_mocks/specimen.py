@@ -16,45 +16,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from acquire.addresses import Address, Options
 from acquire.errors import ConfigError
+from acquire.settings import take_settings
 from hw_mocks.cyclic import take_cyclic
 from hw_mocks.deformation import Gradient, SpecimenDeformation
 from hw_mocks.machine import FlowCurve, Machine, PowerLaw, Programme, Pull, TestClock
+from hw_mocks.sim_settings import CyclicSettings, SpecimenSettings
 from hw_mocks.strain_modes import NECK_AT, Axis, Kind, StrainModes
 
 Array = NDArray[np.float64]
 KINDS: tuple[Kind, ...] = ("uniform", "hole", "woven", "halves")
-SPECIMEN_KEYS = frozenset(
-    {
-        "width",
-        "height",
-        "E_GPa",
-        "nu",
-        "yield_MPa",
-        "yield2_MPa",
-        "n",
-        "r",
-        "seconds",
-        "hold",
-        "end",
-        "max_strain",
-        "axis",
-        "section_mm2",
-        "px_per_mm",
-        "hole",
-        "cell",
-        "overstrain",
-        "neck",
-        "drift_x",
-        "drift_y",
-        "rotation_deg",
-        "lockstep",
-        "machine",
-        "waits",
-        "programme",
-        "hz",
-        "fall",
-    }
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -232,32 +202,32 @@ def specimen_from(address: Address) -> VirtualSpecimen:
 
 def take_specimen(options: Options) -> VirtualSpecimen:
     """Take the keys of the specimen out of an address's settings; raises as ``specimen_from``."""
-    kind, cyclic = _kind(options.address), options.choice("programme", ("pull", "cyclic"), "pull") == "cyclic"
+    kind, address = _kind(options.address), options.address
+    cyclic = ("programme", "cyclic") in address.settings
+    given = take_settings(CyclicSettings if cyclic else SpecimenSettings, options)
     if cyclic and kind == "halves":
-        raise ConfigError(
-            "{text}: halves are pulled, programme=cyclic is for the others", options.address.text
-        )
-    material = _take_material(options, 120.0 if kind == "halves" else 140.0, metal=not cyclic)
+        raise ConfigError("{text}: halves are pulled, programme=cyclic is for the others", address.text)
+    material = _material(given, 120.0 if kind == "halves" else 140.0)
     clock = TestClock()
     return VirtualSpecimen(
         kind=kind,
-        width=options.integer("width", 640, minimum=32, maximum=8192),
-        height=options.integer("height", 512, minimum=32, maximum=8192),
+        width=given.width,
+        height=given.height,
         material=material,
-        programme=take_cyclic(options, material)
-        if cyclic and isinstance(material, FlowCurve)
-        else _take_programme(options, material, clock),
-        axis="x" if options.choice("axis", ("y", "x"), "y") == "x" else "y",
-        area_m2=options.number("section_mm2", 40.0, minimum=1e-3) * 1e-6,
-        px_per_m=options.number("px_per_mm", 20.0, minimum=1e-3) * 1e3,
-        hole_radius_px=options.number("hole", 60.0, minimum=4),
-        cell_px=options.number("cell", 96.0, minimum=8),
-        overstrain=options.number("overstrain", 0.6, minimum=0, maximum=0.95),
-        neck_px=_take_neck(options, kind, material),
-        second=_take_second(options, kind, material),
-        drift_px=(options.number("drift_x", 0.0), options.number("drift_y", 0.0)),
-        rotation_rad=math.radians(options.number("rotation_deg", 0.0, minimum=-45, maximum=45)),
-        nominal=options.flag("lockstep"),
+        programme=take_cyclic(address, given, material)
+        if isinstance(given, CyclicSettings) and isinstance(material, FlowCurve)
+        else _programme(address, given, material, clock),
+        axis="x" if given.axis == "x" else "y",
+        area_m2=given.section_mm2 * 1e-6,
+        px_per_m=given.px_per_mm * 1e3,
+        hole_radius_px=given.hole,
+        cell_px=given.cell,
+        overstrain=given.overstrain,
+        neck_px=_checked_neck(address, given.neck, kind, material),
+        second=_second(address, given.yield2_MPa, kind, material),
+        drift_px=(given.drift_x, given.drift_y),
+        rotation_rad=math.radians(given.rotation_deg),
+        nominal=given.lockstep,
         clock=clock,
     )
 
@@ -275,56 +245,49 @@ def _kind(address: Address) -> Kind:
     )
 
 
-def _take_neck(options: Options, kind: Kind, material: FlowCurve | PowerLaw) -> float:
-    width = options.number("neck", 0.0, minimum=4, maximum=8192)
+def _checked_neck(address: Address, width: float, kind: Kind, material: FlowCurve | PowerLaw) -> float:
     if width and (kind != "uniform" or not isinstance(material, PowerLaw)):
-        raise ConfigError(
-            "{text}: a neck needs sim:uniform of a sheet metal; give n or r", options.address.text
-        )
+        raise ConfigError("{text}: a neck needs sim:uniform of a sheet metal; give n or r", address.text)
     return width
 
 
-def _take_second(options: Options, kind: Kind, material: FlowCurve | PowerLaw) -> FlowCurve | None:
-    strength = options.number("yield2_MPa", minimum=1e-3)
+def _second(
+    address: Address, strength: float | None, kind: Kind, material: FlowCurve | PowerLaw
+) -> FlowCurve | None:
     if kind != "halves" and strength is None:
         return None
     if kind != "halves" or not isinstance(material, FlowCurve):
-        raise ConfigError("{text}: yield2_MPa is of sim:halves, which have no n or r", options.address.text)
+        raise ConfigError("{text}: yield2_MPa is of sim:halves, which have no n or r", address.text)
     return replace(material, yield_stress=(160.0 if strength is None else strength) * 1e6)
 
 
-def _take_material(options: Options, yield_MPa: float, *, metal: bool) -> FlowCurve | PowerLaw:
-    """Sheet metal of given n and r, where one of them is given; not ``metal``: they are of the programme."""
-    modulus = options.number("E_GPa", 70.0, minimum=1e-3) * 1e9
-    nu = options.number("nu", 0.33, minimum=0, maximum=0.5)
-    strength = options.number("yield_MPa", yield_MPa, minimum=1e-3) * 1e6
-    n = options.number("n", minimum=0.01, maximum=0.9) if metal else None
-    r = options.number("r", minimum=0.05, maximum=10) if metal else None
-    if n is None and r is None:
+def _material(given: SpecimenSettings, yield_MPa: float) -> FlowCurve | PowerLaw:
+    """Sheet metal of given n and r, where one of them is given and they are not of the programme."""
+    modulus, nu = given.E_GPa * 1e9, given.nu
+    strength = (yield_MPa if given.yield_MPa is None else given.yield_MPa) * 1e6
+    if given.programme == "cyclic" or (given.n is None and given.r is None):
         return FlowCurve(E=modulus, nu=nu, yield_stress=strength)
-    return PowerLaw(0.2 if n is None else n, 1.0 if r is None else r, modulus, nu, strength)
+    n, r = 0.2 if given.n is None else given.n, 1.0 if given.r is None else given.r
+    return PowerLaw(n, r, modulus, nu, strength)
 
 
-def _take_programme(options: Options, material: FlowCurve | PowerLaw, clock: TestClock) -> Programme:
-    seconds = options.number("seconds", 20.0, minimum=0.1)
+def _programme(
+    address: Address, given: SpecimenSettings, material: FlowCurve | PowerLaw, clock: TestClock
+) -> Programme:
+    seconds, top = given.seconds, given.max_strain
     # A short test keeps its parts in proportion unless they are given.
-    hold = options.number("hold", min(2.0, 0.1 * seconds), minimum=0)
-    end = options.number("end", min(1.0, 0.05 * seconds), minimum=0)
-    top = options.number("max_strain", 8e-3, minimum=0, maximum=0.5)
+    hold = min(2.0, 0.1 * seconds) if given.hold is None else given.hold
+    end = min(1.0, 0.05 * seconds) if given.end is None else given.end
     if hold + end >= seconds:
         raise ConfigError(
             "{text}: hold and end leave no time to pull; give seconds above {hold:g}",
-            options.address.text,
+            address.text,
             hold + end,
         )
     plastic = top > material.yield_strain
     knee_strain, knee = (material.yield_strain, 0.6) if plastic else (top / 2, 0.5)
-    pull = Pull() if options.flag("waits") else None
-    machine = _machine(options, material, clock)
-    return Programme(hold, seconds - hold - end, end, knee_strain, top, knee, machine, pull)
-
-
-def _machine(options: Options, material: FlowCurve | PowerLaw, clock: TestClock) -> Machine | None:
-    """The machine that another program drives over this port, where there is one."""
-    port = options.integer("machine", minimum=0, maximum=65535)
-    return None if port is None else Machine(port, material.yield_strain, clock.elapsed)
+    port = given.machine
+    machine = None if port is None else Machine(port, material.yield_strain, clock.elapsed)
+    return Programme(
+        hold, seconds - hold - end, end, knee_strain, top, knee, machine, Pull() if given.waits else None
+    )

@@ -59,6 +59,7 @@ CAMERAS: Registry[Camera] = Registry(
         "opencv": "acquire.opencv.webcam:OpenCVSettings",
         "video": "acquire.opencv.video:VideoSettings",
         "files": "acquire.opencv.images:FileSettings",
+        "session": "acquire.session.devices:SessionSettings",
     },
 )
 

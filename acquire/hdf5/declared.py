@@ -304,7 +304,8 @@ def check_format(path: Path, file: h5py.File, root: Mapping[str, Declared], want
     found = as_text(read_attribute(file, "format", root["format"])) if there else None
     if found != wanted:
         shown = Message("something else") if found is None else repr(found[:40])
-        raise DataError("{path}: holds {found}, not {wanted}; give another file", path, shown, wanted)
+        kind = wanted.removeprefix("phasedic-")
+        raise DataError("{path}: holds {found}: not a {kind} file of phasedic", path, shown, kind)
     version = int(read_attribute(file, "format_version", root["format_version"]))
     if version > newest:
         raise DataError(

@@ -8,14 +8,20 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 
-from acquire.addresses import Address, Options
+from acquire.addresses import Address
 from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError
 from acquire.events import EventSink, device_event
 from acquire.frame import CameraInfo, Frame
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.session.reader import Session
+from acquire.settings import read_settings
 from acquire.text import Message
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class SessionSettings:
+    """Of ``session:``: none; what was recorded is not changed."""
 
 
 class _SessionDevice(Closing):
@@ -101,7 +107,7 @@ def open_session_load(address: Address, on_event: EventSink) -> SessionLoadCell:
 
 
 def _open(address: Address, on_event: EventSink) -> Session:
-    Options(address).done()
+    read_settings(SessionSettings, address)
     if not address.target:
         raise ConfigError("{text}: name the file, for example session:run.h5", address.text)
     session = Session.open(address.target)

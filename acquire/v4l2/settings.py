@@ -39,7 +39,7 @@ class V4L2Settings:
     buffers: int = setting(whole(2, 32), 8, "pictures that the driver holds")
     stall_s: float | None = setting(number(0.1), None,
         "time without a picture that counts as a stall (default five frame periods and the exposure, at least 0.5);"
-        " give a triggered camera more than its longest pause", "s")
+        " more than the longest pause of a trigger", "s")
     manual: bool = setting(FLAG, True, "no: leave automatic controls on (not for measuring)")
     exposure_us: float | None = setting(number(1), None, "exposure (cameras count in steps of 100)", "us")
     gain: int | None = setting(whole(), None, "in the camera's own steps")

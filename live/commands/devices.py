@@ -46,10 +46,10 @@ def command(arguments: argparse.Namespace) -> int:
 
 
 def _settings() -> int:
-    from acquire.camera import CAMERAS
     from acquire.settings import settings_of
+    from live.setup.devices import camera_settings
 
-    for scheme, kind in CAMERAS.settings():
+    for scheme, kind in camera_settings().items():
         print_line(f"{scheme}:" if scheme else "/dev/...:")
         for one in settings_of(kind):
             more = "; ".join(filter(None, (one.allowed, one.unit, one.stands)))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from acquire.addresses import parse_address, with_setting
-from acquire.camera import Camera, CroppedCamera, open_camera
+from acquire.camera import CAMERAS, Camera, CroppedCamera, open_camera
 from acquire.errors import ConfigError
 from acquire.events import Event, EventSink, ignore_event
 from acquire.load_cell import LoadCell, ZeroedLoadCell, open_load_cell
@@ -107,7 +107,7 @@ def open_rigs(
 
 def _check_one_specimen(addresses: Sequence[str]) -> None:
     """Raises ConfigError where two simulated cameras would have different specimens."""
-    from hw_mocks.specimen import SPECIMEN_KEYS
+    from hw_mocks.sim_settings import SPECIMEN_KEYS
 
     found = [parse_address(address) for address in addresses]
     for other in found[1:]:
@@ -135,6 +135,13 @@ def check_load_sign(load: LoadConfig) -> None:
         raise ConfigError(
             "load.sign is for files and recordings (replay, batch); for a load cell give sign=-1 in its address"
         )
+
+
+def camera_settings() -> dict[str, type]:
+    """The class of the settings of every kind of camera, by scheme."""
+    from hw_mocks.sim_settings import SimSettings
+
+    return {"sim": SimSettings, **dict(CAMERAS.settings())}
 
 
 def at_rest(address: str) -> str:

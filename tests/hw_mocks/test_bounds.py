@@ -9,6 +9,7 @@ import pytest
 from acquire.addresses import Options, parse_address
 from acquire.errors import ConfigError
 from acquire.events import ignore_event
+from acquire.settings import settings_of
 from hw_mocks.faults import CAMERA_FAULTS, SERIAL_FAULTS
 from hw_mocks.machine import FlowCurve, PowerLaw
 from hw_mocks.memory_camera import MemorySettings, open_memory_camera
@@ -16,7 +17,8 @@ from hw_mocks.optics import Optics, take_optics
 from hw_mocks.scene import Sensor, take_sensor
 from hw_mocks.sim_camera import SimCameraSettings, open_sim_camera
 from hw_mocks.sim_load_cell import SimLoadSettings, open_sim_load
-from hw_mocks.specimen import SPECIMEN_KEYS, VirtualSpecimen, specimen_from, take_specimen
+from hw_mocks.sim_settings import SPECIMEN_KEYS, SimSettings
+from hw_mocks.specimen import VirtualSpecimen, specimen_from, take_specimen
 
 SPECIMEN = {
     "width": "a whole number from 32 to 8192",
@@ -129,6 +131,10 @@ def test_bounds_that_follow_from_other_settings() -> None:
     assert refusal("camera", "fps=50&exposure_us=20001") == "a number from 0 to 20000"
     assert refusal("camera", "stand_off_mm=300&settle_mm=151") == "a number from -150 to 150"
     assert {*SPECIMEN, *CYCLIC} == SPECIMEN_KEYS
+    cycles = {key: CYCLIC[key] for key in ("hz", "fall")}
+    further = {"settle_mm": "a number", "exposure_us": "a number from 0"}
+    declared = {one.key: one.allowed for one in settings_of(SimSettings) if one.allowed}
+    assert declared == SPECIMEN | cycles | CAMERA | further
     for key, allowed in CYCLIC.items():
         assert refusal("camera", f"programme=cyclic&{key}=nonsense") == allowed
 

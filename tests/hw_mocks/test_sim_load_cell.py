@@ -21,7 +21,8 @@ from hw_mocks.indicator_output import Sensing
 from hw_mocks.indicator_server import IndicatorServer, PtyPort
 from hw_mocks.sim_indicators import INDICATORS
 from hw_mocks.sim_load_cell import NominalLoadCell, SimLoadCell, open_sim_load
-from hw_mocks.specimen import SPECIMEN_KEYS, VirtualSpecimen, specimen_from, take_specimen
+from hw_mocks.sim_settings import SPECIMEN_KEYS
+from hw_mocks.specimen import VirtualSpecimen, specimen_from, take_specimen
 
 
 def opened(text: str, on_event=ignore_event) -> tuple[LoadCell, VirtualSpecimen]:

@@ -27,6 +27,7 @@ from live.config.listen_address import listening_socket
 from live.pipeline.latency import OUTPUT
 from live.ui.web.authorization import HttpError, RequestCheck
 from live.ui.web.broadcaster import Broadcaster, json_bytes
+from live.ui.web.setup.device_lists import camera_kinds
 from live.words.language import LANGUAGES, entries
 
 log = logging.getLogger(__name__)
@@ -96,7 +97,9 @@ def json_response(value: Any) -> Response:
 
 
 def _file(path: str) -> Response:
-    """A file of the page, or the entries of a language; raises ``HttpError``."""
+    """A file of the page, the entries of a language, or the settings of cameras; raises ``HttpError``."""
+    if path == "/settings.json":
+        return json_response(camera_kinds())
     if path in (f"/words/{language}.json" for language in LANGUAGES):
         return json_response(entries(path[7:9]))
     return static("index.html" if path == "/" else path.removeprefix("/static/"))

@@ -13,8 +13,10 @@ from acquire.errors import PhasedicError
 from acquire.serial_line import identify
 from acquire.serial_line.identify import Finding
 from acquire.serial_line.ports import LineSettings, PortInfo, list_serial_ports
+from acquire.settings import settings_of
 from acquire.text import Message
 from acquire.text.printable import brief, printable
+from live.setup.devices import camera_settings
 
 log = logging.getLogger(__name__)
 
@@ -119,6 +121,17 @@ class DeviceLists:
         """The address of a port first in the list of load cells."""
         known = [one for one in self._loads if one["address"] != finding.address]
         self._loads = [{"address": finding.address, "name": finding.protocol}, *known]
+
+
+def camera_kinds() -> dict[str, list[dict[str, str]]]:
+    """The settings of an address of each kind of camera, by scheme, as the page shows them."""
+    return {
+        scheme: [
+            {"key": one.key, "default": one.plain_default, "unit": one.unit, "words": one.words}
+            for one in settings_of(kind)
+        ]
+        for scheme, kind in camera_settings().items()
+    }
 
 
 def _shown(one: CameraListing) -> dict[str, str]:

@@ -26,12 +26,45 @@ onChoice($("format"), (value) => change({ do: "option", key: "format", value }))
 const rate = numberField($("rate"), { unit: "1/s", onvalue: (value) => change({ do: "option", key: "fps", value: value ?? "" }) });
 $("identify").addEventListener("click", () => change({ do: "identify", port: $("loadaddress").value.split("?")[0] }));
 
+// The settings of each kind of camera, as the program declares them. A changed one is written into the address.
+let kinds = {}, addressNow = "";
+const kindOf = (address) => /^([A-Za-z][\w+.-]+):/.exec(address)?.[1] ?? "";
+fetch("/settings.json").then(async (answer) => { if (answer.ok) kinds = await answer.json(); showKind(addressNow); }, () => {});
+
+function withSetting(address, key, value) {
+  const [, body, query = ""] = /^(.*?)(?:\?([A-Za-z_]\w*=[^?]*))?$/.exec(address);
+  const others = query.split("&").filter((pair) => pair && pair.split("=")[0] !== key);
+  if (value) others.push(`${key}=${encodeURIComponent(value)}`);
+  return others.length ? `${body}?${others.join("&")}` : body;
+}
+
+function showKind(address) {
+  addressNow = address;
+  const given = new URLSearchParams(address.slice(address.lastIndexOf("?") + 1)), settings = kinds[kindOf(address)] ?? [];
+  $("kind").hidden = !settings.length;
+  if ($("kindsettings").contains(document.activeElement)) return;
+  fill($("kindsettings"), settings.map((one) => ({ ...one, value: given.get(one.key) ?? "" })), settingRow);
+}
+
+function settingRow({ key, value, words, unit, default: preset }) {
+  const input = el("input", { type: "text", maxLength: 80, value, placeholder: preset, autocomplete: "off", "aria-label": `${key} ${t(words)}` });
+  input.addEventListener("change", async () => {
+    input.blur();
+    const answer = await change({ do: "address", value: withSetting(addressNow, key, input.value.trim()) });
+    if (answer.refused) input.value = value;
+  });
+  onEscape(input, () => { input.value = value; input.blur(); });
+  const field = key ? el("span", { class: "box" }, input, el("span", { class: "unit", text: unit })) : "";
+  return el("tr", {}, el("th", {}, el("span", key ? { text: key } : { t: "others" }), el("small", { t: words })), el("td", {}, field));
+}
+
 export function showDevices(value) {
   const { devices, load } = value;
   shown = devices;
   offer($("cameras"), devices.cameras, value.address);
   offer($("loads"), devices.loads, load.address);
   keep($("cameraaddress"), value.address);
+  showKind(value.address);
   keep($("loadaddress"), load.address);
   const query = new URLSearchParams(value.address.split("?")[1] ?? "");
   offerFormats(value.camera?.formats ?? [], value.camera?.format ?? "", query.get("format") ?? "");
