@@ -11,7 +11,7 @@ from acquire.text.message import about, formatted
 from acquire.text.quantity import Amount
 from live.words.language import told
 from tests.acquire.test_quantity import CASES, quantity_of
-from tests.live.ui.web.conftest import Start
+from tests.live.ui.web.made_page import MadePage
 
 pytestmark = pytest.mark.slow
 
@@ -27,8 +27,8 @@ QUANTITIES = """async ([language, cases]) => { const { setLanguage } = await imp
     await setLanguage(language); return cases.map(quantityText); }"""
 
 
-def test_numbers_are_those_of_python(start: Start) -> None:
-    page = start()
+def test_numbers_are_those_of_python(browser: Any) -> None:
+    page = MadePage(browser)
     # JSON knows no difference between 1.0 and 1, and JavaScript shows the latter.
     cases = [(value, spec) for value in VALUES for spec in FORMATS if spec or value != int(value)]
     shown = page.page.evaluate(NUMBERS, cases)
@@ -38,16 +38,16 @@ def test_numbers_are_those_of_python(start: Start) -> None:
 
 
 @pytest.mark.parametrize("language", ["en", "de", "fr"])
-def test_quantities_are_those_of_the_table(start: Start, language: str) -> None:
-    page = start()
+def test_quantities_are_those_of_the_table(browser: Any, language: str) -> None:
+    page = MadePage(browser)
     cases = [case for case in CASES if language in case]
     sent = [quantity_of(case).to_json() for case in cases]
     assert page.page.evaluate(QUANTITIES, [language, sent]) == [case[language] for case in cases]
 
 
 @pytest.mark.parametrize("language", ["en", "de", "fr"])
-def test_a_message_is_the_same_on_the_page_and_in_a_terminal(start: Start, language: str) -> None:
-    page = start()
+def test_a_message_is_the_same_on_the_page_and_in_a_terminal(browser: Any, language: str) -> None:
+    page = MadePage(browser)
     text = about(
         "/dev/video0",
         Message("no picture for {waited:.1f} s; still waiting (trigger, cable, light control?)", 2.13),
@@ -68,8 +68,8 @@ def test_a_message_is_the_same_on_the_page_and_in_a_terminal(start: Start, langu
         assert page.page.evaluate(FILL, [language, sent]) == told(one, language)
 
 
-def test_without_entries_the_page_stays_english(start: Start) -> None:
-    page = start()
+def test_without_entries_the_page_stays_english(browser: Any) -> None:
+    page = MadePage(browser)
     page.page.route("**/words/fr.json", lambda route: route.fulfill(status=404))
     message = Message("measuring is paused").to_json()
     assert page.page.evaluate(FILL, ["fr", message]) == "measuring is paused"
