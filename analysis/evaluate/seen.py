@@ -23,25 +23,26 @@ _EQUAL = 5  # readings in a row that may be those of a load cell that stands sti
 _BY_CHANCE = 1e-6  # how often so many may be equal in a living load cell
 _LEVELS = 3  # values at which readings rest: as many are the resolution of a quiet load cell
 _LOADED = 0.05  # of the highest stress
-_AROUND, _SAME_RATE = 8, 0.5  # readings before and after a fall, and how much the strain rates may differ
+_AROUND, _SAME_RATE = 8, 0.5  # readings before and after a fall; how much strain rates of one motion differ
 
 
 def without_stopped(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
     """The curve without the stresses of a load cell that stood still or fell out, and words that say so."""
     known = np.flatnonzero(np.isfinite(curve.stress) & np.isfinite(curve.strain))
-    runs = [known[a + 1 : b] for a, b in _stuck(curve.stress[known], curve.strain[known])]
-    words = [
-        Message(
-            "forces left out: the same to the last digit from {t:.4g} s to {end:.4g} s while the strain rises; does "
-            "the load cell reach its limit, or stop?",
-            curve.t[rows[0] - 1] - curve.t[0],
-            curve.t[rows[-1]] - curve.t[0],
-        )
-        for rows in runs
-    ]
-    left = replace(curve, stress=curve.stress.copy())
-    for rows in runs:
+    runs = _stuck(curve.stress[known], curve.strain[known])
+    rows = np.array([row for a, b in runs for row in known[a + 1 : b]], np.intp)
+    left, words = replace(curve, stress=curve.stress.copy()), []
+    if len(rows):
         left.stress[rows] = math.nan
+        words.append(
+            Message(
+                "forces left out: {n} the same to the last digit, from {t:.4g} s to {end:.4g} s, while the strain "
+                "rises; does the load cell reach its limit, or stop?",
+                len(rows),
+                curve.t[rows[0] - 1] - curve.t[0],
+                curve.t[rows[-1]] - curve.t[0],
+            )
+        )
     stop = broken_at(left.stress, left.strain)
     if stop is not None and _goes_on(left.strain, stop):
         left.stress[stop + 1 :] = math.nan
@@ -56,7 +57,7 @@ def without_stopped(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
 
 
 def _stuck(stress: Floats, strain: Floats) -> list[tuple[int, int]]:
-    """First and end of each run of equal stresses that noise cannot make, under load and while the strain rises."""
+    """First and end of each run of equal stresses that noise cannot make, under load and while the strain moves on."""
     same = np.flatnonzero(np.diff(np.concatenate([[False], np.diff(stress) == 0, [False]])))
     runs = [(int(a), int(b) + 1) for a, b in same.reshape(-1, 2) if b + 1 - a >= _EQUAL]
     rest = np.delete(stress, [k for a, b in runs for k in range(a, b)])
@@ -65,15 +66,27 @@ def _stuck(stress: Floats, strain: Floats) -> list[tuple[int, int]]:
         return []
     by_step = float(steps[steps > 0].min()) / (2 * math.sqrt(math.pi) * sigma)
     chance = min(max(by_step, float(np.mean(steps == 0))), 1.0)
-    least, rises = _LOADED * float(stress.max()), _SURE * noise(strain)
+    least = _LOADED * float(np.abs(stress).max())
     found = [
         (a, b)
         for a, b in runs
         if len(stress) * chance ** (b - a - 1) < _BY_CHANCE
-        and stress[a] > least
-        and strain[b - 1] - strain[a] > rises
+        and abs(stress[a]) > least
+        and _pulled_on(strain, a, b)
     ]
     return found if len({float(stress[a]) for a, _ in runs}) < _LEVELS else []
+
+
+def _pulled_on(strain: Floats, first: int, end: int) -> bool:
+    """Whether the strain changes about as fast as before: not a hold, nor creep under a weight."""
+    before = strain[max(2 * first - end, 0) : first]
+    if len(before) < _EQUAL:
+        return False
+    moved = float(np.ptp(strain[first:end]))
+    return bool(
+        moved > 1.5 * _SURE * noise(strain)
+        and moved / (end - first) > _SAME_RATE * np.ptp(before) / len(before)
+    )
 
 
 def _goes_on(strain: Floats, stop: int) -> bool:

@@ -140,7 +140,8 @@ def _with_forces(
     placed = table.placed(pictures, source.start, recorded=source.count is None)
     times = source.times if pictures is None else np.array([*pictures.values()])
     placed = placed.at_pictures(str(request.forces), config.load, times)
-    screen.print(joined("; ", (about(request.forces.name, table.export.taken), *placed.remarks)))
+    assumed = [] if named else _assumed_times(request.source)
+    screen.print(joined("; ", (about(request.forces.name, table.export.taken), *placed.remarks, *assumed)))
     return replace(source, samples=placed.samples(), loads=placed.log(config.load), doubts=placed.doubts)
 
 
@@ -155,6 +156,19 @@ def _picture_times(source: str, *, named: bool) -> dict[str, float] | None:
         if named:
             raise
         return None
+
+
+def _assumed_times(source: str) -> list[str]:
+    """A remark where the pictures have no times that those of the forces could fit."""
+    address = parse_address(with_scheme(source))
+    if address.scheme != "files" or {"fps", "stamps"} & dict(address.settings).keys():
+        return []
+    words = Message(
+        "the pictures have no times and are taken as 1 s apart; if they are not, give fps= or stamps=, as in "
+        "{example}",
+        f"'files:{address.target}?fps=2'",
+    )
+    return [words]
 
 
 def _in_test_time(event_log: EventLog) -> EventSink:

@@ -78,6 +78,18 @@ def test_what_rests_or_is_coarse_is_no_load_cell_that_stopped() -> None:
     assert without_stopped(slow) == (slow, ())
 
 
+def test_a_weight_that_hangs_on_a_quiet_load_cell_creeps() -> None:
+    """The readings have steps of 0.1 MPa and are interpolated to the pictures, so that nothing shows their steps."""
+    rng = np.random.default_rng(3)
+    ramp = np.round(np.linspace(0, 200, 200) + rng.normal(0, 0.5, 200))
+    t = np.arange(300) + 0.37
+    stress = np.interp(t, 0.3 * np.arange(1200), np.r_[ramp, np.full(1000, 200.0)] * 1e5)
+    strain = stress / E_PA + 2e-5 * np.log1p(np.maximum(t - 60, 0) / 5)
+    curve = Curve(t, strain + rng.normal(0, 4e-6, len(t)), stress)
+    assert without_stopped(curve) == (curve, ())
+    assert evaluate_test(curve).kind == "creep"
+
+
 def test_the_highest_stress_is_uncertain_by_its_resolution() -> None:
     found = evaluate_test(pulled(resolution=5e6)).Rm
     assert found.value == pytest.approx(310e6) and found.low < STRESS.max() < found.high

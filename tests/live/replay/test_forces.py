@@ -209,7 +209,9 @@ def test_a_folder_of_pictures_with_forces_by_name_has_a_curve(shots: Path, tmp_p
 
 
 @pytest.mark.parametrize("session", [False, True])
-def test_forces_by_time(shots: Path, tmp_path: Path, session: bool) -> None:
+def test_forces_by_time(
+    shots: Path, tmp_path: Path, session: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
     source = None
     if session:
         live = tmp_path / "run"
@@ -218,8 +220,15 @@ def test_forces_by_time(shots: Path, tmp_path: Path, session: bool) -> None:
     text = "time_s,force_N\n" + "".join(f"{t},{10 * t}\n" for t in (0, 2, 4, 6))
     code, out = replayed(shots, tmp_path, text, source=source)
     assert code == 0
+    assert ("the pictures have no times and are taken as 1 s apart" in capsys.readouterr().out) == (
+        not session
+    )
     with open_run(out) as run:
         np.testing.assert_allclose(run.force, 10 * run.strain.time_s, rtol=1e-9)
+    if not session:
+        replayed(shots, tmp_path, text, source=f"files:{shots}?fps=2")
+        said = capsys.readouterr().out
+        assert "pictures have a force" in said and "apart" not in said
 
 
 def test_names_must_fit(shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
