@@ -29,7 +29,7 @@ $("identify").addEventListener("click", () => change({ do: "identify", port: $("
 // The settings of each kind of camera, as the program declares them. A changed one is written into the address.
 let kinds = {}, addressNow = "";
 const kindOf = (address) => /^([A-Za-z][\w+.-]+):/.exec(address)?.[1] ?? "";
-fetch("/settings.json").then(async (answer) => { if (answer.ok) kinds = await answer.json(); showKind(addressNow); }, () => {});
+fetch("/settings.json").then((answer) => answer.json()).then((found) => { kinds = found; showKind(addressNow); }).catch(() => {});
 
 function withSetting(address, key, value) {
   const [, body, query = ""] = /^(.*?)(?:\?([A-Za-z_]\w*=[^?]*))?$/.exec(address);

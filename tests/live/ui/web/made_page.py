@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from live.ui.web.painting import as_jpeg
+from live.ui.web.setup.device_lists import camera_kinds
 from live.words.language import entries
 from tests.live.ui.web.browser import Page
 from tests.live.ui.web.page_texts import STATIC
@@ -80,6 +81,8 @@ class MadePage(Page):
             route.fulfill(body=file.read_bytes(), content_type=TYPES.get(file.suffix, "text/plain"))
         elif path.startswith("words/"):
             route.fulfill(body=json.dumps(dict(entries(path[6:8]))), content_type="application/json")
+        elif path == "settings.json":
+            route.fulfill(body=json.dumps(camera_kinds()), content_type="application/json")
         else:
             grey = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
             route.fulfill(body=as_jpeg(grey), content_type="image/jpeg")

@@ -180,3 +180,24 @@ def test_the_forms_of_scale_and_board_read_numbers_and_can_be_left(page: MadePag
     page.page.click("#board")
     page.page.keyboard.press("Escape")
     assert not page.page.locator("#scale form").count() and page.sent() == []
+
+
+def test_a_setting_of_the_kind_of_camera_is_written_into_its_address(page: MadePage) -> None:
+    page.set_up(address="sim:woven?fps=20&hole=30")
+    page.step("camera")
+    page.page.click("#kind > summary")
+    field = page.page.locator("#kindsettings input[aria-label^='hole ']")
+    assert (field.input_value(), field.get_attribute("placeholder")) == ("30", "60.0")
+    page.sent()
+    for text, address in (("45", "sim:woven?fps=20&hole=45"), ("", "sim:woven?fps=20")):
+        field.fill(text)
+        field.press("Enter")
+        sent: list[dict[str, Any]] = []
+        page.until(lambda sent=sent: bool(sent.extend(page.sent()) or sent), "it is sent")  # type: ignore[misc]
+        assert [(one["do"], one["value"]) for one in sent] == [("address", address)]
+    page.answer("not possible")
+    field.fill("no")
+    field.press("Enter")
+    page.until(lambda: field.input_value() == "30", "what is refused is not kept")
+    page.set_up(address="session:run.h5")
+    assert page.page.is_hidden("#kind"), "it has none"
