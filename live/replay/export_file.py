@@ -42,7 +42,6 @@ MAX_ROWS, MAX_NAMES = 20_000_000, 1_000_000
 _MARKS = {"point": ".", "comma": ","}
 _HALF_DAY_S, _DAY_S = 43_200.0, 86_400.0
 _UNIX_S, _UNIX_MS = 1e8, 1e11  # from 1973 on
-
 Array = NDArray[np.float64]
 
 
@@ -358,8 +357,7 @@ class _Reader:
         for kinds in self._kinds.values():
             if self._given.decimal is None and kinds.keys() >= {"?", "plain"} and self._mark not in kinds:
                 raise two_readings(self._where, kinds["?"])
-        times = np.array(self._times) if self._times else None
-        times = times if times is None else self._to_dates(times)
+        times = self._to_dates(np.array(self._times)) if self._times else None
         clock = self._zero(times)
         return Export(
             tuple(self._names), times, forces, clock, self._taken(forces, clock), tuple(self._remarks)
