@@ -1,7 +1,7 @@
 """The decorator of compiled loops that numba keeps for the next process, each file with a checksum behind it.
 
 A power cut leaves files that are empty, cut, or of zeros. Numba would raise an error on them, or run what they hold;
-here they are compiled anew. ``analysis.compiled.cache`` does the same: neither package imports the other.
+here they are compiled anew. ``analysis.compiled.loops`` does the same: neither package imports the other.
 """
 
 from __future__ import annotations

@@ -9,14 +9,181 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hw_mocks.strain_modes import Modes, StrainModes
-
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Kind = Literal["uniform", "hole", "woven", "halves"]
+Axis = Literal["x", "y"]
+Mode = tuple[Array, Array, Array, Array, Array, Array]  # u, v, du_dx, du_dy, dv_dx, dv_dy
+# The field is continued into the hole down to this part of its radius, where it stays finite.
+CONTINUED = 0.75
+NECK_AT = 0.2  # of the distance along the load, from the centre
+SEAM_PX = 4.0  # half the width of the seam between two halves
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Modes:
+    """Both fields at given places, per unit of mean strain.
+
+    Attributes
+    ----------
+    dx, dy : array, px
+        Places, from the centre.
+    axial, transverse : tuple of six arrays
+        u and v in px, then du_dx, du_dy, dv_dx, dv_dy.
+    neck : pair of the same, or None
+        Per unit of strain that the middle of the neck, or the first half, has more than the rest, along and across
+        the load.
+    """
+
+    dx: Array
+    dy: Array
+    axial: Mode
+    transverse: Mode
+    neck: tuple[Mode, Mode] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StrainModes:
+    """Which field, and where it is.
+
+    Attributes
+    ----------
+    kind : "uniform" | "hole" | "woven" | "halves"
+    axis : "x" | "y"
+        Direction of the load.
+    x0, y0 : float, px
+        The point that strain leaves where it is; centre of the hole, corner of a cell.
+    hole_radius : float, px
+    cell : float, px
+        Period of the weave along x and y.
+    overstrain : float
+        Highest local strain over the mean, less 1.
+    neck : (float, float), px
+        Its middle along the load, from (x0, y0), and its width: the argument of sech^2 is the distance over it.
+        Without a width there is no neck.
+    """
+
+    kind: Kind = "uniform"
+    axis: Axis = "y"
+    x0: float = 0.0
+    y0: float = 0.0
+    hole_radius: float = 60.0
+    cell: float = 96.0
+    overstrain: float = 0.6
+    neck: tuple[float, float] = (0.0, 0.0)
+
+    def at(self, x: ArrayLike, y: ArrayLike) -> Modes:
+        """The two fields at reference pixels (x, y), px."""
+        x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        dx, dy = x - self.x0, y - self.y0
+        along, across = (dx, dy) if self.axis == "x" else (dy, dx)
+        if self.kind == "hole":
+            pair = _hole(along, across, self.hole_radius)
+        elif self.kind == "woven":
+            pair = _woven(along, across, self.cell, self.overstrain)
+        else:
+            pair = _uniform(along, across)
+        neck = _necked(along, across, *self.neck) if self.neck[1] else None
+        if self.kind == "halves":
+            neck = _first_half(along, across)
+        if self.axis == "x":
+            return Modes(dx, dy, *pair, neck)
+        turned = None if neck is None else (_swapped(neck[0]), _swapped(neck[1]))
+        return Modes(dx, dy, _swapped(pair[0]), _swapped(pair[1]), turned)
+
+
+def _swapped(mode: Mode) -> Mode:
+    along, across, aa, ac, ca, cc = mode
+    return across, along, cc, ca, ac, aa
+
+
+def _uniform(along: Array, across: Array) -> tuple[Mode, Mode]:
+    zero, one = np.zeros_like(along), np.ones_like(along)
+    return (along, zero, one, zero, zero, zero), (zero, across, zero, zero, zero, one)
+
+
+def _necked(along: Array, across: Array, middle: float, width: float) -> tuple[Mode, Mode]:
+    far, zero = (along - middle) / width, np.zeros_like(along)
+    share = 1 / np.cosh(np.clip(far, -300, 300)) ** 2
+    moved = width * (np.tanh(far) + math.tanh(middle / width))
+    narrows = -2 / width * share * np.tanh(far) * across
+    return (moved, zero, share, zero, zero, zero), (zero, across * share, zero, zero, narrows, share)
+
+
+def _first_half(along: Array, across: Array) -> tuple[Mode, Mode]:
+    far, zero = along / SEAM_PX, np.zeros_like(along)
+    share = (1 - np.tanh(far)) / 2
+    moved = (along - SEAM_PX * (np.logaddexp(far, -far) - math.log(2))) / 2
+    narrows = -across / (2 * SEAM_PX) / np.cosh(np.clip(far, -300, 300)) ** 2
+    return (moved, zero, share, zero, zero, zero), (zero, across * share, zero, zero, narrows, share)
+
+
+def _woven(along: Array, across: Array, cell: float, over: float) -> tuple[Mode, Mode]:
+    k = 2 * math.pi / cell
+    sa, ca, sc, cc = np.sin(k * along), np.cos(k * along), np.sin(k * across), np.cos(k * across)
+    zero = np.zeros_like(along)
+    stretch, shear = 1 + over * ca * cc, -over * sa * sc
+    axial = (along + over / k * sa * cc, zero, stretch, shear, zero, zero)
+    transverse = (zero, across + over / k * ca * sc, zero, zero, shear, stretch)
+    return axial, transverse
+
+
+def _hole(along: Array, across: Array, radius: float) -> tuple[Mode, Mode]:
+    """Kirsch: 2 G (u + i v) = kappa phi - z conj(phi') - conj(psi), load along the real axis.
+
+    phi = S/4 (z + 2 a^2/z), psi = -S/2 (z + a^2/z - a^4/z^3), kappa = (3 - nu)/(1 + nu); with
+    S = E axial and nu = -transverse/axial both sides are linear in the two strains.
+    Muskhelishvili, Some Basic Problems of the Mathematical Theory of Elasticity, section 56a.
+    """
+    z: Complex = along + 1j * across
+    zc = z.conj()
+    (p, p_z, p_zc), (b, b_z, b_zc), (c, c_z, c_zc) = _around_hole(z, radius)
+    phi, phi_z, phi_zc = z / 4 + p / 2, 0.25 + p_z / 2, p_zc / 2
+    rest = z / 4 - zc / 2 - (b + p.conj() - c) / 2
+    rest_z = 0.25 - (b_z + p_zc.conj() - c_z) / 2
+    rest_zc = -0.5 - (b_zc + p_z.conj() - c_zc) / 2
+    axial = _from_complex(3 * phi - rest, 3 * phi_z - rest_z, 3 * phi_zc - rest_zc)
+    transverse = _from_complex(phi + rest, phi_z + rest_z, phi_zc + rest_zc)
+    return axial, transverse
+
+
+def _around_hole(z: Complex, a: float) -> tuple[tuple[Complex, Complex, Complex], ...]:
+    """a^2/z, a^2 z/conj(z)^2 and a^4/conj(z)^3, each with its derivatives by z and by conj(z).
+
+    Within CONTINUED of the radius, powers of |z| are held at their value there: polynomials that
+    join continuously.
+    """
+    limit = CONTINUED * a
+    out = np.abs(z) >= limit
+    w: Complex = np.where(out, z, limit)  # never zero
+    wc, zc, none = w.conj(), z.conj(), np.zeros_like(z)
+    a2, near2 = a**2, (a / limit) ** 2
+    p = np.where(out, a2 / w, near2 * zc), np.where(out, -a2 / w**2, none), np.where(out, none, near2)
+    inner = 3 * near2 * z**2 / limit**2
+    b = (
+        np.where(out, a2 * w / wc**2, inner * z / 3),
+        np.where(out, a2 / wc**2, inner),
+        np.where(out, -2 * a2 * w / wc**3, none),
+    )
+    c = (
+        np.where(out, a2**2 / wc**3, near2 * inner * z / 3),
+        np.where(out, none, near2 * inner),
+        np.where(out, -3 * a2**2 / wc**4, none),
+    )
+    return p, b, c
+
+
+def _from_complex(d: Complex, d_z: Complex, d_zc: Complex) -> Mode:
+    """u + i v and its derivatives by z and by its conjugate, as six real fields."""
+    d_along, d_across = d_z + d_zc, 1j * (d_z - d_zc)
+    return d.real, d.imag, d_along.real, d_across.real, d_along.imag, d_across.imag
+
+
 Gradient = tuple[Array, Array, Array, Array]
 
 

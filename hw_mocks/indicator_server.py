@@ -19,8 +19,7 @@ from pathlib import Path
 from acquire.closing import Closing
 from acquire.system import open_pty
 from hw_mocks.faults import FaultPlan
-from hw_mocks.indicator import Indicator
-from hw_mocks.indicator_output import IndicatorOutput, Sensing
+from hw_mocks.indicator import Indicator, IndicatorOutput, Sensing
 
 
 class PtyPort:

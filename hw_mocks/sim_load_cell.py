@@ -24,8 +24,7 @@ from acquire.load_cell import LoadCell, open_load_cell
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.text import Message
 from hw_mocks.faults import SERIAL_FAULTS, FaultPlan, parse_faults
-from hw_mocks.indicator import AsciiIndicator, Indicator, Style
-from hw_mocks.indicator_output import Sensing
+from hw_mocks.indicator import AsciiIndicator, Indicator, Sensing, Style
 from hw_mocks.indicator_server import IndicatorServer
 from hw_mocks.sim_indicators import INDICATORS, HbmAedIndicator
 from hw_mocks.sim_settings import SPECIMEN_KEYS

@@ -18,10 +18,9 @@ from acquire.addresses import Address, Options
 from acquire.errors import ConfigError
 from acquire.settings import take_settings
 from hw_mocks.cyclic import take_cyclic
-from hw_mocks.deformation import Gradient, SpecimenDeformation
+from hw_mocks.deformation import NECK_AT, Axis, Gradient, Kind, SpecimenDeformation, StrainModes
 from hw_mocks.machine import FlowCurve, Machine, PowerLaw, Programme, Pull, TestClock
 from hw_mocks.sim_settings import CyclicSettings, SpecimenSettings
-from hw_mocks.strain_modes import NECK_AT, Axis, Kind, StrainModes
 
 Array = NDArray[np.float64]
 KINDS: tuple[Kind, ...] = ("uniform", "hole", "woven", "halves")
@@ -34,7 +33,7 @@ class VirtualSpecimen:
     Attributes
     ----------
     kind : "uniform" | "hole" | "woven" | "halves"
-        See ``hw_mocks.strain_modes``.
+        See ``hw_mocks.deformation``.
     width, height : int, px
         The field of view.
     material : FlowCurve or PowerLaw

@@ -17,9 +17,8 @@ from acquire.text import Message
 from acquire.text.message import about
 from acquire.text.printable import brief, printable
 from live.commands.arguments import Command, parse
-from live.commands.environment import check_environment, limit_resources
+from live.commands.environment import check_environment, limit_resources, nonblocking_streams
 from live.commands.signals import ended_by_sigterm
-from live.commands.streams import nonblocking_streams
 from live.words.language import told
 
 _WRONG_PATH = {errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}

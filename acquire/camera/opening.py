@@ -50,7 +50,7 @@ CAMERAS: Registry[Camera] = Registry(
     lists_group="phasedic.camera_lists",
     elsewhere=["sim"],
     lists=({"": "acquire.v4l2.listing:list_cameras"} if HAS_V4L2 else {})
-    | {"genicam": "acquire.genicam.listing:list_cameras", "pylon": "acquire.pylon.camera:list_cameras"},
+    | {"genicam": "acquire.genicam.finding:list_cameras", "pylon": "acquire.pylon.camera:list_cameras"},
     settings_group="phasedic.camera_settings",
     settings={
         "": "acquire.v4l2.settings:V4L2Settings",

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from acquire.addresses import Address
 from acquire.camera.live import Driver, LiveCamera, Picture
 from acquire.camera.timing import longest_pause_s
-from acquire.device_clock import DeviceClock
+from acquire.clock import DeviceClock
 from acquire.errors import DataError
 from acquire.events import EventSink
 from acquire.frame import CameraInfo, Clock

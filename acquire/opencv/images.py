@@ -25,9 +25,8 @@ from acquire.addresses import Address
 from acquire.camera import CameraBase
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import EventSink, device_event, ignore_event
-from acquire.files.folder import listed
 from acquire.files.jpeg import quantisation
-from acquire.files.order import AUTO, BY, in_order, masks
+from acquire.files.order import AUTO, BY, in_order, listed, masks
 from acquire.files.picture import LOSSY, Source, check_regular, picture_source, read_bytes, read_picture_page
 from acquire.files.tiff import full_pages, tiff_pages
 from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen

@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterator
 from typing import Any, Self
 
 from acquire.addresses import Address
+from acquire.clock import ClockUnit, DeviceClock
 from acquire.closing import Closing
-from acquire.device_clock import ClockUnit, DeviceClock
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample

@@ -2,7 +2,7 @@
 
 A read returns some time after the last of its bytes arrived; a byte before it came one byte time
 earlier (``ArrivalTimes``). ``ArrivalRate`` finds messages that waited somewhere. Where the device sends its own
-milliseconds ``acquire.device_clock`` replaces the arrival times.
+milliseconds ``acquire.clock`` replaces the arrival times.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 
-from acquire.device_clock import ClockUnit
+from acquire.clock import ClockUnit
 from acquire.protocols.base import Reading
 
 

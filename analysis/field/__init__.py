@@ -4,17 +4,13 @@
 ``uncertainty`` has sigmas of values and means, ``motion`` predicts the next field, ``blocks`` are what is missing.
 """
 
-from analysis.field.blocks import area_share, in_blocks
-from analysis.field.blur import Blur, blur_maps, mean_blur
-from analysis.field.common import CommonError
-from analysis.field.grid import WINDOWS, Roi, Window, ZoiGrid, overlap, profile
-from analysis.field.motion import Motion
-from analysis.field.part import Block, part_of
-from analysis.field.status import Status
+from analysis.field.grid import WINDOWS, Motion, Roi, Status, Window, ZoiGrid, overlap, profile
+from analysis.field.part import Block, Blur, area_share, blur_maps, in_blocks, mean_blur, part_of
 from analysis.field.strain_field import StrainField
 from analysis.field.uncertainty import (
     PAIR_INDEX,
     VALUES,
+    CommonError,
     Measure,
     StrainTensor,
     Sums,

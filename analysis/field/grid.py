@@ -10,11 +10,83 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from enum import IntEnum
 from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+
+class Status(IntEnum):
+    """Whether a ZOI has a value, and why not; files store the numbers."""
+
+    OK = 0
+    NOT_MEASURED = 1
+    NO_PATTERN = 2
+    CLIPPED = 3
+    OUTSIDE = 4
+    LOST = 5
+    NOT_CONVERGED = 6
+    POOR_MATCH = 7
+    UNEVEN = 8
+    AMBIGUOUS = 9
+
+    @property
+    def text(self) -> str:
+        """The status in words for a person."""
+        return _TEXTS[self]
+
+
+_TEXTS = {
+    Status.OK: "measured",
+    Status.NOT_MEASURED: "not asked for (outside the mask or switched off)",
+    Status.NO_PATTERN: "too little pattern to measure on",
+    Status.CLIPPED: "saturated pixels: reduce exposure or light",
+    Status.OUTSIDE: "moved out of the picture",
+    Status.LOST: "the pattern was not found again",
+    Status.NOT_CONVERGED: "the iteration did not settle",
+    Status.POOR_MATCH: "the picture does not fit the reference here (crack, edge, glare or blur)",
+    Status.UNEVEN: "the displacement jumps or bends inside the ZOI (crack, edge, steep strain): take smaller ZOIs",
+    Status.AMBIGUOUS: "the pattern repeats, and nothing decides where this is: smaller steps between pictures",
+}
+
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """The motion of the A active ZOIs of a field, to predict the next one.
+
+    Attributes
+    ----------
+    index : (A,)
+        Flat places of the ZOIs on the grid.
+    change : (A, modes)
+        Of the parameters, a frame.
+    ahead : (A, modes)
+        What to add to the parameters for the start in the next frame.
+    age : (A,) uint8
+        Frames that it rests on.
+    """
+
+    index: NDArray[np.intp]
+    change: Floats
+    ahead: Floats
+    age: NDArray[np.uint8]
+
+    @classmethod
+    def none(cls, index: NDArray[np.intp], modes: int) -> Motion:
+        """No motion yet, of ZOIs at known places."""
+        return cls(
+            index, np.zeros((len(index), modes)), np.zeros((len(index), modes)), np.ones(len(index), np.uint8)
+        )
+
+    def fits(self, index: NDArray[np.intp], modes: int) -> bool:
+        """Whether this is of the same ZOIs."""
+        return self.change.shape == (len(index), modes) and np.array_equal(self.index, index)
+
 
 Window = Literal["gaussian", "uniform", "tukey", "bi-triangular"]
 WINDOWS: tuple[Window, ...] = get_args(Window)

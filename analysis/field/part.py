@@ -2,19 +2,110 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from analysis.field.grid import Roi, ZoiGrid
-from analysis.field.status import Status
+from acquire.text import Message
+from analysis.field.grid import Roi, Status, ZoiGrid
 from analysis.field.strain_field import StrainField
-from analysis.field.uncertainty import Floats, Sums
+from analysis.field.uncertainty import Floats, Sums, fixed_sum, variance_of_sum
 
 Bools = NDArray[np.bool_]
+
+MIN_BLOCK = 9
+"""ZOIs side by side that make a block, or ..."""
+BLOCK_SHARE = 0.1
+"""... this share of a smaller area."""
+
+
+def in_blocks(where: Bools, least: int = MIN_BLOCK) -> Bools:
+    """Which of the ZOIs ``where`` (R, C) lie in a group of at least ``least`` side by side, (R, C)."""
+    from scipy.ndimage import label
+
+    numbers, _ = label(where)
+    counts = np.bincount(numbers.ravel())
+    counts[0] = 0
+    return np.asarray((counts >= least)[numbers])
+
+
+def area_share(field: StrainField, where: ArrayLike | None = None) -> float:
+    """The share of an area that a mean over its valid ZOIs stands for.
+
+    1 unless a block of ZOIs that have a pattern is without a value: single ones that are missing change no mean.
+
+    Parameters
+    ----------
+    field : StrainField
+    where : (R, C) bool, optional
+        The ZOIs of a gauge; None: all.
+    """
+    able = (field.status != Status.NOT_MEASURED) & (field.status != Status.NO_PATTERN)
+    if where is not None:
+        able &= np.asarray(where, bool)
+    lost = able & ~field.ok
+    n_lost, count = int(np.count_nonzero(lost)), int(np.count_nonzero(able))
+    least = max(1, min(MIN_BLOCK, round(BLOCK_SHARE * count)))
+    if n_lost < least or not in_blocks(lost, least).any():
+        return 1.0
+    return 1 - n_lost / count
+
+
+class Blur(NamedTuple):
+    """Standard deviation of the blur since the reference along one axis, and its standard uncertainty, px.
+
+    Negative where the picture is sharper: the width by which the reference is blurred against it. NaN where it is not
+    known.
+    """
+
+    px: float
+    sigma: float
+
+    @property
+    def text(self) -> str:
+        """In words, "less sharp by 0.41 ± 0.02 px"; empty where it is not known."""
+        if not math.isfinite(self.px):
+            return ""
+        return Message(
+            "{value} by {size:.2f} ± {sigma:.2f} px",
+            Message("less sharp") if self.px >= 0 else Message("sharper"),
+            abs(self.px),
+            self.sigma,
+        )
+
+
+def mean_blur(field: StrainField) -> Blur:
+    """The blur of the whole picture: from the mean variance over the valid ZOIs, whose windows overlap."""
+    count = field.n_valid
+    if field.blur is None or not count:
+        return Blur(math.nan, math.nan)
+    variance, sigma = field.blur.astype(np.float64)
+    mean = fixed_sum(variance[field.ok]) / count
+    # The blur weighs the pixels of a window evenly, as a displacement does: neighbours correlate alike.
+    of_sum = variance_of_sum(np.where(field.ok, sigma, 0.0), "u", field.grid, field.window)
+    px, uncertainty = widths(np.array([mean]), np.array([math.sqrt(max(of_sum, 0.0)) / count]))
+    return Blur(float(px[0]), float(uncertainty[0]))
+
+
+def blur_maps(field: StrainField) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Blur of each ZOI and its standard uncertainty, (R, C) px, as of ``Blur``."""
+    nothing = np.full((2, *field.grid.shape), np.nan)
+    px, sigma = widths(*(nothing if field.blur is None else field.blur.astype(np.float64)))
+    return px.astype(np.float32), sigma.astype(np.float32)
+
+
+def widths(variance: Floats, sigma: Floats) -> tuple[Floats, Floats]:
+    """Signed roots of variances, px, and half of what their standard uncertainty either way makes of them."""
+    px, low, high = (
+        np.copysign(np.sqrt(np.abs(v)), v) for v in (variance, variance - sigma, variance + sigma)
+    )
+    return px, (high - low) / 2
+
+
 Item = TypeVar("Item")
 
 

@@ -16,15 +16,13 @@ from typing import Literal, Protocol, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.field.common import CommonError
-from analysis.field.grid import Window, ZoiGrid
-from analysis.field.motion import Motion
-from analysis.field.picture_error import PictureError
-from analysis.field.status import Status
+from analysis.field.grid import Motion, Status, Window, ZoiGrid
 from analysis.field.uncertainty import (
     PAIR_INDEX,
+    CommonError,
     Floats,
     Measure,
+    PictureError,
     StrainTensor,
     Sums,
     combination,

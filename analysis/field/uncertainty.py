@@ -17,6 +17,79 @@ from numpy.typing import NDArray
 from analysis.field.grid import Window, ZoiGrid, overlap
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CommonError:
+    """What the noise of the parameters of a correction makes of each ZOI.
+
+    Attributes
+    ----------
+    shapes : (K, 6, R, C) float64
+        Of u, du_dx, du_dy, v, dv_dx, dv_dy by each parameter.
+    covariance : (K, K) float64
+        Of the parameters.
+    """
+
+    shapes: Floats
+    covariance: Floats
+
+    def variance(self, name: str) -> Floats:
+        """Of a value of each ZOI, (R, C)."""
+        of_value = sum(share * self.shapes[:, i] for i, share in combination(name).items())
+        return np.asarray(np.einsum("krc,kl,lrc->rc", of_value, self.covariance, of_value))
+
+    def variance_of_sum(self, weights: Floats) -> float:
+        """Of the sum of the six parameters of all ZOIs times ``weights`` (6, R, C)."""
+        made = np.einsum("kirc,irc->k", self.shapes, weights)
+        return float(made @ self.covariance @ made)
+
+    def beside(self, other: CommonError | None) -> CommonError:
+        """Both errors, which have nothing to do with each other."""
+        if other is None:
+            return self
+        k, n = len(self.covariance), len(self.covariance) + len(other.covariance)
+        covariance = np.zeros((n, n))
+        covariance[:k, :k], covariance[k:, k:] = self.covariance, other.covariance
+        return CommonError(np.concatenate([self.shapes, other.shapes]), covariance)
+
+    def part(self, rows: slice, columns: slice) -> CommonError:
+        """That of some rows and columns of ZOIs."""
+        return CommonError(self.shapes[:, :, rows, columns], self.covariance)
+
+
+Cause = Literal["", "noise", "compression", "bands", "blur", "filter"]
+
+
+@dataclass(frozen=True, slots=True)
+class PictureError:
+    """What the fits of a picture leave in common, over what its noise as given (or as its reference shows) explains.
+
+    Attributes
+    ----------
+    over_noise : float
+        Standard deviation over that expected.
+    colour : tuple of two floats
+        Variance of u and of v over that of white noise of this strength.
+    cause : str
+        What it looks like where ``factor`` exceeds ``LIMIT``: "noise", "compression" (blocks of 8 px), "bands" (rows
+        or columns), "blur" (or sharpening), "filter" (not white), else "".
+    """
+
+    over_noise: float
+    colour: tuple[float, float]
+    cause: Cause = ""
+
+    @property
+    def factor(self) -> float:
+        """Uncertainty of a value over that from the noise as given."""
+        return float(self.over_noise * max(self.colour) ** 0.5)
+
+
+LIMIT = 1.5
+"""Factor of the uncertainty from which on the picture is another than its noise says."""
+
+
 Item = TypeVar("Item")
 Measure = Literal["small", "engineering", "green", "hencky"]
 U, DU_DX, DU_DY, V, DV_DX, DV_DY = range(6)

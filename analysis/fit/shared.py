@@ -37,8 +37,8 @@ from analysis.fit.moments import (
 )
 from analysis.fit.shapes import N_HELD
 from analysis.fit.tiles import LOST, TERMS, Tiles, departures, fit_motion, within_zoi
-from analysis.picture.smooth import new_pieces, stays, warp_smooth
 from analysis.picture.splines import PAD
+from analysis.picture.warp import new_pieces, stays, warp_smooth
 
 MODES = 6
 MIN_SAVED = 0.8

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper
-from analysis.picture.smooth import moved, slopes
+from analysis.picture.warp import moved, slopes
 
 NODES = 8, 16
 """ZOIs of a tile down and along, about: the larger it is, the fewer pixels belong to two, and the farther is the motion

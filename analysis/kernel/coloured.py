@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.field.picture_error import Cause
+from analysis.field.uncertainty import Cause
 from analysis.fit.validity import AGREES
 from analysis.kernel.lines import inner, left_by_fit, lines_along, some, zois_of
 from analysis.kernel.reference import ReferencePicture

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Motion, Status, StrainField, stretched
-from analysis.field.picture_error import LIMIT, PictureError
+from analysis.field.uncertainty import LIMIT, PictureError
 from analysis.fit.validity import AGREES, COLOURED
 from analysis.follow.renewal import UNSHARED, Placement
 from analysis.kernel.coloured import (

@@ -46,10 +46,10 @@ def not_compiled(kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) ->
 def _loops(phase: bool) -> list[Any]:
     from analysis.compiled import sparse_sums
     from analysis.fit import assembly, iteration, pooling, sensitivity, shared, sums, verdict
-    from analysis.follow import block_match, coherence, hill_climb, prediction
+    from analysis.follow import coherence, hill_climb, prediction, search
 
     loops = [
-        sensitivity.prepare, iteration.track, shared.share_warps, block_match.match, hill_climb.climb,
+        sensitivity.prepare, iteration.track, shared.share_warps, search.match, hill_climb.climb,
         prediction.advance, verdict.judge, coherence.stand_out, coherence.label,
         assembly.expect, assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.medians,
         pooling.interpolate, assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,

@@ -7,15 +7,21 @@ what reading line by line adds, for the time that ``readout`` finds; ``burst_mot
 during a burst; ``lens`` the distortion, which ``shifts`` finds.
 """
 
-from analysis.optics.burst_motion import BurstMotion
 from analysis.optics.keystone import Keystone, alike, keystones
-from analysis.optics.layout import Box, PlateLayout, without_plates
 from analysis.optics.lens import LENS_NAMES, LensCorrection, LensModel, LensReading, strain_of_shift
 from analysis.optics.plane import MODELS, NAMES, SCALE, ApparentMotion, Model
-from analysis.optics.plates import ASSUMED_TILT, ChosenModel, PlateFit, choose_model, trouble
-from analysis.optics.readout import Readout, readout_of_bands, readout_of_motion
-from analysis.optics.shifts import LensFit, lens_of_shifts
-from analysis.optics.shutter import ShutterCorrection
+from analysis.optics.plates import (
+    ASSUMED_TILT,
+    Box,
+    ChosenModel,
+    PlateFit,
+    PlateLayout,
+    choose_model,
+    trouble,
+    without_plates,
+)
+from analysis.optics.readout import Readout, ShutterCorrection, readout_of_bands, readout_of_motion
+from analysis.optics.shifts import BurstMotion, LensFit, lens_of_shifts
 
 __all__ = [
     "ASSUMED_TILT",

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from analysis.evaluate import AreaStrain
 from analysis.field import CommonError, StrainField, ZoiGrid, part_of
-from analysis.optics.layout import PlateLayout
 from analysis.optics.plane import affine_values
+from analysis.optics.plates import PlateLayout
 
 Floats = NDArray[np.float64]
 LENS_NAMES = ("focal_px", "x0", "y0", "k1", "k2", "p1", "p2", "k3")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from acquire.text import Message
 from live.commands.signals import signals
 from live.config.loading import Config
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.run.control import ControlPort
 from live.run.keyboard import listen
 from live.run.live_run import LiveRun

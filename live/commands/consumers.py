@@ -14,12 +14,11 @@ from live.config.figures import DEFAULT_CHANNELS, OF_LOAD, joint_channels
 from live.config.gauges import gauge_colours, outlines
 from live.config.listen_address import ListenAddress, read_token
 from live.config.loading import Config
-from live.pipeline.channel_values import ChannelValues
-from live.pipeline.consumer import Compose, Consumer, RunInfo
+from live.pipeline.consumer import Compose, Consumer, RunInfo, Screen
 from live.pipeline.run_state import RunState
-from live.pipeline.screen import Screen
+from live.pipeline.snapshot import ChannelValues
 from live.pipeline.timed.response import shown_names
-from live.results.sides.channels import JointChannels
+from live.results.sides import JointChannels
 from live.results.summary import StatusCard
 from live.results.writer import write_results
 from live.run.alarms import ActionMeans, Alarm, AlarmWatch, actions_of

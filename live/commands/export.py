@@ -8,8 +8,7 @@ from pathlib import Path
 
 from acquire.errors import ConfigError
 from acquire.text import Message
-from live.commands.more_gauges import add_gauges
-from live.commands.options import add_gauge_option
+from live.commands.options import add_gauge_option, add_gauges
 from live.results.export.formats import FORMATS, ExportRequest, export
 from live.results.export.job import ExportOptions
 from live.results.quantities import Display

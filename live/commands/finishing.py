@@ -11,10 +11,10 @@ from acquire.text import Message
 from live.commands.sides import TABLE, put_together
 from live.config.cameras import BACK, FRONT
 from live.config.loading import Config
+from live.pipeline.consumer import Screen
 from live.pipeline.run_state import RunState
-from live.pipeline.screen import Screen
 from live.results.finished.finished_test import FinishedTest
-from live.ui.terminal.cameras_screen import CamerasScreen
+from live.ui.terminal.screen import CamerasScreen
 from live.ui.terminal.summary import print_summary
 
 

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from live.commands.consumers import standard_consumers
 from live.config.loading import Config, load_config
-from live.pipeline.consumer import Consumer, Policy
+from live.pipeline.consumer import Consumer, Policy, Screen
 from live.pipeline.measurement import Measurement
-from live.pipeline.screen import Screen
 from live.run.live_run import LiveRun, run_live
 from live.run.outcome import Outcome, StopSignal
 from live.setup.region import located

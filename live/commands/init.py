@@ -25,7 +25,7 @@ from live.commands.options import (
 )
 from live.config.loading import load_config
 from live.config.rig_file import new_rig
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.setup.pictures import mask_picture
 from live.setup.region import first_look
 from live.setup.rig_proposal import Proposal, propose, rig_text

@@ -13,9 +13,8 @@ from live.commands.options import add_config_file, add_options, add_verbose, ove
 from live.commands.scale import add_board, board_of
 from live.config.loading import load_config, settings_in
 from live.config.rig_file import write_rig
-from live.pipeline.screen import Screen
-from live.setup.lens import lens_words
-from live.setup.lens_calibration import LensCalibration, from_boards, from_shifts
+from live.pipeline.consumer import Screen
+from live.setup.lens import LensCalibration, from_boards, from_shifts, lens_words
 from live.ui.terminal.screen import TerminalScreen
 
 if TYPE_CHECKING:

@@ -11,14 +11,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from acquire.addresses import parse_address, with_setting
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError
 from acquire.text import Message
 from acquire.text.message import word
+from analysis.evaluate import Gauge, GaugeSet
 from live.commands.arguments import HELP_ALL, bad_value, not_empty
+from live.config.gauges import gauges_for
 from live.config.loading import Config, lens_in, load_config, options
 from live.config.values import numbers_of
+from live.results.row import gauge_columns
+from live.results.run_folder import RunFolder
 
 MEASURE = (
     "roi", "mask", "zoi", "step", "gauges", "scale", "burst", "reference-burst", "window", "estimator", "strain",
@@ -207,3 +213,39 @@ def _section(text: str) -> dict[str, float]:
     except ValueError:
         raise ConfigError("--section {given}: give width,thickness in mm, for example 10,2", text) from None
     return {"specimen.width_mm": width, "specimen.thickness_mm": thickness}
+
+
+def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
+    """Add the ``[gauges.NAME]`` of a TOML file to ``run`` while it is open; its files stay as they are.
+
+    Values are those that a replay with this file would give, to the digits of the maps, and so are the uncertainties of
+    extensometers and single ZOIs. That of an area includes only the overlap of the windows (6 % low at a step of a
+    quarter of a ZOI, a third at most). Files of earlier versions have no normal matrices: there the ZOIs of an area
+    weigh as those of a pattern that is everywhere alike. A gauge replaces an existing one of the same name.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read, holds no gauge, or no ZOI lies at a gauge.
+    DataError
+        The maps cannot be read.
+    """
+    config = load_config(path, {"specimen.axis": run.specimen.axis})
+    if not config.gauges:
+        raise ConfigError("{path}: holds no gauge; give a table [gauges.NAME] each", path)
+    gauges, strain = gauges_for(config.gauges, config.specimen.first_axis, run.strain.grid), run.strain
+    values, sigmas = _read(run, gauges)
+    stored = run.section("gauges")
+    strain.config["gauges"] = {**stored, **config.gauges}
+    for k, gauge in enumerate(gauges):
+        strain.values |= dict(zip(gauge_columns(gauge.name)[:2], (values[:, k], sigmas[:, k]), strict=True))
+    run.__dict__.pop("gauges", None)  # the cached value is out of date
+    return tuple(gauge.name for gauge in gauges)
+
+
+def _read(run: RunFolder, gauges: tuple[Gauge, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Values and sigmas, (T, number of gauges) each."""
+    gauge_set = GaugeSet(gauges)
+    read = [gauge_set.read(run.field(row)).values() for row in range(run.strain.n)]
+    found = np.array([[(one.value, one.sigma) for one in row] for row in read]).reshape(-1, len(gauges), 2)
+    return found[..., 0], found[..., 1]

@@ -19,7 +19,7 @@ from live.commands.run import OTHER_PROGRAMS, RECORDING, run_with_page
 from live.commands.signals import signals
 from live.config.cameras import camera_configs
 from live.config.loading import load_config
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.web.page_controller import PageController
 from live.ui.web.server import DEFAULT_PORT

@@ -24,8 +24,7 @@ from live.commands.options import (
 )
 from live.commands.signals import signals
 from live.results.folder import check_folder, make_folder
-from live.ui.terminal.cameras_screen import CamerasScreen
-from live.ui.terminal.screen import TerminalScreen
+from live.ui.terminal.screen import CamerasScreen, TerminalScreen
 
 if TYPE_CHECKING:
     from live.replay.source import ReplayRequest
@@ -80,7 +79,7 @@ def command(arguments: argparse.Namespace) -> int:
 def _of_each(request: ReplayRequest) -> dict[str, ReplayRequest]:
     """One for each camera by its name, with folders in one that is made; "" where the recording is of one alone."""
     from live.results.run_folder import SESSION
-    from live.results.sides.folder import recorded_cameras_in
+    from live.results.sides import recorded_cameras_in
 
     names, wanted = recorded_cameras_in(Path(request.source)), request.overrides.get("output.dir")
     if not names:

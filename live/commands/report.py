@@ -10,10 +10,9 @@ from pathlib import Path
 from acquire.errors import ConfigError, PhasedicError
 from acquire.text import Message
 from acquire.text.message import about
-from live.commands.more_gauges import add_gauges
-from live.commands.options import add_gauge_option
+from live.commands.options import add_gauge_option, add_gauges
 from live.config.new_files import check_free, free_name, new_file
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.results.finished.figures_file import FILE, FiguresFile
 from live.results.quantities import Display
 from live.results.report.cameras import report_of_cameras
@@ -21,7 +20,7 @@ from live.results.report.comparison import compare, tests_of, write_table
 from live.results.report.report import Report, ReportRequest, make_report
 from live.results.report.saving import NO_BROWSER, find_browser, save_figures, save_page, save_pdf
 from live.results.run_folder import RunFolder, open_run
-from live.results.sides.folder import cameras_in
+from live.results.sides import cameras_in
 from live.ui.terminal.screen import TerminalScreen
 
 

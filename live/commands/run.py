@@ -19,10 +19,9 @@ from live.commands.finishing import finish_test
 from live.commands.options import add_measure, add_options, configured, overrides
 from live.config.cameras import FRONT, camera_configs
 from live.config.loading import Config
-from live.pipeline.consumer import Consumer
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Consumer, Screen
 from live.results.folder import check_folder
-from live.results.sides.channels import JointChannels
+from live.results.sides import JointChannels
 from live.run.alarms import check_alarms
 from live.run.control import Answer, refusal
 from live.run.live_run import CameraOfTest, LiveRun, run_cameras
@@ -30,8 +29,7 @@ from live.run.outcome import Outcome, OutcomeOfTest, StopSignal
 from live.setup.devices import check_load_port
 from live.setup.region import located
 from live.ui.rerun.view import rerun_command, spawn_viewer
-from live.ui.terminal.cameras_screen import CamerasScreen
-from live.ui.terminal.screen import TerminalScreen
+from live.ui.terminal.screen import CamerasScreen, TerminalScreen
 from live.ui.terminal.summary import trouble_lines
 
 if TYPE_CHECKING:

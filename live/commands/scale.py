@@ -15,7 +15,7 @@ from live.commands.options import add_options, add_verbose, configured
 from live.config.loading import Config
 from live.config.rig_file import write_rig
 from live.config.values import AUTO, Number, numbers_of
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.setup.region import first_look, region_of
 from live.setup.scale import OUT_OF_PLANE_MM, Board, Scale, false_strain, from_board, from_points, from_width
 from live.ui.terminal.screen import TerminalScreen

@@ -7,8 +7,7 @@ import threading
 from pathlib import Path
 
 from acquire.errors import ConfigError
-from live.commands.more_gauges import add_gauges
-from live.commands.options import add_gauge_option, add_time_span
+from live.commands.options import add_gauge_option, add_gauges, add_time_span
 from live.commands.signals import signals
 from live.results.run_folder import open_run
 from live.ui.rerun.playback import ShowRequest, show

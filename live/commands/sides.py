@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from live.config.cameras import BACK, FRONT
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.ui.terminal.screen import TerminalScreen
 
 if TYPE_CHECKING:
-    from live.results.sides.together import SidesOfTest
+    from live.results.sides import SidesOfTest
 
 TABLE = "strain.csv"
 """Of both sides, in the folder of a test with two cameras."""
@@ -48,7 +48,7 @@ def put_together(front: Path, back: Path, out: Path, screen: Screen) -> None:
     """
     from live.config.new_files import new_file
     from live.results.run_folder import open_run
-    from live.results.sides.together import SidesOfTest, write_sides
+    from live.results.sides import SidesOfTest, write_sides
 
     with open_run(front) as one, open_run(back) as other:
         sides, stresses = SidesOfTest.of_folders(one, other), one.specimen.area_m2 is not None
@@ -61,7 +61,7 @@ def put_together(front: Path, back: Path, out: Path, screen: Screen) -> None:
 
 def _strains(sides: SidesOfTest) -> Iterator[str]:
     """The last instant that both sides have."""
-    from live.results.sides.together import at_end
+    from live.results.sides import at_end
     from live.ui.terminal.status_line import strain_text
 
     yield "at the end:            mean of both        front minus mean"

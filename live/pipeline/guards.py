@@ -11,7 +11,7 @@ from acquire.events import Event, EventKind, EventSink, Level
 from acquire.text import Message
 from acquire.text.quantity import Amount
 from analysis.field import Blur
-from analysis.field.picture_error import LIMIT, PictureError
+from analysis.field.uncertainty import LIMIT, PictureError
 from analysis.optics import alike, keystones
 from live.pipeline.measurement import TimeStep
 from live.pipeline.reference import repetition_text

@@ -21,22 +21,24 @@ from acquire.text import Message
 from acquire.text.printable import counted
 from acquire.text.quantity import number as grouped
 from live.config.sections import LoadConfig
-from live.replay.export_headings import name_and_unit, newtons_of, seconds_per
-from live.replay.export_numbers import (
+from live.replay.export_table import Table, blocks, cell_of, find_table, is_heading, is_remark
+from live.replay.export_text import (
     CLOCK,
     DATE,
     EMPTY,
     NUMBERISH,
+    Rows,
     days_of,
     decimal_mark,
     is_value,
+    name_and_unit,
+    newtons_of,
     numbers_in,
+    seconds_per,
     time_of_day,
     two_readings,
     vote,
 )
-from live.replay.export_table import Table, blocks, cell_of, find_table, is_heading, is_remark
-from live.replay.export_text import Rows
 
 MAX_ROWS, MAX_NAMES = 20_000_000, 1_000_000
 _MARKS = {"point": ".", "comma": ","}

@@ -16,16 +16,22 @@ from acquire.text import Message
 from acquire.text.message import joined
 from acquire.text.printable import counted
 from live.config.sections import LoadConfig
-from live.replay.export_headings import (
+from live.replay.export_text import (
+    EMPTY,
+    HEAD,
+    NUMBERISH,
+    Rows,
+    encoding_of,
     find_columns,
     given_columns,
     is_unit,
+    is_value,
+    lines_of,
     name_and_unit,
     newtons_of,
     plain_unit,
+    split_rows,
 )
-from live.replay.export_numbers import EMPTY, NUMBERISH, is_value
-from live.replay.export_text import HEAD, Rows, encoding_of, lines_of, split_rows
 
 _SEPARATORS = {
     "\t": Message("tabs"), ";": Message("semicolons"), "|": Message("bars"), ",": Message("commas"),

@@ -16,8 +16,8 @@ from acquire.text import Message
 from live.config.gauges import gauges_for
 from live.config.loading import AUTO_GAUGES, Config, load_config, settings_in
 from live.config.values import AUTO
+from live.pipeline.consumer import Screen
 from live.pipeline.reference import averaged
-from live.pipeline.screen import Screen
 from live.replay.pictures import picture_source, with_reference
 from live.replay.session import session_config, session_path, session_source
 from live.replay.source import ReplayRequest, ReplaySource, check_window

@@ -20,9 +20,9 @@ from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst, frozen
 from analysis import StrainField
+from live.pipeline.consumer import Screen
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import unchanged
-from live.pipeline.screen import Screen
 from live.replay.opening import open_session_source, prepare_replay
 from live.replay.session import session_path
 from live.replay.source import ReplayRequest, check_window, prefetch

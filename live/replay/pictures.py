@@ -16,8 +16,7 @@ from acquire.burst import average_bursts, burst_of
 from acquire.camera import Camera, with_scheme
 from acquire.clock import ClockPair
 from acquire.errors import DataError
-from acquire.files.folder import listed
-from acquire.files.order import masks
+from acquire.files.order import listed, masks
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
 from acquire.opencv.images import picture_names

@@ -31,11 +31,10 @@ from acquire.text.printable import counted
 from acquire.text.quantity import Amount
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
-from live.pipeline.consumer import Compose, RunInfo
+from live.pipeline.consumer import Compose, RunInfo, Screen
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
 from live.pipeline.run_state import FrameCounts, RunState
-from live.pipeline.screen import Screen
 from live.pipeline.timed.force_watch import with_force_watch
 from live.replay.forces import read_forces
 from live.replay.opening import open_session_source, prepare_replay
@@ -46,14 +45,13 @@ from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Work, 
 from live.results.finished.figures_file import finished
 from live.results.finished.finished_test import FinishedTest
 from live.results.folder import LOG, BurstFailures, check_folder, make_folder
-from live.results.response.rising import check_channel
+from live.results.response.evaluate import check_channel
 from live.results.writer import write_results
 from live.setup.frames import camera_of
 from live.setup.pictures import with_film, with_mask
 from live.setup.region import is_auto_region
 from live.stream.adapted import Outputs
-from live.stream.state_keeper import StateKeeper
-from live.stream.stream import Stream
+from live.stream.stream import StateKeeper, Stream
 
 _MOST_TOLD = 5  # pictures that were left out, in the summary
 

@@ -8,7 +8,7 @@ table of tensile figures, ``summary`` the text at the end, ``noise_floor`` the s
 
 from live.results.quantities import MEANS, UNITLESS, Display, Quantity, mean_name, quantity_of
 from live.results.reader import Strain
-from live.results.report.noise_floor import StillPhase, still_phase_of
+from live.results.report.evaluation import StillPhase, still_phase_of
 from live.results.row import ResultsInfo, gauge_columns
 from live.results.strain_h5 import FLUSH_S
 from live.results.writer import Results

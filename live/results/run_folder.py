@@ -33,10 +33,18 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.history import curve_of
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.results.finished.readings import Readings
-from live.results.pictures import Image, Pictures, of_images, of_session
 from live.results.reader import Strain
 from live.results.row import gauge_columns
-from live.results.stored_fields import StoredPattern, length_between, read_field, stored_pattern
+from live.results.stored_fields import (
+    Image,
+    Pictures,
+    StoredPattern,
+    length_between,
+    of_images,
+    of_session,
+    read_field,
+    stored_pattern,
+)
 
 Item = TypeVar("Item")
 SESSION, STRAIN = "session.h5", "strain.h5"

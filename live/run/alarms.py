@@ -21,11 +21,10 @@ from acquire.text.quantity import Amount
 from live.config.figures import OF_LOAD, OF_SECTION, figure_of, is_joint
 from live.config.loading import Config
 from live.config.sections import AlarmConfig
-from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import ActiveAlarms
-from live.pipeline.snapshot import BURST, Snapshot
+from live.pipeline.snapshot import BURST, ChannelValues, Snapshot
 from live.pipeline.timed.figure import BEYOND, LACKING, FigureState, TimedFigure
 from live.run.strain_output import StrainOut
 

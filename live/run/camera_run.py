@@ -11,11 +11,10 @@ from acquire.events import Event, EventKind
 from acquire.hdf5 import FolderWatch
 from acquire.record_mode import RecordMode
 from acquire.text import Message
-from live.pipeline.consumer import Compose, RunInfo
+from live.pipeline.consumer import Compose, RunInfo, Screen
 from live.pipeline.latency import KernelWork, LatencyMonitor
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
-from live.pipeline.screen import Screen
 from live.pipeline.timed.figure import OLD_S
 from live.pipeline.timed.force_watch import with_force_watch
 from live.results.finished.figures_file import finished
@@ -31,9 +30,7 @@ from live.run.recording.pre_trigger import PreTriggerBuffer
 from live.run.recording.recorder import open_recording
 from live.setup.devices import Rig
 from live.stream.adapted import Outputs
-from live.stream.record import Record, ReferenceWanted, Waiting
-from live.stream.state_keeper import StateKeeper
-from live.stream.stream import Stream, Subscriber
+from live.stream.stream import Record, ReferenceWanted, StateKeeper, Stream, Subscriber, Waiting
 
 _ARMED = Message("; nothing is recorded until the command start")
 _SILENT_S = 1.0

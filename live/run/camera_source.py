@@ -24,8 +24,7 @@ from acquire.text.printable import counted
 from live.config.loading import Config
 from live.pipeline.reference import ReferenceTaker
 from live.pipeline.run_state import RunState
-from live.stream.record import CameraEnded, Record, ReferenceWanted, Role
-from live.stream.stream import Stream, Subscriber
+from live.stream.stream import CameraEnded, Record, ReferenceWanted, Role, Stream, Subscriber
 
 log = logging.getLogger(__name__)
 HELD_BYTES, HELD_S, A_MEGAPIXEL_S, LATE_S = 512_000_000, 1.0, 0.25, 0.25

@@ -31,7 +31,7 @@ from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.text import Message
 from acquire.text.printable import printable
 from live.config.listen_address import SOCKET, ListenAddress, private_socket, read_token
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.run.tcp_lines import LineServer
 
 START, STOP = "start", "stop"

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Protocol, TextIO
 
 from acquire.text import Message
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.run.control import ENDED, Controls, answer
 
 HELP = (

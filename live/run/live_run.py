@@ -19,9 +19,8 @@ from acquire.events import EventKind, Level
 from acquire.load_cell import LoadCell
 from live.config.cameras import FRONT
 from live.config.loading import Config
-from live.pipeline.consumer import Compose
+from live.pipeline.consumer import Compose, Screen
 from live.pipeline.run_state import RunState
-from live.pipeline.screen import Screen
 from live.results.folder import make_folder
 from live.results.writer import write_results
 from live.run.camera_run import CameraRun

@@ -9,8 +9,7 @@ from acquire.errors import PhasedicError
 from acquire.load_cell import LoadCell
 from acquire.system import lower_priority
 from live.pipeline.latency import LOAD
-from live.stream.record import LoadEnded
-from live.stream.stream import Stream
+from live.stream.stream import LoadEnded, Stream
 
 log = logging.getLogger(__name__)
 

@@ -17,11 +17,11 @@ from acquire.record_mode import RecordMode
 from acquire.text import Message
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST
+from live.pipeline.consumer import Screen
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import RunState
-from live.pipeline.screen import Screen
 from live.results.folder import make_folder
-from live.results.response.rising import check_channel
+from live.results.response.evaluate import check_channel
 from live.run.alarms import check_alarms
 from live.run.outcome import StopSignal
 from live.setup.devices import Rig

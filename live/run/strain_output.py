@@ -24,10 +24,9 @@ from acquire.events import Event, Level
 from acquire.serial_line.ports import LineSettings, open_port
 from acquire.text import Message
 from live.config.figures import OF_SNAPSHOT
-from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
 from live.pipeline.measurement import Measurement
-from live.pipeline.snapshot import AXIAL
+from live.pipeline.snapshot import AXIAL, ChannelValues
 from live.run.tcp_lines import LineServer
 
 EVERY_S = 0.4

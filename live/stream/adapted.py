@@ -21,8 +21,7 @@ from live.pipeline.consumer import KINDS, Consumer, ConsumerReport, Policy, kind
 from live.pipeline.event_log import EventLog
 from live.pipeline.latency import OUTPUT
 from live.pipeline.measurement import ForceMatching, Measurement
-from live.stream.record import ALL, Matched, Record
-from live.stream.stream import Stream, Subscriber
+from live.stream.stream import ALL, Matched, Record, Stream, Subscriber
 
 log = logging.getLogger(__name__)
 

@@ -28,9 +28,9 @@ from analysis.evaluate import (
     free,
 )
 from analysis.field import StrainField
+from hw_mocks.deformation import Kind
 from hw_mocks.scene import Exposer, Scene, Sensor
 from hw_mocks.specimen import VirtualSpecimen
-from hw_mocks.strain_modes import Kind
 from tests.accuracy.limit import derivative
 
 Floats = NDArray[np.float64]

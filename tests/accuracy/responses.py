@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from acquire.addresses import parse_address
 from analysis import PhaseKernel, Roi, StrainField, ZoiGrid
-from analysis.evaluate.response.departures import Departures
-from analysis.evaluate.response.lines import ResponseLines, ResponseSums
+from analysis.evaluate.response import Departures, ResponseLines, ResponseSums
 from hw_mocks.scene import Exposer, Scene, Sensor
 from hw_mocks.specimen import VirtualSpecimen, specimen_from
 from live.commands.demo import ZoiTruth

@@ -13,9 +13,9 @@ from acquire.addresses import parse_address
 from hw_mocks.specimen import VirtualSpecimen, specimen_from
 from live.config.cameras import camera_configs
 from live.config.loading import load_config
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.results.run_folder import open_run
-from live.results.sides.together import SidesOfTest
+from live.results.sides import SidesOfTest
 from live.results.writer import write_results
 from live.run.live_run import CameraOfTest, run_cameras
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquire.device_clock import ClockUnit, DeviceClock
+from acquire.clock import ClockUnit, DeviceClock
 from acquire.load_sample import LoadFlag
 from tests.acquire.serial_line.fake_port import FakeLine
 

@@ -18,8 +18,8 @@ from acquire.events import ignore_event
 from acquire.frame import Frame, frozen, saturation
 from acquire.session import Session
 from acquire.v4l2.camera import open_v4l2
-from analysis.quality.exposure import exposure
-from live.ui.web.painting import RED, mark_saturated, shrunk
+from analysis.quality.pattern import exposure
+from live.ui.web.map_view import RED, mark_saturated, shrunk
 from tests.acquire.session import fixtures
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeKernel
 from tests.contracts.entry_points import install_example

@@ -12,7 +12,7 @@ from analysis import Status, StrainField
 from analysis.evaluate import AreaStrain, Gauge, facing
 from analysis.evaluate.area.strain import GRADIENTS
 from analysis.field import PAIR_INDEX, variance_of_sum
-from analysis.field.blocks import BLOCK_SHARE, MIN_BLOCK, in_blocks
+from analysis.field.part import BLOCK_SHARE, MIN_BLOCK, in_blocks
 
 Mask = NDArray[np.bool_]
 Value = tuple[float, float, float]

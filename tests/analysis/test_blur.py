@@ -9,7 +9,7 @@ import pytest
 
 from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
 from analysis.field import blur_maps, mean_blur
-from analysis.field.blur import Blur, widths
+from analysis.field.part import Blur, widths
 from analysis.kernel.images import continue_rim, padded, with_second_differences
 from analysis.picture.spectrum import filtered_pattern
 from tests.accuracy.truth import Speckle, affine, digitise

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from analysis.field import Block, Roi, Status, StrainField, ZoiGrid, area_share, part_of
-from analysis.field.common import CommonError
 from analysis.field.part import PartSums
-from analysis.field.uncertainty import PAIR_INDEX, stretched
+from analysis.field.uncertainty import PAIR_INDEX, CommonError, stretched
 
 GRID = ZoiGrid.cover(Roi(20, 40, 96, 64), 32, 16)  # 3 rows, 5 columns
 

@@ -7,9 +7,9 @@ import pytest
 
 from analysis import PhaseKernel, Roi, Status, StrainField, ZoiGrid
 from analysis.field import area_share, in_blocks
-from analysis.follow.block_match import match
 from analysis.follow.features import feature_motions, motion_at
 from analysis.follow.repetition import side_peaks
+from analysis.follow.search import match
 from analysis.kernel import retry
 from live.pipeline.reference import repetition_text
 from tests.accuracy import finding

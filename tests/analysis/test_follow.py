@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis import PhaseKernel, Roi, Status, ZoiGrid
-from analysis.field.motion import Motion
+from analysis.field.grid import Motion
 from analysis.follow.prediction import AGE_MOVED, MAX_AGE, motion_after
 from analysis.follow.search import Blocks, find_blocks, global_shift, search
 from tests.analysis.speckle import SHAPE, picture

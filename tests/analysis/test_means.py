@@ -11,9 +11,7 @@ import pytest
 from analysis import KernelSettings, PhaseKernel, Roi, ZoiGrid
 from analysis.evaluate import AreaStrain
 from analysis.field import StrainField, Window
-from analysis.field.common import CommonError
-from analysis.field.picture_error import PictureError
-from analysis.field.uncertainty import variance_of_sum
+from analysis.field.uncertainty import CommonError, PictureError, variance_of_sum
 from analysis.fit.moments import CHANNELS
 from analysis.fit.sums import MONOMIALS, scatter, sum_of_squares
 from analysis.kernel.images import continue_rim, padded, with_second_differences

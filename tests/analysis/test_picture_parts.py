@@ -15,7 +15,7 @@ from analysis.follow.repetition import side_peaks
 from analysis.kernel.lines import APART, _profile, apart
 from analysis.picture.blocks import BLOCKS, blockiness
 from analysis.picture.impulses import without_impulses
-from analysis.quality.exposure import depth, exposure
+from analysis.quality.pattern import depth, exposure
 from tests.analysis.speckle import picture
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from analysis import KernelSettings, NoiseModel, PhaseKernel, Roi, Status, StrainField, ZoiGrid
 from analysis.field import mean_blur
-from analysis.field.picture_error import PictureError
+from analysis.field.uncertainty import PictureError
 from analysis.fit import pooling
 from analysis.fit.kernel_args import CONVERGED, OutArgs, ReferenceArgs
 from analysis.fit.pooling import pooled

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.evaluate.response.departures import NOT_USED, Departures
-from analysis.evaluate.response.lines import ResponseSums
+from analysis.evaluate.response import NOT_USED, Departures, ResponseSums
 
 Array = NDArray[np.float64]
 SLOPE, SIGMA, REFERENCE = 14.3, 75.0, 30.0  # um/m per MPa; um/m of one instant, and of the reference

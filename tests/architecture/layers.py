@@ -69,7 +69,7 @@ LAYERS = {
         for i, layer in enumerate(LIVE)
     },
     "live.cli": "acquire.errors acquire.text acquire.text.message acquire.text.printable live.commands.arguments"
-    " live.commands.environment live.commands.signals live.commands.streams live.words.language",
+    " live.commands.environment live.commands.signals live.words.language",
 }
 # One module opens the simulated devices. The demo compares with their truth; the examples have simulated pictures.
 EXCEPTIONS = {

@@ -26,7 +26,7 @@ from live.replay.batch.cluster import Cluster
 from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.scheduler import BatchProgress
 from live.replay.batch.task import Task
-from live.replay.batch.worker_processes import Pool, WorkerProcesses
+from live.replay.batch.worker import Pool, WorkerProcesses
 from live.ui.terminal.screen import TerminalScreen
 from tests.bench import machine
 from tests.bench.soak import children, status

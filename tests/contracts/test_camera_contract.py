@@ -27,7 +27,7 @@ from live.cli import main
 from live.commands.init import find_devices
 from live.setup.devices import open_rig
 from live.ui.terminal.screen import TerminalScreen
-from live.ui.web.setup.check_panel import camera_values
+from live.ui.web.setup.specimen_check import camera_values
 from tests.acquire.session import fixtures as session_fixtures
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeKernel
 from tests.contracts.entry_points import install_example

@@ -17,7 +17,7 @@ from acquire.errors import ConfigError, DataError, DeviceError, PhasedicError
 from acquire.events import Event, EventKind
 from acquire.load_cell.contract import LoadCell, open_load_cell
 from hw_mocks.faults import FaultPlan
-from hw_mocks.indicator_output import Sensing
+from hw_mocks.indicator import Sensing
 from hw_mocks.indicator_server import IndicatorServer
 from hw_mocks.sim_indicators import INDICATORS
 from hw_mocks.sim_load_cell import open_sim_load

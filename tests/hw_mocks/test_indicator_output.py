@@ -7,8 +7,7 @@ import pytest
 
 from acquire.errors import ConfigError
 from hw_mocks.faults import CAMERA_FAULTS, SERIAL_FAULTS, Fault, FaultPlan, parse_faults, plan_frames
-from hw_mocks.indicator import AsciiIndicator, IndicatorReading
-from hw_mocks.indicator_output import IndicatorOutput, Sensing
+from hw_mocks.indicator import AsciiIndicator, IndicatorOutput, IndicatorReading, Sensing
 from hw_mocks.sim_indicators import MtSicsIndicator
 
 RATE = 10.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
+from live.pipeline.consumer import Screen
 from live.pipeline.run_state import RunState
-from live.pipeline.screen import Screen
 
 
 class RecordingScreen(Screen):

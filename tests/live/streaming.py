@@ -12,9 +12,7 @@ from live.pipeline.consumer import Consumer, ConsumerReport
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.stream.adapted import Outputs
-from live.stream.record import Body, Record
-from live.stream.state_keeper import StateKeeper
-from live.stream.stream import Stream, Subscriber
+from live.stream.stream import Body, Record, StateKeeper, Stream, Subscriber
 
 
 class Published:

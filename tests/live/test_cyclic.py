@@ -18,11 +18,11 @@ from acquire.events import Event
 from live.cli import main
 from live.config.loading import from_dict
 from live.config.sections import AlarmConfig
-from live.pipeline.channel_values import ChannelValues
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import ActiveAlarms
+from live.pipeline.snapshot import ChannelValues
 from live.results import Results, ResultsInfo
-from live.results.finished.creep import creep_figures
+from live.results.finished.cycles import creep_figures
 from live.results.finished.finished_test import FinishedTest
 from live.results.report.report import ReportRequest, make_report
 from live.results.run_folder import open_run

@@ -20,7 +20,7 @@ from analysis import Status, StrainField
 from analysis.evaluate import AreaGauge, Gauge, GaugeSet, GaugeValue
 from analysis.field import ZoiGrid
 from live.cli import main
-from live.commands.more_gauges import add_gauges
+from live.commands.options import add_gauges
 from live.config.gauges import gauges_for
 from live.config.loading import load_config
 from live.pipeline.history import History
@@ -31,7 +31,7 @@ from live.results.report.curves import others, parts
 from live.results.run_folder import open_run
 from live.results.summary import StatusCard, summary_lines
 from live.run.outcome import Outcome
-from live.ui.rerun.drawing.large_figures import paint
+from live.ui.rerun.drawing.layout import paint
 from live.ui.rerun.messages import LargeFigures
 from live.ui.terminal.status_line import gauge_texts, status_line
 from tests.live.made_run import finished

@@ -24,8 +24,7 @@ from live.config.loading import Config, from_dict, load_config
 from live.config.rig_file import write_rig
 from live.results.reader import Strain
 from live.results.run_folder import open_run
-from live.setup.lens import lens_for
-from live.setup.lens_calibration import from_boards, lens_of_corners
+from live.setup.lens import from_boards, lens_for, lens_of_corners
 from live.setup.scale import Board, Corners
 
 WIDTH, HEIGHT, DISTORTION = 400, 300, -0.005

@@ -23,11 +23,11 @@ from live.cli import main
 from live.config.cameras import camera_configs
 from live.config.loading import load_config
 from live.config.sections import CameraConfig, LoadConfig
+from live.pipeline.consumer import Screen
 from live.pipeline.run_state import FrameCounts
-from live.pipeline.screen import Screen
 from live.results.reader import Strain
 from live.results.run_folder import open_run
-from live.results.sides.together import SidesOfTest, newest
+from live.results.sides import SidesOfTest, newest
 from live.results.writer import write_results
 from live.run.live_run import CameraOfTest, LiveRun, run_cameras
 from live.run.outcome import OutcomeOfTest

@@ -22,7 +22,7 @@ from acquire.text.message import FIELD, about, fields, from_json, joined, word
 from analysis.evaluate import GAUGE_KINDS
 from live.commands.arguments import COMMANDS, EXAMPLES, full_parser, parse
 from live.pipeline.event_log import sentence
-from live.results.maps.field_maps import FIELD_MAPS
+from live.results.maps.painting import FIELD_MAPS
 from live.results.quantities import KNOWN as QUANTITIES
 from live.results.report.record import FIGURES
 from live.setup.devices import camera_settings

@@ -25,8 +25,8 @@ from live.setup.pattern.outcome import (
     ProgressBar,
     figure,
     write_outcome,
+    write_page,
 )
-from live.setup.pattern.page import write_page
 from tests.paper.outcomes import read_outcome
 
 INTRODUCTION = """The accuracy of phase-DIC, on rendered truth and on real pictures, compared with its paper:

@@ -26,8 +26,10 @@ from live.setup.pattern.outcome import (
     ExperimentContext,
     ExperimentOutcome,
     ProgressBar,
+    comparison_summary,
+    page,
+    write_page,
 )
-from live.setup.pattern.page import comparison_summary, page, write_page
 from tests.acquire.session.fixtures import CAMERA, frame, writer
 from tests.live.screens import Terminal
 from tests.paper.__main__ import EXPERIMENTS, add_arguments, chosen, command, run

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Roi, StrainField, ZoiGrid
-from hw_mocks.deformation import SpecimenDeformation
-from hw_mocks.strain_modes import StrainModes
+from hw_mocks.deformation import SpecimenDeformation, StrainModes
 from live.results.maps.map import PAPER_LOW_PASS, for_display
 from live.setup.pattern.outcome import (
     Comparison,

@@ -8,8 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate.response.departures import WINDOW, Departures
-from analysis.evaluate.response.lines import ResponseSums
+from analysis.evaluate.response import WINDOW, Departures, ResponseSums
 from analysis.field import StrainField, Sums
 from live.pipeline.measurement import Measurement
 

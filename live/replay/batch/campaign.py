@@ -21,7 +21,7 @@ from acquire.text import Message
 from acquire.text.printable import counted
 from live.config.loading import load_config
 from live.config.new_files import replaced_file
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.replay.batch.cluster import Cluster, check_scheduler
 from live.replay.batch.keys import key_of, longest_first
 from live.replay.batch.row import COLUMNS, BatchRow, Value, failed
@@ -29,7 +29,7 @@ from live.replay.batch.scheduler import BatchProgress, ChunkPlan, Scheduler, cut
 from live.replay.batch.task import Task, row_done
 from live.replay.batch.test_list import BatchJob
 from live.replay.batch.workdir import sweep, sweep_done
-from live.replay.batch.worker_processes import Pool, WorkerProcesses
+from live.replay.batch.worker import Pool, WorkerProcesses
 from live.replay.pictures import reference_file
 from live.setup.compiling import compile_ahead
 

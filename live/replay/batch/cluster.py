@@ -19,12 +19,11 @@ from typing import Any
 
 from acquire.errors import ConfigError, DataError
 from acquire.text.printable import printable
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress, row_done
-from live.replay.batch.worker import compile_on_worker, describe_worker, perform_on_worker
-from live.replay.batch.worker_processes import OnDone, OnProgress
+from live.replay.batch.worker import OnDone, OnProgress, compile_on_worker, describe_worker, perform_on_worker
 
 log = logging.getLogger(__name__)
 RETRIES = 2  # of a task that raised; Dask itself gives one whose worker died to another, three times

@@ -21,7 +21,7 @@ from acquire.errors import DEFECT, PhasedicError
 from acquire.text import Message
 from acquire.text.message import joined
 from acquire.text.printable import duration
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.replay.batch.keys import is_session, key_of_chunk
 from live.replay.batch.row import RENEWED, BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress

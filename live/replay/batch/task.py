@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from acquire.errors import PhasedicError
 from acquire.text.printable import printable
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.replay.batch.row import BatchRow, failed, row_of, row_of_chunk
 from live.replay.batch.workdir import make, publish, remove, staging_dir, sweep
 from live.replay.parts import measure_part

@@ -14,16 +14,19 @@ import os
 import platform
 import queue
 import signal
+import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
-from acquire.system import unblock_signals
+from acquire.system import blocked_signals, python_command, python_environment, unblock_signals
 from analysis import PICTURE_KINDS, not_compiled
 from live.replay.batch.keys import deciding_versions
+from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress, perform
 
 
@@ -117,3 +120,245 @@ def _progress_to(task: Task, topic: str) -> Callable[[TaskProgress], None]:
 
 if __name__ == "__main__":
     sys.exit(main())
+
+
+# Settings of glibc: memory that one task has freed goes back to the system before the next one.
+_LEAN = {
+    "MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "6000000", "MALLOC_TRIM_THRESHOLD_": "20000000",
+}  # fmt: skip
+_END_TIMEOUT_S = 5.0
+MAX_DEATHS = 3
+
+log = logging.getLogger(__name__)
+
+OnProgress = Callable[[Task, TaskProgress], object]
+OnDone = Callable[[Task, BatchRow], Sequence[Task]]
+"""Called with a task that is done and its row; gives the tasks that can be done now."""
+
+
+class WorkerProcesses:
+    """``count`` processes that load their libraries while the caller plans the tasks."""
+
+    def __init__(self, count: int) -> None:
+        self._idle = deque(WorkerProcess() for _ in range(count))
+
+    def are_ready(self) -> bool:
+        """Whether all loops are compiled on this machine; waits for the answer of a worker.
+
+        Raises
+        ------
+        OSError
+            No process can be started.
+        """
+        if not self._idle:
+            self._idle.append(WorkerProcess())
+        return self._idle[0].is_ready()
+
+    def take(self) -> WorkerProcess:
+        """An idle process, or a new one.
+
+        Raises
+        ------
+        OSError
+            No process can be started.
+        """
+        try:
+            return self._idle.popleft()
+        except IndexError:
+            return WorkerProcess()
+
+    def close(self) -> None:
+        """End the idle processes."""
+        while self._idle:
+            worker = self._idle.popleft()
+            worker.kill()
+            worker.end()
+
+
+class WorkerProcess:
+    """One process; raises OSError where it cannot be started."""
+
+    def __init__(self) -> None:
+        with blocked_signals(signal.SIGINT):
+            self._process = subprocess.Popen(
+                python_command("live.replay.batch.worker"),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                errors="backslashreplace",
+                env=_LEAN | python_environment() | dict.fromkeys(ONE_THREAD, "1"),
+                text=True,
+                encoding="utf-8",
+            )
+        self.pid, self._said = self._process.pid, deque[str](maxlen=1)
+        self._listener = threading.Thread(target=self._pass_on, daemon=True)
+        self._listener.start()
+
+    def _pass_on(self) -> None:
+        for line in self._process.stderr or ():
+            self._said.extend([line.strip()] * bool(line.strip()))
+            sys.stderr.write(line)
+
+    def why(self) -> str:
+        """How it ended, after ``end``: its last words, or the signal."""
+        killed = f"signal {-self._process.returncode}" if self._process.returncode < 0 else ""
+        return "; ".join([*self._said, *filter(None, [killed])]) or f"exit code {self._process.returncode}"
+
+    def is_ready(self) -> bool:
+        """Its first message: whether all loops are compiled; False where it died before."""
+        assert self._process.stdout is not None
+        try:
+            return bool(json.loads(self._process.stdout.readline()).get("compiled"))
+        except (OSError, ValueError):
+            return False
+
+    def perform(self, task: Task, on_progress: OnProgress) -> BatchRow | None:
+        """The row of ``task``; None where the process died over it."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        try:
+            self._process.stdin.write(task.to_json() + "\n")
+            self._process.stdin.flush()
+            for line in self._process.stdout:
+                message = json.loads(line)
+                if "row" in message:
+                    return BatchRow.of(message["row"])
+                if "progress" in message:
+                    on_progress(task, TaskProgress(**message["progress"]))
+        except (OSError, ValueError):  # a process that is killed may write half a line
+            pass
+        return None
+
+    def kill(self) -> None:
+        """Kill it now."""
+        self._process.kill()
+
+    def end(self) -> None:
+        """Close its streams, which ends it, and wait for that."""
+        for stream in (self._process.stdin, self._process.stdout):
+            if stream is not None:
+                with contextlib.suppress(OSError):
+                    stream.close()
+        try:
+            self._process.wait(_END_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._listener.join(_END_TIMEOUT_S)
+        if self._process.stderr is not None and not self._listener.is_alive():
+            self._process.stderr.close()
+
+
+class Pool:
+    """Performs ``tasks`` with ``workers`` processes; ``on_progress`` and ``on_done`` are called from threads.
+
+    A task whose worker died three times gives a failed row; other tasks are not affected. Where the first three workers
+    die before one has measured anything, all tasks fail. The processes come from ``processes``, closed by the caller.
+    """
+
+    def __init__(
+        self,
+        tasks: Sequence[Task],
+        workers: int,
+        on_progress: OnProgress,
+        on_done: OnDone,
+        processes: WorkerProcesses,
+    ) -> None:
+        self._processes = processes
+        self._waiting, self._deaths = deque(tasks), dict.fromkeys((task.title for task in tasks), 0)
+        self._on_progress, self._on_done = on_progress, on_done
+        self._stopped = threading.Event()
+        self._first_deaths: int | None = 0  # None once a worker has measured something
+        self._hopeless = ""
+        self._workers: set[WorkerProcess] = set()
+        self._lock = threading.Lock()
+        n = min(workers, len(tasks))
+        self._threads = [threading.Thread(target=self._serve, name="worker", daemon=True) for _ in range(n)]
+        for thread in self._threads:
+            thread.start()
+
+    def wait(self, seconds: float) -> bool:
+        """Whether all is done within ``seconds``."""
+        for thread in self._threads:
+            thread.join(seconds / len(self._threads))
+        return not any(thread.is_alive() for thread in self._threads)
+
+    def close(self) -> None:
+        """End all workers, also during a task."""
+        self._stopped.set()
+        with self._lock:
+            for worker in self._workers:
+                worker.kill()
+        for thread in self._threads:
+            thread.join()
+
+    def _serve(self) -> None:
+        worker: WorkerProcess | None = None
+        try:
+            while (task := self._next()) is not None:
+                if self._hopeless:
+                    self._on_done(task, failed(task.title, task.source, self._hopeless, 1))
+                    continue
+                worker = worker or self._new()
+                row = worker.perform(task, self._progressed) if worker is not None else None
+                if row is None:
+                    self._end(worker)
+                    row, worker = (
+                        self._after_death(task, worker.why() if worker else "it cannot be started"),
+                        None,
+                    )
+                else:
+                    self._first_deaths = None
+                if row is not None:
+                    self._add(self._on_done(task, row))
+        finally:
+            self._end(worker)
+
+    def _progressed(self, task: Task, progress: TaskProgress) -> None:
+        self._first_deaths = None
+        self._on_progress(task, progress)
+
+    def _next(self) -> Task | None:
+        with self._lock:
+            return self._waiting.popleft() if self._waiting and not self._stopped.is_set() else None
+
+    def _add(self, tasks: Sequence[Task]) -> None:
+        with self._lock:
+            self._deaths |= dict.fromkeys((task.title for task in tasks), 0)
+            self._waiting.extendleft(tasks)
+
+    def _new(self) -> WorkerProcess | None:
+        """A worker; None where no process can be started."""
+        try:
+            worker = self._processes.take()
+        except OSError as error:
+            log.error("no worker could be started: %s", error)
+            return None
+        with self._lock:
+            self._workers.add(worker)
+        if self._stopped.is_set():
+            worker.kill()
+        return worker
+
+    def _end(self, worker: WorkerProcess | None) -> None:
+        if worker is None:
+            return
+        worker.end()
+        with self._lock:
+            self._workers.discard(worker)
+
+    def _after_death(self, task: Task, why: str) -> BatchRow | None:
+        """Queue the task again, last of all, and return None; a failed row after ``MAX_DEATHS``."""
+        if self._stopped.is_set():
+            return None
+        with self._lock:
+            self._deaths[task.title] += 1
+            if self._first_deaths is not None:
+                self._first_deaths += 1
+                if self._first_deaths >= MAX_DEATHS:
+                    self._hopeless = f"no worker can work here, {MAX_DEATHS} died at once: {why[:80]}"
+            if self._deaths[task.title] < MAX_DEATHS:
+                self._waiting.append(task)
+                return None
+        words = f"its worker died {MAX_DEATHS} times ({why[:80]}); is there memory enough for --workers?"
+        return failed(task.title, task.source, words, 1)

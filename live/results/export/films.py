@@ -20,8 +20,8 @@ from live.config.new_files import new_file, new_folder
 from live.results.export.job import ExportJob
 from live.results.maps.painting import Levels, Painter, caption
 from live.results.maps.scale import ColourScale
-from live.results.pictures import Pictures
-from live.results.response.words import response_title
+from live.results.response.evaluate import response_title
+from live.results.stored_fields import Pictures
 
 _CODECS = {
     ".mp4": ("mp4v", "MPEG-4 part 2: web browsers do not play it; give --to gif or --out NAME.webm for them"),

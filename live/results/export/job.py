@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from acquire.errors import ConfigError, DataError
 from acquire.text import Message
 from analysis.field import Status
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.results.quantities import Display
 from live.results.reader import Strain
+from live.results.response.evaluate import response_lines
 from live.results.response.stored import GROUP
-from live.results.response.words import response_lines
 from live.results.run_folder import RunFolder
 
 USUAL = ("u", "v", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy", "status")

@@ -19,7 +19,7 @@ from live.config.loading import Config
 from live.config.new_files import new_file
 from live.pipeline.run_state import RunState
 from live.results.figures import tensile_table
-from live.results.finished.creep import creep_figures
+from live.results.finished.cycles import creep_figures
 from live.results.finished.findings import DataCheck, findings
 from live.results.finished.finished_test import FinishedTest
 from live.results.response.evaluate import response_of

@@ -26,8 +26,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.measurement import AXIAL, TimeStep, mean_width
 from live.pipeline.run_state import RunState
 from live.results.figures import lag_of, tensile_options
-from live.results.finished.creep import creep_lines
-from live.results.finished.cycles import Cycles
+from live.results.finished.cycles import Cycles, creep_lines
 from live.results.finished.readings import Readings
 from live.results.run_folder import RunFolder
 

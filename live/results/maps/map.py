@@ -23,7 +23,7 @@ from analysis.field import ZoiGrid
 from live.results.maps.painting import Image, Painter
 from live.results.maps.scale import AutoRange, ColourScale, range_kind
 from live.results.reader import Strain
-from live.results.response.words import response_title
+from live.results.response.evaluate import response_title
 
 DISPLACEMENTS = ("u", "v")
 MAX_MEDIAN, MAX_STEPS, MAX_SHARPENED = 51, 100, 4

@@ -27,7 +27,7 @@ from live.results.report.page import Html, element, page, paragraph, section, ta
 from live.results.report.report import Report, budget_table
 from live.results.report.svg import COLOURS, Array, Plot, PlotLine
 from live.results.run_folder import RunFolder
-from live.results.sides.together import SidesOfTest, at_end
+from live.results.sides import SidesOfTest, at_end
 
 ALIKE = Message(
     "The mean of both sides has neither bending nor motion towards a camera; front minus mean has both, which one "

@@ -20,8 +20,8 @@ from live.results.maps.painting import Levels, Painter, caption
 from live.results.maps.scale import ColourScale, status_legend
 from live.results.quantities import quantity_of
 from live.results.report.page import Html, captioned, element, joined, paragraph, safe
+from live.results.response.evaluate import response_lines, response_title
 from live.results.response.stored import FATE
-from live.results.response.words import response_lines, response_title
 from live.results.run_folder import RunFolder
 from live.words.language import of_terminal
 

@@ -13,9 +13,8 @@ from acquire.text import Message
 from acquire.text.message import word
 from acquire.text.quantity import Amount
 from analysis.evaluate import CONFIDENCE
-from live.pipeline.event_log import counted_text
-from live.pipeline.repeats import Repeats
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
+from live.pipeline.event_log import Repeats, counted_text
 from live.results.figures import NOT_KNOWN, figure_text
 from live.results.finished.figures_file import stored_remarks
 from live.results.finished.finished_test import FinishedTest

@@ -14,7 +14,7 @@ from acquire.text import Message
 from acquire.text.message import joined as joined_texts
 from acquire.text.quantity import Amount
 from analysis.evaluate import AT_LEAST, CONFIDENCE
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.results.budget import CameraView, budget_cells
 from live.results.figures import (
     NOT_KNOWN,
@@ -27,16 +27,21 @@ from live.results.figures import (
     headline,
     sharpness_line,
 )
-from live.results.finished.answers import MeasuredAgain, checks_line, missing_lines
-from live.results.finished.belief import belief
+from live.results.finished.answers import MeasuredAgain, belief, checks_line, missing_lines
 from live.results.finished.figures_file import finished_in
 from live.results.finished.findings import NO_FORCE, doubts, findings
 from live.results.finished.finished_test import FinishedTest
 from live.results.report import curves, record
-from live.results.report.cycles import long_sections
-from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
+from live.results.report.curves import long_sections
+from live.results.report.evaluation import (
+    EvaluatedCurve,
+    StillPhase,
+    nearest_rows,
+    neck_line,
+    still_phase_of,
+    time_steps,
+)
 from live.results.report.maps import MapPictures, map_pictures, maps, statuses, whole_maps
-from live.results.report.noise_floor import StillPhase, still_phase_of
 from live.results.report.page import (
     Html,
     Shown,

@@ -17,7 +17,7 @@ import numpy as np
 from acquire.errors import ConfigError, DataError
 from acquire.text import Message
 from live.config.new_files import new_file, new_folder
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.results.report.report import Report
 from live.results.report.svg import HEIGHT, WIDTH, Plot, draw
 

@@ -17,8 +17,7 @@ from acquire.record_mode import RecordMode
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.run.recording.pre_trigger import PreTriggerBuffer
-from live.stream.record import Matched, Record
-from live.stream.stream import Subscriber
+from live.stream.stream import Matched, Record, Subscriber
 
 _TURN = 0.1  # of the range of the test so far
 _MOST_WAITING = 8  # peaks without a cycle: at rest noise turns

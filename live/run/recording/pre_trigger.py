@@ -21,8 +21,7 @@ from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import FrameCounts
 from live.pipeline.timed.figure import TimedFigure
 from live.run.control import START, ControlRefused
-from live.stream.record import Record
-from live.stream.stream import Subscriber
+from live.stream.stream import Record, Subscriber
 
 _SMALL = 512  # bytes counted for an event
 

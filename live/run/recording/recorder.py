@@ -24,10 +24,10 @@ from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import RotatingWriter, SessionInfo, SessionWriter
 from acquire.text import Message
+from live.pipeline.consumer import Screen
 from live.pipeline.event_log import EventLog
 from live.pipeline.queues import BoundedQueue
 from live.pipeline.run_state import FrameCounts, RunState
-from live.pipeline.screen import Screen
 from live.pipeline.timed.figure import TimedFigure
 from live.pipeline.timed.health import DISK_EVERY_S, Health
 from live.results.folder import versions

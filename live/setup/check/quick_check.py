@@ -6,18 +6,70 @@ import math
 import threading
 from collections import deque
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from acquire.camera import Camera
+from acquire.errors import DataError
 from acquire.frame import Frame
-from analysis.field import Blur
+from analysis.field import Blur, mean_blur
 from live.config.loading import Config
+from live.pipeline.reference import averaged, prepare
 from live.setup.check.check_list import CheckFigures, KernelFigures, examine, figures_of, find_region
 from live.setup.check.noise_floor import predict_noise
-from live.setup.check.sample import MIN_FRAMES, CheckRegion, CheckSample, FrameStack, stack_of
-from live.setup.check.sharpness import SharpestPicture
-from live.setup.check.stillness import stillness
+from live.setup.check.sample import MIN_FRAMES, CheckRegion, CheckSample, FrameStack, around, moved, stack_of
+from live.setup.check.stillness import covered, middle, stillness
+from live.setup.pictures import correction
 from live.setup.region import Region
+
+if TYPE_CHECKING:
+    from analysis import PhaseKernel
+
+NOT_KNOWN = Blur(math.nan, math.nan)
+SHARPER = 3.0
+"""Sigmas by which a picture is sharper than the reference and takes its place."""
+
+
+class SharpestPicture:
+    """The sharpest picture of one region so far, as a reference for those that follow."""
+
+    def __init__(self) -> None:
+        self._kernel: PhaseKernel | None = None
+        self._peak = math.nan  # sharpness figure of the reference
+
+    def compare(self, sample: CheckSample, measurable: NDArray[np.bool_], sharpness: float) -> Blur:
+        """The blur of a sample since the sharpest picture, over some dozens of ZOIs about the middle.
+
+        Parameters
+        ----------
+        sample : CheckSample
+        measurable : (R, C) bool
+            ZOIs with a pattern. Without any the blur is NaN.
+        sharpness : float
+            Figure of the sample; decides where the blur has changed too much to be measured (NaN).
+        """
+        measurable = measurable & sample.check_region.grid.active
+        if not measurable.any():
+            return NOT_KNOWN
+        chosen = middle(sample.check_region.grid.subset(active=measurable))
+        cut = around(covered(chosen, sample.check_region.at_zois.shape))
+        correct = correction(sample.check_region.config, sample.check_region.camera, cut)
+        burst = correct(sample.stack.cut(*cut).mean())
+        if self._kernel is None or burst.mean.shape != self._kernel.reference.prepared.shape:
+            try:
+                self._kernel, _ = prepare(burst, moved(chosen, cut), sample.settings, sample.noise)
+            except DataError:
+                return NOT_KNOWN
+            self._peak = sharpness
+        found = mean_blur(self._kernel.measure(burst.mean, noise=averaged(sample.noise, burst.n)))
+        too_sharp = math.isnan(found.px) and sharpness > self._peak
+        if too_sharp or found.px < -SHARPER * found.sigma:
+            self._peak = sharpness
+            self._kernel, _ = prepare(burst, self._kernel.grid, sample.settings, sample.noise)
+        return found
+
 
 QUICK_FRAMES = 8
 """Frames of one quick check."""

@@ -27,8 +27,8 @@ from live.setup.pattern.outcome import (
     save_figure,
     shown,
     write_outcome,
+    write_page,
 )
-from live.setup.pattern.page import write_page
 
 SIZES = (16, 24, 32, 48, 64, 96, 128)
 BURSTS = (1, 4, 16, 64)

@@ -25,10 +25,10 @@ from acquire.text.quantity import Amount
 from analysis.evaluate import evaluate_test
 from live.config.gauges import gauge_colours, outlines
 from live.config.loading import from_dict
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.results.figures import figure_lines, tensile_options
+from live.results.response.evaluate import response_lines
 from live.results.response.stored import FATE
-from live.results.response.words import response_lines
 from live.results.run_folder import RunFolder
 from live.ui.rerun.messages import (
     STRAINS,

@@ -10,19 +10,20 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, TextIO
 
 from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text.message import about, joined
 from acquire.text.printable import duration, printable, share_text
 from acquire.text.quantity import IN_ASCII
-from live.pipeline.screen import Screen
-from live.ui.terminal.status_line import GAP, force_text, gauge_texts, status_line
+from live.pipeline.consumer import Screen
+from live.ui.terminal.status_line import GAP, cameras_line, force_text, gauge_texts, status_line
 from live.words.language import told
 
 if TYPE_CHECKING:
     from live.pipeline.measurement import TimeStep
+    from live.pipeline.run_state import RunState
     from live.pipeline.snapshot import Snapshot
 
 _TERMINAL_EVERY_S, _FILE_EVERY_S = 0.25, 5.0
@@ -127,3 +128,55 @@ class TerminalScreen(Screen):
             self._stream.flush()
         except (OSError, ValueError):
             self._quiet = True
+
+
+class CamerasScreen:
+    """A screen for all cameras; ``of`` is the part of one.
+
+    Parameters
+    ----------
+    screen : Screen
+    """
+
+    def __init__(self, screen: Screen) -> None:
+        self.screen = screen
+        self._snapshots: dict[str, Snapshot] = {}
+        self._states: Mapping[str, RunState] = {}
+
+    def of(self, name: str) -> Screen:
+        """The screen of one camera; that of all for a camera without a name."""
+        return _CameraScreen(name, self) if name else self.screen
+
+    def attach(self, states: Mapping[str, RunState]) -> None:
+        """Show strains of all cameras, which have begun."""
+        self._states = states
+
+    def show(self, name: str, snapshot: Snapshot, words: str) -> None:
+        """Renew the status line; ``snapshot`` is of the camera ``name``."""
+        from live.results.sides import newest
+
+        self._snapshots[name] = snapshot
+        all_of = {one: state.snapshot(snapshot.t) for one, state in self._states.items()} or self._snapshots
+        both = newest(self._states, snapshot.t)
+        self.screen.status(cameras_line(all_of, both, self.screen.width, words))
+
+
+class _CameraScreen(Screen):
+    def __init__(self, name: str, every: CamerasScreen) -> None:
+        self._name, self._every = name, every
+
+    @property
+    def is_due(self) -> bool:
+        return self._every.screen.is_due
+
+    def print(self, text: str = "") -> None:
+        self._every.screen.print(about(Message(self._name), text) if text else "")
+
+    def bell(self) -> None:
+        self._every.screen.bell()
+
+    def status(self, text: str) -> None:
+        self._every.screen.status(f"{self._name}: {text}")
+
+    def snapshot(self, snapshot: Snapshot, words: str = "") -> None:
+        self._every.show(self._name, snapshot, words)

@@ -12,11 +12,10 @@ import numpy as np
 from acquire.text import Message
 from acquire.text.printable import counted
 from acquire.text.quantity import Amount
-from live.pipeline.consumer import ConsumerReport
+from live.pipeline.consumer import ConsumerReport, Screen
 from live.pipeline.event_log import sentence
 from live.pipeline.history import History
 from live.pipeline.run_state import RunState
-from live.pipeline.screen import Screen
 from live.results.figures import alignment_line, elastic_lines, figure_lines, film_line, tare_line
 from live.results.finished.answers import MeasuredAgain, checks_line, missing_lines
 from live.results.finished.findings import NO_FORCE, findings

@@ -11,7 +11,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import FPS
 from live.results.figures import evaluate, headline, tensile_options
-from live.results.sides.together import SideOfTest, SidesOfTest, newest
+from live.results.sides import SideOfTest, SidesOfTest, newest
 
 FIGURES_S = 2.0
 """Between two evaluations of all that was measured so far."""

@@ -22,13 +22,11 @@ from acquire.text.printable import printable, share_text
 from analysis.evaluate import ExtensionGauge, LineGauge
 from live.config.gauges import complete_gauges, gauge_colours
 from live.config.loading import Config
-from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
-from live.pipeline.event_log import counted_text, sentence
+from live.pipeline.event_log import Repeats, counted_text, sentence
 from live.pipeline.measurement import AXIAL, Measurement, TimeStep
-from live.pipeline.repeats import Repeats
 from live.pipeline.run_state import RunState
-from live.pipeline.snapshot import BURST, FORCE, STRESS, ShownFigure, Snapshot, peak_force
+from live.pipeline.snapshot import BURST, FORCE, STRESS, ChannelValues, ShownFigure, Snapshot, peak_force
 from live.pipeline.timed.figure import TimedFigure
 from live.pipeline.timed.response import shown_names
 from live.results.reader import whole_maps
@@ -37,8 +35,7 @@ from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.cameras_panel import CamerasPanel
 from live.ui.web.curve_history import CurveHistory
 from live.ui.web.limits import FigureLimits
-from live.ui.web.map_view import MapView, gauge_shapes, plate_shapes
-from live.ui.web.painting import as_jpeg, shrunk
+from live.ui.web.map_view import MapView, as_jpeg, gauge_shapes, plate_shapes, shrunk
 
 MAX_EVENTS = 30
 STATE_S, PICTURE_S = 0.1, 0.25

@@ -27,17 +27,15 @@ from live.config.new_files import free_name
 from live.run.control import ONCE, Answer, Controls, carry_out, refusal
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.map_view import map_choices
+from live.ui.web.map_view import as_png, map_choices
 from live.ui.web.page_consumer import PageConsumer, RunningTest
 from live.ui.web.page_consumers import PageConsumers
-from live.ui.web.painting import as_png
 from live.ui.web.run_result import peaks
 from live.ui.web.server import DEFAULT_PORT, REPORT_POLICY, PageServer, Response, jpeg_response
 from live.ui.web.setup.config_draft import ConfigDraft, drafts_of, next_name
 from live.ui.web.setup.draft_changes import CHANGES
 from live.ui.web.setup.drawn_region import DrawnRegion
-from live.ui.web.setup.setup_session import SetupSession
-from live.ui.web.setup.setup_sessions import SetupSessions
+from live.ui.web.setup.setup_session import SetupSession, SetupSessions
 
 SET_UP, RUN, AFTER = "setup", "run", "after"
 START, NEXT, AGAIN, QUIT = "start", "next", "again", "quit"

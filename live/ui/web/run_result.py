@@ -16,9 +16,8 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import sentence
 from live.pipeline.run_state import RunState
 from live.results.figures import TensileRow, beyond_scatter, headline, tensile_table
-from live.results.finished.belief import belief
-from live.results.finished.creep import creep_lines
-from live.results.finished.cycles import shown_figures
+from live.results.finished.answers import belief
+from live.results.finished.cycles import creep_lines, shown_figures
 from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
 from live.results.report.curves import load_unit, strain_unit, stress_strain

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from acquire.genicam import device as device_module
-from acquire.genicam import library, listing
+from acquire.genicam import finding, library
 from acquire.genicam.device import STATUS, GenicamDevice
 from acquire.genicam.finding import FoundCamera
 from acquire.genicam.library import _ERROR, CALLS, GenicamError, has_aravis
@@ -162,8 +162,8 @@ def test_a_camera_in_the_list(monkeypatch: pytest.MonkeyPatch) -> None:
             Listed.closed = True
 
     camera = Listed()
-    monkeypatch.setattr(listing, "GenicamDevice", lambda library, name: camera)
-    found = listing._look_at(None, FoundCamera("Maker-1", "Maker", "M1", "1", "10.0.0.2", "GigEVision"))  # type: ignore[arg-type]
+    monkeypatch.setattr(finding, "GenicamDevice", lambda library, name: camera)
+    found = finding._look_at(None, FoundCamera("Maker-1", "Maker", "M1", "1", "10.0.0.2", "GigEVision"))  # type: ignore[arg-type]
     assert (found.address, found.trouble) == ("genicam:Maker-1?format=Mono12p", "")
     assert found.name == "Maker M1 (1, GigEVision 10.0.0.2)" and Listed.closed
     assert found.details == (

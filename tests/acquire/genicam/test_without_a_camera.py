@@ -12,10 +12,9 @@ from acquire.camera.opening import open_camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.genicam import library
 from acquire.genicam.device import GenicamDevice
-from acquire.genicam.finding import name_of
+from acquire.genicam.finding import list_cameras, name_of
 from acquire.genicam.formats import FORMATS, decode
 from acquire.genicam.library import CALLS, load_aravis
-from acquire.genicam.listing import list_cameras
 from acquire.genicam.settings import GenicamSettings
 from acquire.pylon.camera import list_cameras as list_basler_cameras
 from acquire.settings import read_settings

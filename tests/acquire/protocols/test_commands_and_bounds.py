@@ -11,8 +11,7 @@ from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import PROTOCOLS, find_protocol
 from acquire.protocols.buffers import HeldBytes, Line, LineBuffer, number
-from acquire.protocols.modbus import ModbusParser, frame
-from acquire.protocols.modbus_profile import load_profile, profile_from
+from acquire.protocols.modbus import ModbusParser, frame, load_profile, profile_from
 from tests.acquire.protocols.conversation import any_parser, parser, read_line
 
 COMMANDS: dict[str, dict[str, bytes]] = {

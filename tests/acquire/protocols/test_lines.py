@@ -15,8 +15,7 @@ from acquire.load_sample import LoadFlag
 from acquire.protocols.base import find_protocol
 from acquire.protocols.buffers import LineBuffer, number
 from acquire.protocols.lines import PRESETS, load_preset, parser_from
-from acquire.protocols.modbus import ModbusParser, crc16, frame
-from acquire.protocols.modbus_profile import load_profile, profile_from
+from acquire.protocols.modbus import ModbusParser, crc16, frame, load_profile, profile_from
 from acquire.protocols.units import newtons_per
 from tests.acquire.protocols.conversation import parser
 

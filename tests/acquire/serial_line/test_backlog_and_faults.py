@@ -15,15 +15,14 @@ from dataclasses import dataclass, field
 import pytest
 
 from acquire.addresses import parse_address
-from acquire.device_clock import DeviceClock
+from acquire.clock import DeviceClock
 from acquire.events import Event
 from acquire.load_cell.contract import open_load_cell
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.serial_line.cell import SerialCell
 from acquire.serial_line.settings import read_settings
 from hw_mocks.faults import SERIAL_FAULTS, FaultPlan, parse_faults
-from hw_mocks.indicator import AsciiIndicator
-from hw_mocks.indicator_output import Sensing
+from hw_mocks.indicator import AsciiIndicator, Sensing
 from hw_mocks.indicator_server import IndicatorServer, PtyPort
 
 PERIOD_S = 0.0125

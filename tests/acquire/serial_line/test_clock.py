@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from acquire.device_clock import DeviceClock
+from acquire.clock import DeviceClock
 from acquire.serial_line.clock import ArrivalRate, ArrivalTimes
 
 

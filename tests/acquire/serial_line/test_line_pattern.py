@@ -15,8 +15,7 @@ from acquire.errors import DeviceError
 from acquire.protocols.base import Reading, find_protocol
 from acquire.protocols.units import is_mass, newtons_per
 from acquire.serial_line import identify as search
-from acquire.serial_line.identify import Finding, guess, listen, proposed
-from acquire.serial_line.line_pattern import pattern_of
+from acquire.serial_line.identify import Finding, guess, listen, pattern_of, proposed
 from acquire.serial_line.ports import LineSettings
 from live.commands import identify
 from tests.acquire.serial_line.fake_port import FakePort

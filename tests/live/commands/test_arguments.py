@@ -14,13 +14,12 @@ from acquire.errors import ConfigError
 from analysis.field import Blur
 from live import VERSION
 from live.cli import main
-from live.commands.arguments import parse
-from live.commands.check_watch import RenewedLines, blur_line, peak_line, short_line
+from live.commands.arguments import parse, understood
+from live.commands.check import RenewedLines, blur_line, peak_line, short_line
 from live.commands.options import configured, overrides
 from live.commands.report import _first_free, _targets
 from live.commands.scale import board_of
 from live.commands.study import _csv, _line, _settings
-from live.commands.words import understood
 from live.config.loading import Config, load_config
 from live.replay.study import NO_WINDOW, StudyResult, StudySetting
 from live.setup.check.check_line import CheckLine
@@ -134,7 +133,7 @@ def test_the_short_line_names_what_is_not_well() -> None:
 
 
 def test_lines_are_renewed_over_as_many_as_there_were(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("live.commands.check_watch.shutil.get_terminal_size", lambda: (6, 5))
+    monkeypatch.setattr("live.commands.check.shutil.get_terminal_size", lambda: (6, 5))
     stream = Terminal()
     lines = RenewedLines(TerminalScreen(stream), stream)
     lines.lines(["one", "two\nparts", "four", "five"], "short")

@@ -16,8 +16,8 @@ import pytest
 
 from acquire.serial_line.ports import PortInfo
 from live.cli import main
-from live.commands import device_report
-from live.commands.device_report import report_lines, without_names, without_serials
+from live.commands import devices
+from live.commands.devices import report_lines, without_names, without_serials
 
 CAMERA = "sim:woven?fps=20&width=160&height=128"
 
@@ -63,16 +63,16 @@ def port() -> Iterator[str]:
 
 
 def test_a_port_is_heard_and_understood(port: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(device_report, "list_cameras", list)
-    monkeypatch.setattr(device_report, "list_serial_ports", lambda: [PortInfo(port, "a sketch", "", True)])
+    monkeypatch.setattr(devices, "list_cameras", list)
+    monkeypatch.setattr(devices, "list_serial_ports", lambda: [PortInfo(port, "a sketch", "", True)])
     lines = list(report_lines([], [], 1.0))
     assert any("understood as" in line and "protocol=lines" in line for line in lines)
     assert any(re.search(r"[1-9]\d* with a value", line) for line in lines)
 
 
 def test_without_devices_it_says_what_to_give(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(device_report, "list_cameras", list)
-    monkeypatch.setattr(device_report, "list_serial_ports", list)
+    monkeypatch.setattr(devices, "list_cameras", list)
+    monkeypatch.setattr(devices, "list_serial_ports", list)
     said = list(report_lines([], [], 1.0))
     assert said[-2:] == [
         "no camera was found; --camera ADDRESS gives one",

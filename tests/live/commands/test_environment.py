@@ -15,7 +15,7 @@ import pytest
 from acquire import compiled_loops
 from acquire.errors import ConfigError
 from acquire.system import can_write, private_folder, python_command, python_environment
-from analysis.compiled import cache
+from analysis.compiled import loops
 from live.commands import environment
 
 ROOT = Path(__file__).parents[3]
@@ -75,7 +75,7 @@ def random_bytes(data: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("harm", [emptied, halved, zeroed, one_bit, random_bytes])
-@pytest.mark.parametrize("checked", [cache.CheckedFile, compiled_loops.KeptFile])
+@pytest.mark.parametrize("checked", [loops.CheckedFile, compiled_loops.KeptFile])
 def test_a_damaged_file_of_the_cache_is_as_if_it_were_not_there(
     checked: Any, harm: Any, tmp_path: Path
 ) -> None:
@@ -94,8 +94,8 @@ def test_a_damaged_file_of_the_cache_is_as_if_it_were_not_there(
 
 
 def test_numba_itself_reads_what_is_kept(tmp_path: Path) -> None:
-    kept(cache.CheckedFile, tmp_path)
-    assert cache.IndexDataCacheFile(str(tmp_path), "f", 1).load("b") == {"code": b"2" * 999}
+    kept(loops.CheckedFile, tmp_path)
+    assert loops.IndexDataCacheFile(str(tmp_path), "f", 1).load("b") == {"code": b"2" * 999}
 
 
 def test_all_compiled_loops_are_checked() -> None:
@@ -106,7 +106,7 @@ def test_all_compiled_loops_are_checked() -> None:
 
     for loop in (tile_sums, fletcher32, splat):
         assert isinstance(loop._cache._cache_file, compiled_loops.KeptFile)
-    assert isinstance(getattr(coefficients, "dispatcher", coefficients)._cache._cache_file, cache.CheckedFile)
+    assert isinstance(getattr(coefficients, "dispatcher", coefficients)._cache._cache_file, loops.CheckedFile)
 
 
 def test_loops_are_kept_below_the_temporary_folder_where_nothing_else_can_be_written(

@@ -16,8 +16,7 @@ from acquire.clock import ClockPair
 from acquire.errors import ConfigError, DataError
 from acquire.load_cell.calibration import load
 from acquire.serial_line import identify as identify_module
-from hw_mocks.indicator import AsciiIndicator
-from hw_mocks.indicator_output import Sensing
+from hw_mocks.indicator import AsciiIndicator, Sensing
 from hw_mocks.indicator_server import IndicatorServer
 from live.cli import main
 from live.commands import identify, load_calibrate, load_check, recover, run

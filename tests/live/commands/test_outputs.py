@@ -15,7 +15,7 @@ from live.commands import consumers
 from live.commands.consumers import OUTPUT_NAME, signals_of
 from live.config.loading import Config, load_config
 from live.pipeline.run_state import RunState
-from live.results.sides.channels import JointChannels
+from live.results.sides import JointChannels
 from tests.live.made_run import UTC_START
 from tests.live.made_up import CAMERA, START, make_grid
 from tests.live.screens import RecordingScreen

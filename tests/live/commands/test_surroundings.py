@@ -12,10 +12,10 @@ import pytest
 
 from acquire.errors import ConfigError
 from live.cli import main
-from live.commands import environment, recover, streams
+from live.commands import environment, recover
 from live.commands.batch import _chunk_s
+from live.commands.environment import NonBlockingStream
 from live.commands.options import add_options
-from live.commands.streams import NonBlockingStream
 from live.config.loading import load_config
 
 
@@ -53,11 +53,11 @@ def test_a_stopped_terminal_loses_writes_and_says_how_many() -> None:
 
 def test_streams_are_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
     out = io.StringIO()
-    monkeypatch.setattr(streams.sys, "stdout", out)
-    with streams.nonblocking_streams():
+    monkeypatch.setattr(environment.sys, "stdout", out)
+    with environment.nonblocking_streams():
         print("a line")
-        assert streams.sys.stdout is not out
-    assert streams.sys.stdout is out and out.getvalue() == "a line\n"
+        assert environment.sys.stdout is not out
+    assert environment.sys.stdout is out and out.getvalue() == "a line\n"
 
 
 @pytest.mark.parametrize(("name", "value", "well"), [

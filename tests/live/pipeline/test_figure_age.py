@@ -16,10 +16,10 @@ from acquire.load_sample import LoadFlag, LoadSample
 from acquire.text.message import from_json
 from live.config.loading import load_config
 from live.config.sections import AlarmConfig, SpecimenConfig
-from live.pipeline.channel_values import ChannelValues
 from live.pipeline.history import History
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
+from live.pipeline.snapshot import ChannelValues
 from live.pipeline.timed.figure import ARRIVALS, OLD_INTERVALS, OLD_S, Arrivals, FigureState, TimedFigure
 from live.pipeline.timed.force_watch import ForceWatch
 from live.run.alarms import ActionMeans, Alarm, AlarmWatch, actions_of

@@ -10,7 +10,7 @@ import pytest
 
 from acquire.events import Event
 from analysis import StrainField
-from analysis.field.picture_error import PictureError
+from analysis.field.uncertainty import PictureError
 from live.pipeline.guards import (
     BlurGuard,
     DilatationGuard,

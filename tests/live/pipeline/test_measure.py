@@ -19,7 +19,7 @@ from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
 from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
 from analysis.evaluate import GaugeValue
-from analysis.field.picture_error import PictureError
+from analysis.field.uncertainty import PictureError
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.pipeline.guards import BlurGuard, PictureGuard, standard_guards

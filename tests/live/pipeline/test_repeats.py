@@ -8,9 +8,8 @@ import tracemalloc
 import pytest
 
 from acquire.events import Event, EventKind, Level
-from live.pipeline import repeats
-from live.pipeline.event_log import EventLog
-from live.pipeline.repeats import Repeats
+from live.pipeline import event_log
+from live.pipeline.event_log import EventLog, Repeats
 
 
 def alarm(k: int, level: Level = "warning") -> Event:
@@ -52,7 +51,7 @@ def test_other_sources_levels_and_words_are_others() -> None:
 
 
 def test_texts_without_end_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(repeats, "MAX_KINDS", 10)
+    monkeypatch.setattr(event_log, "MAX_KINDS", 10)
     held = Repeats()
     for k in range(500):
         held.add(Event(k, EventKind.VIEW, "view", "x" * k, "warning"))

@@ -13,10 +13,9 @@ from analysis.evaluate import GaugeValue
 from live.config.figures import CYCLE_CHANNELS, MEASURED_CHANNELS
 from live.config.loading import load_config
 from live.config.sections import SpecimenConfig
-from live.pipeline.channel_values import ChannelValues
 from live.pipeline.measurement import Measurement, TimeStep
 from live.pipeline.run_state import RunState
-from live.pipeline.snapshot import Snapshot, peak_force
+from live.pipeline.snapshot import ChannelValues, Snapshot, peak_force
 from live.results.summary import StatusCard
 from live.ui.terminal.status_line import status_line
 from live.ui.web.broadcaster import Broadcaster, json_bytes

@@ -14,16 +14,15 @@ from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
 from analysis import StrainField
 from analysis.evaluate import GaugeValue
-from live.pipeline import columns
-from live.pipeline.columns import NumberColumn, TextColumn
-from live.pipeline.history import History
+from live.pipeline import history
+from live.pipeline.history import History, NumberColumn, TextColumn
 from live.pipeline.measurement import AXIAL, TRANSVERSE, extension_along, strains_along, time_step_of
 from tests.live.made_up import START, make_measurement
 from tests.live.pipeline.test_reference import GRID, seen
 
 
 def test_a_column_in_blocks_has_the_newest_two_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(columns, "_ROWS", 4)
+    monkeypatch.setattr(history, "_ROWS", 4)
     column = NumberColumn("d", BlockFile())
     for value in range(11):
         column.append(float(value))

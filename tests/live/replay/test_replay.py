@@ -32,8 +32,8 @@ from acquire.session import Session
 from analysis import numerics
 from live.cli import main
 from live.config.loading import Config, load_config
+from live.pipeline.consumer import Screen
 from live.pipeline.measure import Tracker
-from live.pipeline.screen import Screen
 from live.replay.burst_index import burst_ends, index_of_frames
 from live.replay.opening import prepare_replay
 from live.replay.source import ReplaySource, prefetch

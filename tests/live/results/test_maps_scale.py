@@ -9,7 +9,7 @@ import pytest
 
 from analysis.field import Status
 from live.results.maps.colours import colour, diverging_table, nice_above, sequential_table, ticks, unit_for
-from live.results.maps.field_maps import FIELD_MAPS, FieldMaps
+from live.results.maps.painting import FIELD_MAPS, FieldMaps
 from live.results.maps.scale import (
     AutoRange,
     ColourRange,

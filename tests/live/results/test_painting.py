@@ -18,9 +18,9 @@ from live.results.maps.colours import diverging_table, sequential_table
 from live.results.maps.map import MapRequest, draw, for_display, save
 from live.results.maps.painting import Levels, Painter, _mixed, caption, overlay_cells, overlay_quads
 from live.results.maps.scale import OPACITY, AutoRange, ColourScale, range_kind, status_colours
-from live.results.pictures import _nearest
 from live.results.reader import Strain
 from live.results.run_folder import open_run
+from live.results.stored_fields import _nearest
 from tests.live.made_run import make_run
 from tests.live.made_up import make_grid
 

@@ -23,10 +23,8 @@ from live.results import Results, ResultsInfo, Strain
 from live.results.__main__ import main as probed
 from live.results.finished.finished_test import FinishedTest
 from live.results.report.report import ReportRequest, make_report
-from live.results.response.evaluate import respond, response_of
-from live.results.response.rising import check_channel
+from live.results.response.evaluate import check_channel, respond, response_lines, response_of, response_title
 from live.results.response.stored import FATE, map_names
-from live.results.response.words import response_lines, response_title
 from live.results.run_folder import open_run
 from live.ui.rerun.playback import playback_messages, view_setup
 from live.ui.rerun.wire import Kind

@@ -16,7 +16,7 @@ import pytest
 from acquire.errors import DataError
 from acquire.record_mode import RecordMode
 from live.cli import main
-from live.commands.more_gauges import add_gauges
+from live.commands.options import add_gauges
 from live.results import Results, ResultsInfo, Strain
 from live.results.row import StrainRow
 from live.results.run_folder import open_run

@@ -12,7 +12,7 @@ import pytest
 from analysis.evaluate import Figure
 from hw_mocks.machine import PowerLaw
 from live.cli import main
-from live.commands.more_gauges import add_gauges
+from live.commands.options import add_gauges
 from live.results.report.evaluation import EvaluatedCurve, neck_line
 from live.results.run_folder import open_run
 

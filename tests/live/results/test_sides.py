@@ -20,9 +20,7 @@ from live.pipeline.measurement import AXIAL
 from live.pipeline.run_state import RunState
 from live.results.figures import tensile_options
 from live.results.run_folder import open_run
-from live.results.sides.channels import JointChannels
-from live.results.sides.folder import shift_s
-from live.results.sides.together import SideOfTest, SidesOfTest, longest_gap, newest
+from live.results.sides import JointChannels, SideOfTest, SidesOfTest, longest_gap, newest, shift_s
 from tests.live import made_run
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run, noisy
 from tests.live.made_up import START, make_measurement
@@ -82,7 +80,7 @@ def test_the_newest_values_are_those_of_the_newest_instant_of_both(monkeypatch: 
         t = np.arange(state.last + 1.0)
         return {AXIAL: Course(t, 1e-3 * t * state.last, np.zeros(state.last + 1))}
 
-    monkeypatch.setattr("live.results.sides.together._recent", recent)
+    monkeypatch.setattr("live.results.sides._recent", recent)
     healthy, live = SimpleNamespace(camera_failed=False), SimpleNamespace(known=True)
     made = SimpleNamespace(figure=lambda _: live)
     front, back = (

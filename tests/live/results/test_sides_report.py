@@ -18,12 +18,21 @@ from acquire.errors import DataError
 from analysis.evaluate import Curve, GaugeValue, TwoSides
 from live.config.sections import SpecimenConfig
 from live.pipeline.run_state import RunState
+from live.results import sides as clocks
 from live.results.report.cameras import _strains, _stress_strain, report_of_cameras
 from live.results.run_folder import open_run
-from live.results.sides import folder as clocks
-from live.results.sides.channels import JointChannels
-from live.results.sides.folder import cameras_in, recorded_cameras_in, shift_s
-from live.results.sides.together import SideOfTest, SidesOfTest, _at_the_front, _mean_of, newest, write_sides
+from live.results.sides import (
+    JointChannels,
+    SideOfTest,
+    SidesOfTest,
+    _at_the_front,
+    _mean_of,
+    cameras_in,
+    newest,
+    recorded_cameras_in,
+    shift_s,
+    write_sides,
+)
 from tests.live.made_run import CONFIG, GAUGES, PULLED, force_of, make_run, noisy
 from tests.live.made_up import START, make_measurement
 

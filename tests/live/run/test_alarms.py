@@ -22,8 +22,8 @@ from live.cli import main
 from live.config.listen_address import SOCKET
 from live.config.loading import from_dict, load_config
 from live.config.sections import AlarmConfig
+from live.pipeline.consumer import Screen
 from live.pipeline.run_state import ActiveAlarms, Health
-from live.pipeline.screen import Screen
 from live.run.alarms import ACTIONS, ActionMeans, Alarm, AlarmWatch, actions_of, check_alarms
 from live.run.control import SOCKET_NAME, ControlPort, answer
 from live.run.live_run import run_live

@@ -13,8 +13,7 @@ from live.pipeline.reference import ReferenceBurst, ReferenceTaker
 from live.pipeline.run_state import FrameCounts
 from live.run.camera_source import CameraSource, GrabPlan
 from live.run.incoming_bursts import TAKING, IncomingBursts
-from live.stream.record import CameraEnded, ReferenceWanted, Waiting
-from live.stream.stream import Stream
+from live.stream.stream import CameraEnded, ReferenceWanted, Stream, Waiting
 from tests.live.fakes import ListCamera, frame
 from tests.live.streaming import KeptState, Noted, record_of
 from tests.live.ui.waiting import LONG_S

@@ -15,17 +15,15 @@ from acquire.events import EventKind
 from acquire.frame import Frame
 from acquire.load_cell.contract import NoLoadCell
 from live.config.loading import load_config
-from live.pipeline.consumer import Consumer
+from live.pipeline.consumer import Consumer, Screen
 from live.pipeline.run_state import RunState
-from live.pipeline.screen import Screen
 from live.run import camera_run as module
 from live.run.camera_run import CameraRun
 from live.run.control import ControlRefused
 from live.run.incoming_bursts import TAKING
 from live.run.live_run import CameraOfTest, LiveRun, _run
 from live.run.outcome import INTERRUPTED, TIME_IS_OVER, StopSignal
-from live.stream.record import Waiting
-from live.stream.stream import Stream, Subscriber
+from live.stream.stream import Stream, Subscriber, Waiting
 from tests.live.fakes import ListCamera, frame
 from tests.live.made_up import make_measurement
 

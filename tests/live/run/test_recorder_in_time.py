@@ -14,9 +14,9 @@ from acquire.frame import Burst, CameraInfo
 from acquire.load_cell.contract import NoLoadCell
 from acquire.load_sample import LoadSample
 from live.config.loading import load_config
+from live.pipeline.consumer import Screen
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import FrameCounts, RunState
-from live.pipeline.screen import Screen
 from live.run.control import STOP
 from live.run.outcome import StopSignal
 from live.run.recording import recorder as module

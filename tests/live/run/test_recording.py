@@ -14,9 +14,9 @@ from acquire.events import Event, EventKind
 from acquire.frame import CameraInfo
 from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
+from live.pipeline.consumer import Screen
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import FrameCounts
-from live.pipeline.screen import Screen
 from live.run.control import START, STOP, ControlRefused
 from live.run.recording.pre_trigger import PreTrigger, PreTriggerBuffer
 from live.run.recording.recorder import Recorder, _announce_disk

@@ -15,8 +15,7 @@ from live.pipeline.reference import ReferenceBurst
 from live.pipeline.run_state import RunState
 from live.run.camera_source import CameraSource, GrabPlan
 from live.run.recording.pre_trigger import PreTrigger, PreTriggerBuffer
-from live.stream.record import ReferenceWanted
-from live.stream.stream import Stream
+from live.stream.stream import ReferenceWanted, Stream
 from tests.live.fakes import ListCamera, frame
 from tests.live.streaming import Noted
 

@@ -17,9 +17,9 @@ from acquire.load_sample import LoadSample
 from live.commands.consumers import _emit
 from live.config.listen_address import ListenAddress
 from live.config.sections import SpecimenConfig
-from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import ConsumerReport
 from live.pipeline.run_state import RunState
+from live.pipeline.snapshot import ChannelValues
 from live.run import strain_output
 from live.run.strain_output import MISSED, LineFormat, SerialOut, TcpOut, UdpOut, _number, _rounded
 from live.run.tcp_lines import Client

@@ -25,8 +25,8 @@ from live.config.figures import DEFAULT_CHANNELS
 from live.config.listen_address import ListenAddress
 from live.config.loading import load_config
 from live.config.sections import SpecimenConfig
-from live.pipeline.channel_values import ChannelValues
 from live.pipeline.run_state import RunState
+from live.pipeline.snapshot import ChannelValues
 from live.run.alarms import check_alarms
 from live.run.strain_output import LineFormat, SerialOut, TcpOut, UdpOut
 from tests.live.made_up import START, make_measurement

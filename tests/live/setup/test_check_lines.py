@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.quality.exposure import Depth, Exposure
+from analysis.quality.pattern import Depth, Exposure
 from analysis.quality.steadiness import Steadiness
+from live.setup.check.advice import advice, motion_lines
 from live.setup.check.check_line import CheckLine
-from live.setup.check.motion_lines import motion_lines
-from live.setup.check.noise_advice import advice
 from live.setup.check.noise_floor import GaugeNoise, StrainNoise, ZoiFloor
 from live.setup.check.sample import MIN_FRAMES
 from live.setup.check.verdict import (

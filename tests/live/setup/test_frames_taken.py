@@ -15,7 +15,7 @@ from live.setup import prepared as prepared_module
 from live.setup.check import sample as module
 from live.setup.check.sample import FrameStack, _inner_halves, around, moved, take, temporal_noise
 from live.setup.check.stillness import MAX_ZOIS, covered, middle
-from live.setup.lens_calibration import _places
+from live.setup.lens import _places
 from live.setup.prepared import MeasurePlan
 from tests.live.fakes import ListCamera, frame
 from tests.live.setup.test_prepared import CAMERA

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from acquire.errors import DataError
-from live.setup import lens_calibration as module
-from live.setup.lens_calibration import _box, from_boards, lens_of_corners
+from live.setup import lens as module
+from live.setup.lens import _box, from_boards, lens_of_corners
 from live.setup.scale import (
     Board,
     Corners,

@@ -15,7 +15,7 @@ from analysis import StrainField
 from analysis.field import Blur
 from analysis.quality.steadiness import Steadiness
 from live.config.loading import load_config
-from live.setup.check import noise_floor, sharpness
+from live.setup.check import noise_floor, quick_check
 from live.setup.check.check_list import median
 from live.setup.check.noise_floor import (
     BURSTS,
@@ -35,7 +35,7 @@ from live.setup.check.noise_floor import (
     noise_floors,
     predict_noise,
 )
-from live.setup.check.sharpness import NOT_KNOWN, SharpestPicture
+from live.setup.check.quick_check import NOT_KNOWN, SharpestPicture
 from live.setup.check.stillness import PictureStillness, light
 from tests.live.made_up import make_grid
 
@@ -267,9 +267,9 @@ def test_a_picture_that_is_sharper_for_certain_is_the_next_reference(
 ) -> None:
     made: list[Any] = []
     blurs = [Blur(0.0, 0.01), blur]
-    monkeypatch.setattr(sharpness, "prepare", lambda *given: (Kernel(made, blurs), None))
-    monkeypatch.setattr(sharpness, "mean_blur", lambda found: found)
-    monkeypatch.setattr(sharpness, "correction", lambda *given: lambda burst: burst)
+    monkeypatch.setattr(quick_check, "prepare", lambda *given: (Kernel(made, blurs), None))
+    monkeypatch.setattr(quick_check, "mean_blur", lambda found: found)
+    monkeypatch.setattr(quick_check, "correction", lambda *given: lambda burst: burst)
     burst = SimpleNamespace(mean=np.zeros((8, 8)), n=4)
     stack = SimpleNamespace(cut=lambda *cut: SimpleNamespace(mean=lambda: burst))
     region = SimpleNamespace(grid=make_grid(), at_zois=np.zeros((96, 128), bool), config=None, camera=None)

@@ -20,8 +20,8 @@ from scipy.ndimage import gaussian_filter
 from acquire.errors import DeviceError
 from analysis.field import Blur
 from live.cli import main
-from live.commands import check_watch as check_watch
-from live.commands.check_watch import RenewedLines, blur_line, card, peak_line
+from live.commands import check as check_watch
+from live.commands.check import RenewedLines, blur_line, card, peak_line
 from live.config.loading import load_config
 from live.setup.check.check_line import CheckLine
 from live.setup.check.check_list import examine

@@ -14,13 +14,10 @@ from acquire.frame import CameraInfo
 from analysis.quality.steadiness import Steadiness
 from live.config.loading import load_config
 from live.results.budget import CameraView, budget_rows
-from live.setup.check import disk
-from live.setup.check.budget import budget_lines
-from live.setup.check.check_line import CheckLine
+from live.setup.check import check_line
+from live.setup.check.advice import _vibration, reaching
+from live.setup.check.check_line import CheckLine, budget_lines, disk_lines, write_rate
 from live.setup.check.check_list import automatic_controls, table_lines
-from live.setup.check.disk import disk_lines, write_rate
-from live.setup.check.motion_lines import _vibration
-from live.setup.check.noise_advice import reaching
 from live.setup.check.noise_floor import GaugeNoise, StrainNoise, ZoiFloor
 from live.setup.check.sample import FrameStack
 from live.setup.check.stillness import PictureStillness
@@ -251,7 +248,7 @@ def test_it_must_last_for_the_test_or_ten_minutes(
     monkeypatch: pytest.MonkeyPatch, free: float, seconds: float | None, good: bool, shown: str
 ) -> None:
     config = load_config(None, {} if seconds is None else {"output.seconds": seconds})
-    monkeypatch.setattr(disk, "free_bytes", lambda folder: free)
+    monkeypatch.setattr(check_line, "free_bytes", lambda folder: free)
     (line,) = disk_lines(20 * FRAME, config)
     assert line.good is good and line.value.startswith(shown)
     assert f"for a test of {(seconds or 600) / 60:.3g} min: free some space" in line.advice
@@ -261,6 +258,6 @@ def test_a_disk_that_is_gone_is_no_go(monkeypatch: pytest.MonkeyPatch) -> None:
     def gone(folder: str) -> int:
         raise OSError(5, "Input/output error")
 
-    monkeypatch.setattr(disk, "free_bytes", gone)
+    monkeypatch.setattr(check_line, "free_bytes", gone)
     (line,) = disk_lines(1e6, load_config(None, {"output.dir": "/mnt/usb/run"}))
     assert not line.good and line.value == "/mnt/usb/run: cannot be asked (Input/output error)"

@@ -16,10 +16,9 @@ from acquire.events import Event, EventKind
 from analysis.field import Status
 from live.pipeline.queues import Thinned
 from live.results.maps.colours import LINES, LINES_ON_DARK, number
-from live.results.maps.field_maps import FieldMaps, Painted
+from live.results.maps.painting import FieldMaps, Painted
 from live.results.maps.scale import AutoRange, ColourScale, range_kind
 from live.ui.rerun.drawing.curve import MAX_POINTS, CurveDrawing
-from live.ui.rerun.drawing.large_figures import paint
 from live.ui.rerun.drawing.layout import (
     BAR_GAP,
     BAR_HEIGHT,
@@ -30,6 +29,7 @@ from live.ui.rerun.drawing.layout import (
     VALUES,
     bar_unit,
     gauge_path,
+    paint,
 )
 from live.ui.rerun.drawing.shapes import (
     CYAN,

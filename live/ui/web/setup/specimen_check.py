@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,18 +19,92 @@ from acquire.text import Message
 from acquire.text.printable import brief, printable
 from live.config.sections import DEFAULT_REFERENCE_BURST
 from live.pipeline.latency import OUTPUT
-from live.setup.check.check_line import CheckLine
+from live.setup.check.check_line import CheckLine, disk_lines, write_rate
 from live.setup.check.check_list import CheckFigures, examine
-from live.setup.check.disk import disk_lines, write_rate
 from live.setup.check.quick_check import QuickChecker
+from live.setup.check.sample import FrameStack
 from live.setup.check.verdict import check_lines
 from live.setup.compiling import compile_ahead
 from live.setup.dry_run import picture_kinds
+from live.ui.web.map_view import traffic_light
 from live.ui.web.setup.camera_preview import MAX_BYTES, RECENT, CameraPreview
-from live.ui.web.setup.check_panel import figure_values, frame_stack, line_values, table_values
 from live.ui.web.setup.config_draft import ConfigDraft
 from live.ui.web.setup.load_preview import LoadPreview
 from live.ui.web.setup.specimen_region import SpecimenRegion
+
+GOOD, BAD = 50e-6, 1000e-6
+"""Strain noise of a ZOI that is shown green, and that is shown red."""
+
+
+def frame_stack(frames: Sequence[Frame], info: CameraInfo) -> FrameStack:
+    """Consecutive frames as the input of the check."""
+    lost = sum(frame.lost_before for frame in frames[1:])
+    return FrameStack(np.stack([f.image for f in frames]), np.array([f.t for f in frames]), lost, info)
+
+
+def quality_colours(figures: CheckFigures) -> NDArray[np.uint8]:
+    """Colours of the ZOIs by their predicted strain noise; transparent outside the region."""
+    cells = traffic_light(figures.zois.sigma, GOOD, BAD)
+    cells[~figures.zois.grid.active] = 0
+    return cells
+
+
+def camera_values(info: CameraInfo) -> dict[str, Any]:
+    """The camera, and its settings that can be changed."""
+    return {
+        "name": printable(info.name),
+        "width": info.width,
+        "height": info.height,
+        "bits": info.bits,
+        "fps": info.fps,
+        "format": printable(info.pixel_format),
+        "formats": [printable(name) for name in info.formats],
+        "rates": info.rates,
+        "sliders": [asdict(setting) for setting in info.settings],
+        "warnings": [printable(text) for text in info.warnings],
+    }
+
+
+def line_values(line: CheckLine) -> dict[str, Any]:
+    """A line of the check."""
+    return {
+        "what": line.what,
+        "value": printable(line.value),
+        "good": line.good,
+        "advice": printable(line.advice),
+        "measured": line.measured,
+    }
+
+
+def table_values(figures: CheckFigures) -> dict[str, Any]:
+    """The strain noise of one ZOI by its size and the burst, at the order of the test."""
+    bursts = sorted({noise.burst for floor in figures.floors for noise in floor.noises})
+    rows = [
+        {
+            "zoi": floor.zoi,
+            "order": floor.order,
+            "vsg": floor.vsg,
+            "l10": floor.l10,
+            "noise": [None if (noise := floor.of(n)) is None else noise.known for n in bursts],
+        }
+        for floor in figures.floors
+        if floor.order == figures.order
+    ]
+    return {"bursts": bursts, "rows": rows, "zoi": figures.zoi, "burst": figures.burst}
+
+
+def figure_values(figures: CheckFigures) -> dict[str, Any]:
+    """The figures that change while lens and light are adjusted."""
+    sigma = figures.zois.sigma[np.isfinite(figures.zois.sigma)]
+    return {
+        "sharpness": figures.sharpness,
+        "saturated": figures.exposure.saturated,
+        "light": figures.exposure.high,
+        "noise_GL": figures.noise,
+        "sigma": float(np.median(sigma)) if sigma.size else None,
+        "zois": figures.zois.grid.n_active,
+    }
+
 
 log = logging.getLogger(__name__)
 

@@ -22,7 +22,7 @@ from live.setup.grid import grid_for
 from live.setup.pictures import read_mask
 from live.setup.placement import auto_gauges
 from live.setup.region import region_of
-from live.ui.web.painting import as_png
+from live.ui.web.map_view import as_png
 from live.ui.web.setup.config_draft import ConfigDraft
 from live.ui.web.setup.drawn_region import MAX_UNDO, DrawnRegion
 

@@ -29,7 +29,7 @@ from live.replay.batch.row import COLUMNS, BatchRow
 from live.replay.batch.scheduler import ChunkPlan
 from live.replay.batch.task import ROW_FILE, Task
 from live.replay.batch.test_list import BatchJob, find_tests
-from live.replay.batch.worker_processes import Pool
+from live.replay.batch.worker import Pool
 from tests.live.screens import RecordingScreen
 from tests.live.ui.waiting import LONG_S
 

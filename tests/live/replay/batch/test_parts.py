@@ -15,7 +15,7 @@ from acquire.frame import frozen
 from acquire.load_sample import LoadSample
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.replay.batch import task as module
 from live.replay.batch.row import RENEWED
 from live.replay.batch.task import FIELDS_FILE, LOG_FILE, ROW_FILE, Task, TaskProgress, perform, row_done

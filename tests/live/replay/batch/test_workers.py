@@ -21,8 +21,7 @@ from live.replay.batch.keys import longest_first
 from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress
 from live.replay.batch.test_list import find_tests
-from live.replay.batch.worker import NEEDED, ONE_THREAD, describe_worker
-from live.replay.batch.worker_processes import Pool, WorkerProcess, WorkerProcesses
+from live.replay.batch.worker import NEEDED, ONE_THREAD, Pool, WorkerProcess, WorkerProcesses, describe_worker
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.replay.batch.running import is_gone
 from tests.live.ui.waiting import LONG_S
@@ -138,7 +137,7 @@ def test_no_worker_can_be_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         raise BlockingIOError(11, "Resource temporarily unavailable")
 
     asked = wanted(tmp_path, 1)
-    monkeypatch.setattr("live.replay.batch.worker_processes.subprocess.Popen", none)
+    monkeypatch.setattr("live.replay.batch.worker.subprocess.Popen", none)
     with pytest.raises(DataError, match=r"no process can be started .* end other programs"):
         run_campaign(asked, TerminalScreen(quiet=True), threading.Event())
 
@@ -240,7 +239,7 @@ sys.exit(1)"""
 
 def dying(monkeypatch: pytest.MonkeyPatch, script: str) -> None:
     monkeypatch.setattr(
-        "live.replay.batch.worker_processes.python_command", lambda module: [sys.executable, "-c", script]
+        "live.replay.batch.worker.python_command", lambda module: [sys.executable, "-c", script]
     )
 
 

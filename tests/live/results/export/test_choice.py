@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from acquire.errors import ConfigError, DataError
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.results.export.formats import ExportRequest, export
 from live.results.export.job import ExportJob, ExportOptions, chosen_fields, chosen_rows
 from live.results.quantities import Display
@@ -83,7 +83,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing(
         if next(ticks) > 2:
             raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("live.results.export.vtk.image", lambda *_: full() or b"")  # type: ignore[func-returns-value]
+    monkeypatch.setattr("live.results.export.grids.image", lambda *_: full() or b"")  # type: ignore[func-returns-value]
     with pytest.raises(DataError, match="No space left on device"):
         export(run, ExportRequest("vtk", tmp_path / "vtk"), Screen())
     assert list(tmp_path.iterdir()) == []

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from acquire.load_sample import LoadCellInfo
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.results.export.job import ExportJob
 from live.results.export.r3xa import VERSION, describe
 from live.results.quantities import Display

@@ -14,8 +14,8 @@ from scipy.io import loadmat
 
 from acquire.errors import ConfigError
 from analysis.field import Status
-from live.pipeline.screen import Screen
-from live.results.export import films, tiff
+from live.pipeline.consumer import Screen
+from live.results.export import films, grids
 from live.results.export.formats import ExportRequest, export
 from live.results.export.job import ExportJob, ExportOptions
 from live.results.quantities import Display, mean_name, quantity_of
@@ -196,10 +196,10 @@ def test_a_tiff_of_more_than_four_gigabytes_is_refused(
     pytest.importorskip("tifffile")
     rows, columns = run.strain.grid.shape
     size = N * (4 * rows * columns + 256)
-    monkeypatch.setattr(tiff, "_MAX_BYTES", size - 1)
+    monkeypatch.setattr(grids, "_MAX_BYTES", size - 1)
     with pytest.raises(ConfigError, match=f"12 maps of {columns} x {rows} are more than 4 GB"):
         exported(run, tmp_path / "e.tif", "tiff")
-    monkeypatch.setattr(tiff, "_MAX_BYTES", size)
+    monkeypatch.setattr(grids, "_MAX_BYTES", size)
     exported(run, tmp_path / "e.tif", "tiff")
 
 

@@ -19,14 +19,13 @@ import pytest
 from acquire.events import Event, EventKind
 from acquire.frame import CameraInfo
 from analysis.evaluate import Figure, NoiseFloor
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.results.finished.finished_test import FinishedTest
 from live.results.maps.colours import diverging_table, sequential_table
 from live.results.maps.scale import ColourScale
 from live.results.report import record, report
-from live.results.report.evaluation import EvaluatedCurve
+from live.results.report.evaluation import EvaluatedCurve, still_phase_of
 from live.results.report.maps import _bar, map_pictures, maps, statuses
-from live.results.report.noise_floor import still_phase_of
 from live.results.report.practice import PracticeValues, reporting_table
 from live.results.report.record import events, gauges, hashes, times, version_table
 from live.results.report.report import ReportRequest, make_report, tensile

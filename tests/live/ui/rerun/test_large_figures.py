@@ -11,7 +11,7 @@ import pytest
 
 from live.pipeline.snapshot import Snapshot
 from live.pipeline.timed.figure import TimedFigure
-from live.ui.rerun.drawing.large_figures import HEIGHT, WIDTH, paint
+from live.ui.rerun.drawing.layout import HEIGHT, WIDTH, paint
 from live.ui.rerun.messages import LargeFigures, figures_message, figures_of
 from live.ui.rerun.wire import Kind, Parcel, WireError
 from tests.live.made_up import figures

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from live.cli import main
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.results.run_folder import RunFolder, open_run
 from live.ui.rerun.messages import events_of, field_of, picture_of, rows_of
 from live.ui.rerun.playback import ShowRequest, playback_messages, selected_rows, show, view_setup

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from live.ui.web.painting import as_jpeg
+from live.ui.web.map_view import as_jpeg
 from live.ui.web.setup.device_lists import camera_kinds
 from live.words.language import entries
 from tests.live.ui.web.browser import Page

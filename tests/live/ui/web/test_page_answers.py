@@ -17,7 +17,7 @@ from acquire.errors import EXIT_INTERRUPTED, LOSS, DataError, DeviceError
 from live.commands import page as page_command
 from live.commands.run import finish
 from live.config.loading import load_config
-from live.pipeline.screen import Screen
+from live.pipeline.consumer import Screen
 from live.ui.web import page_controller
 from live.ui.web.authorization import HttpError
 from live.ui.web.page_controller import PageController

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from live.results.maps.field_maps import FIELD_MAPS
+from live.results.maps.painting import FIELD_MAPS
 from tests.live.ui.web.browser import Page
 from tests.live.ui.web.legibility import LOCALES, fits
 from tests.live.ui.web.made_up import (

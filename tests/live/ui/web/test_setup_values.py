@@ -20,17 +20,17 @@ from acquire.serial_line.ports import PortInfo
 from live.config.loading import load_config
 from live.setup.check.check_line import CheckLine
 from live.ui.web.setup import device_lists, specimen_check
-from live.ui.web.setup.check_panel import (
+from live.ui.web.setup.config_draft import ConfigDraft
+from live.ui.web.setup.device_lists import DeviceLists
+from live.ui.web.setup.load_preview import LoadPreview
+from live.ui.web.setup.specimen_check import (
+    SpecimenCheck,
     figure_values,
     frame_stack,
     line_values,
     quality_colours,
     table_values,
 )
-from live.ui.web.setup.config_draft import ConfigDraft
-from live.ui.web.setup.device_lists import DeviceLists
-from live.ui.web.setup.load_preview import LoadPreview
-from live.ui.web.setup.specimen_check import SpecimenCheck
 from tests.live.made_up import CAMERA, make_frame, make_grid
 
 INFO = CameraInfo("sim:", "sim", 256, 192, 12, True, "host")

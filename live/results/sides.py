@@ -1,15 +1,16 @@
-"""Front and back of the specimen put together: mean and bending of each strain, and the figures of the mean.
-
-The two sides come from two finished runs of one test, or from a test that still runs.
-"""
+"""Front and back of one specimen: two runs put together, their folders and clocks, and channels while they run."""
 
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 import time
-from collections.abc import Iterator, Mapping
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text.message import joined, word
 from analysis.evaluate import (
     CONFIDENCE,
     Course,
@@ -27,14 +28,129 @@ from analysis.evaluate import (
     TwoSides,
     evaluate_test,
 )
-from live.config.cameras import BACK, FRONT, SIDES
+from live.config.cameras import BACK, FIELDS, FRONT, SIDES
 from live.config.sections import SpecimenConfig
-from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
+from live.pipeline.measurement import AXIAL, TRANSVERSE, TimeStep, strains_along
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import BURST
+from live.pipeline.timed.figure import LACKING
 from live.results.figures import beyond_scatter, headline, tensile_options
-from live.results.run_folder import RunFolder
-from live.results.sides.folder import shift_s
+from live.results.run_folder import SESSION, STRAIN, RunFolder
+
+LATE_S = 1.0
+"""A side that is behind the other by more than this, and by more than a usual gap, gives no strains."""
+
+
+class JointChannels:
+    """The channels of front and back together (``live.config.figures.JOINT_CHANNELS``); for any thread."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._states: Mapping[str, RunState] = {}
+        self._live = False
+        self._last_t = -math.inf  # the newest instant of both so far
+
+    def attach(self, states: Mapping[str, RunState], *, live: bool) -> None:
+        """Both sides have begun; recorded pictures (not ``live``) may be read one side after the other."""
+        self._states, self._live = states, live
+
+    def read(self, start: float) -> dict[str, float]:
+        """The channels at the newest instant of both; none where there is no such instant, or it is too old.
+
+        ``start`` is time zero, s, monotonic.
+        """
+        if not self._states or self.lost:
+            return {}
+        strains = newest(self._states, self._clock())
+        found = {"mean_time_s": strains[AXIAL].t - start} if AXIAL in strains else {}
+        for name, one in strains.items():
+            channel = name if name == AXIAL else f"gauge_{name}"
+            found |= _channels(channel, one)
+            if name in self._states[FRONT].history.time_steps.gauges:
+                found |= _channels(f"gauge_{name}", one)
+        return found
+
+    @property
+    def lost(self) -> str:
+        """Why there is no mean of both any more; empty while there is, and before both have measured."""
+        for side, state in self._states.items():
+            if state.health.camera_failed:
+                return Message("the camera of the {side} has failed", word(side))
+            if state.snapshot(self._clock()).figure(BURST).state in LACKING:
+                return Message("the {side} gives no strains", word(side))
+        steps = {side: state.history.time_steps for side, state in self._states.items()}
+        if not self._live or not all(steps.values()):
+            return ""
+        ends = {side: one[-1].t for side, one in steps.items()}
+        late, ahead = sorted(ends, key=lambda side: ends[side])
+        limit = max(LATE_S, *(longest_gap(np.array([s.t for s in one[-3:]])) for one in steps.values()))
+        if _went_on(steps[ahead], ends[late]) > limit:
+            return Message("the {late} gives no strains", word(late))
+        joint = newest(self._states, self._clock())
+        if AXIAL in joint:
+            self._last_t = joint[AXIAL].t
+        since = _went_on(steps[late], self._last_t)
+        return Message("no strain of both for {since:.1f} s", since) if since > limit else ""
+
+
+def _went_on(steps: Sequence[TimeStep], t: float) -> float:
+    """How long ``steps`` go on after ``t``, s; a pause before their next is not counted."""
+    first = bisect_right(steps, t, key=lambda step: step.t)
+    return steps[-1].t - steps[first].t if first < len(steps) else 0.0
+
+
+def _channels(name: str, one: JointStrain) -> dict[str, float]:
+    return {f"mean_{name}": one.mean, f"bending_{name}": one.bending, f"sigma_mean_{name}": one.sigma}
+
+
+CLOCKS_AGREE_S = 2.0  # the clock of the day may have been set in between
+
+
+def cameras_in(folder: Path) -> tuple[str, ...]:
+    """The names of the cameras, where ``folder`` is that of a test with several; else none."""
+    return () if (folder / STRAIN).exists() else _with(folder, STRAIN)
+
+
+def recorded_cameras_in(folder: Path) -> tuple[str, ...]:
+    """The names of the cameras, where ``folder`` has the recordings of several; else none."""
+    return _with(folder, SESSION)
+
+
+def _with(folder: Path, file: str) -> tuple[str, ...]:
+    if all((folder / name / file).is_file() for name in SIDES):
+        return SIDES
+    found = tuple(itertools.takewhile(lambda name: (folder / name / file).is_file(), FIELDS))
+    return found if len(found) > 1 else ()
+
+
+def shift_s(front: RunFolder, back: RunFolder) -> float:
+    """What to add to times of the back for times of the front, s; 0 where one run made both.
+
+    Raises
+    ------
+    DataError
+        A recording is missing, or they are of different machines: the two clocks of each disagree.
+    """
+    for run in (front, back):
+        if run.session is None and front.strain.start_utc == back.strain.start_utc:
+            return 0.0
+        if run.session is None:
+            raise DataError(
+                "{path}: no recording, whose clock is needed; give the folders of two runs", run.path
+            )
+    by_machine = back.start_monotonic - front.start_monotonic
+    begun = (datetime.fromisoformat(run.strain.start_utc) for run in (back, front))
+    by_day = (next(begun) - next(begun)).total_seconds()
+    if abs(by_machine - by_day) > CLOCKS_AGREE_S:
+        raise DataError(
+            "{front} and {back}: their clocks are {apart:.0f} s apart; record both on one machine, without a restart"
+            " in between",
+            front.path,
+            back.path,
+            abs(by_machine - by_day),
+        )
+    return by_machine
+
 
 LONGEST_GAP = 5.0  # times the usual distance of the instants of the back
 _RECENT = 12  # time steps of each side that the newest instant of both is found in

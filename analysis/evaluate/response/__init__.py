@@ -1,1 +1,0 @@
-"""What each place does over all instants of a test: ``lines`` from sums that add up, ``departures`` from them."""

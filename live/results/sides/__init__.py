@@ -1,1 +1,0 @@
-"""Front and back of one specimen: two runs put together, their folders and clocks, and channels while they run."""
