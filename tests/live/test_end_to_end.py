@@ -41,7 +41,8 @@ SMALL = {
     "view.enabled": False,
     "view.rrd": False,
 }
-MAPS = ("u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy", "exx", "eyy", "exy", "sigma_exx", "residual", "status")
+MAPS = ("u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy",
+        "residual", "status")  # fmt: skip
 
 
 def live_run(

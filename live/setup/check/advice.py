@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from functools import reduce
 
 from acquire.text import Message
-from acquire.text.message import joined
 from acquire.text.quantity import Amount
 from analysis.quality.steadiness import Steadiness, mains_of, strain_drifts
 from live.setup.check.check_line import CheckLine, not_measured
@@ -115,7 +115,7 @@ def advice(figures: CheckFigures, target: float) -> str:
     """What to change for a strain noise of one ZOI of at most ``target`` (dimensionless)."""
     ways = list(_ways(figures, target))
     if ways:
-        return joined("; ", ways)
+        return reduce(lambda first, other: Message("{first}, or {other}", first, other), ways)
     if not figures.floors:
         return Message("the table of phasedic check shows what reaches it")
     return Message(

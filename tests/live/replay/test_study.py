@@ -67,7 +67,7 @@ def test_windows_given_and_missing(session: Path, tmp_path: Path, capsys: pytest
     assert main([*words, "--static", "0,2", "--loaded", "5,5.9"]) == 0
     printed = capsys.readouterr().out
     assert (
-        "\n1 setting on " in f"\n{printed}" and "it alone shows at least 95% of the largest strain" in printed
+        "\nsettings: 1; " in f"\n{printed}" and "it alone shows at least 95% of the largest strain" in printed
     )
     assert main(words) == 2
     assert "exists already" in capsys.readouterr().err
@@ -110,7 +110,7 @@ def test_nothing_was_still(session: Path, tmp_path: Path, capsys: pytest.Capture
     out = tmp_path / "study"
     words = ["study", str(session), "--zoi", "24,64", "--roi", "all", "--static", "none", "--out", str(out)]
     assert main(words) == 0
-    assert "0 still and 6 loaded bursts" in capsys.readouterr().out
+    assert ": 0 still, 6 loaded\n" in capsys.readouterr().out
     small, large = rows(out)
     assert all(row["noise"] == row["predicted"] for row in (small, large))
     assert small["seen"] > 1.1 * large["seen"] > 0.008

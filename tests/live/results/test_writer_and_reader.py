@@ -399,7 +399,7 @@ def test_what_is_not_ours_is_refused_in_words(tmp_path: Path) -> None:
     foreign = tmp_path / "foreign.h5"
     with h5py.File(foreign, "w") as file:
         file["x"] = 1
-    with pytest.raises(DataError, match="something else, not phasedic-strain"):
+    with pytest.raises(DataError, match="something else: not a strain file of phasedic"):
         Strain.open(foreign)
     with h5py.File(foreign, "a") as file:
         file.attrs["format"], file.attrs["format_version"] = "phasedic-strain", 1

@@ -18,7 +18,8 @@ from live.ui.terminal.summary import print_summary, trouble_lines
 from tests.live.made_run import PULLED, finished, make_run
 from tests.live.results.finished.test_findings import STRAINS, stress_of
 from tests.live.results.finished.test_findings import test_of as made
-from tests.live.ui.terminal.test_summary import Said, run_of
+from tests.live.screens import RecordingScreen
+from tests.live.ui.terminal.test_summary import run_of
 
 AGAIN = MeasuredAgain("phasedic replay R", 4.0)
 
@@ -88,7 +89,7 @@ def test_the_checks_that_were_made_stand_in_one_line() -> None:
 def test_a_bad_test_has_its_answers_in_twelve_lines_in_the_order_in_which_they_are_asked(
     tmp_path: Path,
 ) -> None:
-    run_state, screen = run_of(PULLED[::9]), Said()
+    run_state, screen = run_of(PULLED[::9]), RecordingScreen()
     run_state.frame_counts.add(skipped=40)
     (tmp_path / "session.h5").write_bytes(b"x")
     test = finished(run_state, reference_N=500.0)

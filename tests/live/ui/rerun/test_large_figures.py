@@ -34,7 +34,7 @@ def test_figures_come_back_from_a_message() -> None:
     sent = replace(NOW, figures=lost, alarms=("strain limit: axial is 0.02",))
     meta = json.loads(json.dumps(figures_message(sent).meta, allow_nan=False))
     back = figures_of(Parcel(Kind.FIGURES, meta))
-    assert back.line == "ALARM  strain limit: axial is 0.02" and back.alarmed and back.t == sent.t
+    assert back.line == "ALARM strain limit: axial is 0.02" and back.alarmed and back.t == sent.t
     assert back.cells == LargeFigures.of(sent).cells and back.cells[2][:2] == (
         "FORCE N  24 s old",
         "1\u202f200.0",

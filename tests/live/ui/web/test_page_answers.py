@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from acquire.errors import EXIT_INTERRUPTED, LOSS, DataError, DeviceError
+from acquire.text.message import from_json
 from live.commands import page as page_command
 from live.commands.run import finish
 from live.config.loading import load_config
@@ -105,7 +106,7 @@ def test_the_report_is_shown_once_there_is_one(at: PageController, tmp_path: Pat
     at.end({"figures": []})
     for why, told in (("a full disk\x07", "a full disk"), ("", "no report was made")):
         at.reported(None, why)
-        assert published(at, "after")["report"].startswith(told)
+        assert from_json(published(at, "after")["report"]).startswith(told)
     (tmp_path / "report.html").write_bytes(b"<html>")
     at.reported(tmp_path / "report.html")
     assert published(at, "after")["report"] is True
@@ -162,7 +163,9 @@ def test_a_page_of_a_run_alone_makes_no_report(monkeypatch: pytest.MonkeyPatch) 
         assert alone._answer_to("start").line == "no: the test is being opened"
         alone.end({"figures": []})
         after, stage = published(alone, "after"), published(alone, "stage")
-        assert (after["again"], after["next"]) == (None, None) and "makes no report" in after["report"]
+        assert (after["again"], after["next"]) == (None, None) and "makes no report" in from_json(
+            after["report"]
+        )
         assert stage["stage"] == "after" and stage["n"] == 1
         assert alone._answer_to("next").refused
 
