@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.text import Message
+from acquire.text.quantity import Amount
 from analysis.evaluate.curve import ENOUGH, Curve, Floats, Loading, first_crossing, noise, reading, smoothed
 from analysis.evaluate.elastic import FittedLine
 from analysis.evaluate.figure import Figure, quantile
@@ -30,6 +31,7 @@ _BEGINS = 0.002  # plastic strain before which flow begins
 _FINE = 2.5e-4  # strain that the means may reach over where the stress waves
 _ABOUT = 0.25  # of a proof strain: the part of the curve that its stress is read from
 _PULLED = 0.5  # of the plastic strain there: the strain must grow by as much, or it is a hold
+_LEAP = 0.5  # of the plastic strain, between two measurements: the course of the material is not seen
 _BEFORE = 5  # samples whose rise bounds what may lie between two of them
 _SURE = 4.0  # standard deviations that a fall must exceed
 _EQUAL = 0.1  # of the readings equal to the one before: their noise is below their resolution
@@ -75,6 +77,11 @@ def proof_strength(loading: Loading, line: FittedLine, offset: float) -> Figure:
         between = _waves(loading, at, stress.value, np.arange(first, last))
     else:
         between = _bend(loading.stress, at) + hardening * _bend(plastic, at)
+    leap = float(np.diff(plastic[line.first : last + 1]).max())
+    if leap > max(_LEAP * offset, _SURE * math.sqrt(2) * noise(plastic[line.first : last])):
+        found = found.remarked(
+            Message("the strain leaps by {leap} between two measurements before", Amount("strain", leap))
+        )
     return replace(found, low=found.low - between, high=found.high + between)
 
 

@@ -154,6 +154,16 @@ def test_a_proof_strength_is_as_sure_as_the_elastic_line_there(offset: float, sa
     assert found.value - found.low == pytest.approx(expected, rel=2e-3)
 
 
+@pytest.mark.parametrize(("leap", "told"), [(0.0, False), (9e-4, False), (1.3e-3, True), (2.2e-3, True)])
+def test_a_strain_that_leaps_over_a_proof_strength_is_told(leap: float, told: bool) -> None:
+    """Flow as above; from one measurement to the next the strain grows by ``leap``, where nothing flows yet."""
+    plastic = np.concatenate([np.zeros(30), 1e-5 + 5e-5 * np.arange(120)])
+    stress = np.concatenate([np.linspace(0, 140e6, 30), 140e6 + 1e9 * plastic[30:]])
+    plastic[29:] += leap
+    found = proof_strength(loading(plastic + stress / E_PA, stress), LINE, 0.002)
+    assert found.known and ("leaps by" in found.why) == told, found.why
+
+
 def test_a_plateau_without_a_sample_beyond_its_undershoot_has_no_lower_yield_strength() -> None:
     elastic = np.linspace(0, 3e-3, 30)
     strain = np.concatenate([elastic, [3.3e-3, 6e-3, 7e-3]])
