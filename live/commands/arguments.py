@@ -10,13 +10,14 @@ import argparse
 import difflib
 import importlib
 import os
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from acquire.errors import EXIT_CODES, ConfigError, PhasedicError
+from acquire.errors import EXIT_CODES, USAGE, ConfigError, PhasedicError
 from acquire.text import Message
 from live.words.language import said_here
 
@@ -246,6 +247,9 @@ def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
         argv = understood(argv)
     except PhasedicError as error:
         parser.error(said_here(error.text))
+    if not argv:
+        parser.print_help(sys.stderr)
+        parser.exit(USAGE)
     wanted = next((word for word in argv if not word.startswith("-")), "")
     if wanted and wanted not in COMMANDS:
         near = difflib.get_close_matches(wanted, COMMANDS, 1)

@@ -14,7 +14,7 @@ from acquire.errors import ConfigError
 from analysis.field import Blur
 from live import VERSION
 from live.cli import main
-from live.commands.arguments import parse, understood
+from live.commands.arguments import COMMANDS, parse, understood
 from live.commands.check import RenewedLines, blur_line, peak_line, short_line
 from live.commands.options import configured, overrides
 from live.commands.report import _first_free, _targets
@@ -40,6 +40,13 @@ def test_options_win_over_the_file_and_the_file_over_defaults(tmp_path: Path) ->
     assert (found.measure.zoi, found.measure.burst) == (32, 6)
     assert (found.specimen.width_mm, found.specimen.thickness_mm) == (20.0, 2.0)
     assert found.specimen.area_m2 == pytest.approx(40e-6)
+
+
+def test_no_command_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        parse([])
+    out, err = capsys.readouterr()
+    assert (ended.value.code, out) == (2, "") and all(f"\n    {name}" in err for name in COMMANDS)
 
 
 def test_the_version_alone(capsys: pytest.CaptureFixture[str]) -> None:
