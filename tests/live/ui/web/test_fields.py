@@ -191,13 +191,13 @@ def test_a_setting_of_the_kind_of_camera_is_written_into_its_address(page: MadeP
     page.sent()
     for text, address in (("45", "sim:woven?fps=20&hole=45"), ("", "sim:woven?fps=20")):
         field.fill(text)
-        field.press("Enter")
+        field.blur()
         sent: list[dict[str, Any]] = []
         page.until(lambda sent=sent: bool(sent.extend(page.sent()) or sent), "it is sent")  # type: ignore[misc]
         assert [(one["do"], one["value"]) for one in sent] == [("address", address)]
     page.answer("not possible")
     field.fill("no")
-    field.press("Enter")
+    field.blur()
     page.until(lambda: field.input_value() == "30", "what is refused is not kept")
     page.set_up(address="session:run.h5")
     assert page.page.is_hidden("#kind"), "it has none"

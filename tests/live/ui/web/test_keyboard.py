@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from acquire.text.message import from_json
 from live.cli import main
 from tests.live.ui.web.browser import Page
 from tests.live.ui.web.conftest import CAMERA, OPTIONS, Start, measuring
@@ -209,5 +210,7 @@ def check_every_instant(page: Page) -> int:
         assert state["figures"]["stress"]["value"] == pytest.approx(stress, rel=1e-6)
         assert state["figures"]["force"]["value"] == pytest.approx(stress * 40e-6, rel=1e-6)
         assert state["figures"]["axial"]["value"] == pytest.approx(axial, rel=1e-6, abs=1e-12)
-        assert "delay" not in {one["label"] for one in state["facts"]}, "a recording is not late"
+        assert "delay" not in {str(from_json(one["label"])) for one in state["facts"]}, (
+            "a recording is not late"
+        )
     return len({one["points"][1] for one in states})

@@ -128,7 +128,7 @@ def test_codes_are_words_unless_the_expert_asks(browser: Any) -> None:
         page.page.reload()
         page.page.wait_for_selector("#language")
         show_run(page, stage | {"what": WHAT | {"along": "exx"}})
-        assert listed.all_text_contents()[:2] == PLAIN[1::-1], "the load goes across the picture"
+        page.until(lambda: listed.all_text_contents()[:2] == PLAIN[1::-1], "the load goes across the picture")
         show_setup(page)
         page.step("check")
         assert page.page.is_hidden("#points") and not page.errors
