@@ -158,7 +158,7 @@ def add_time_span(parser: argparse.ArgumentParser) -> None:
 
 def add_as_measured(parser: argparse.ArgumentParser) -> None:
     """Add --as-measured."""
-    words = "use the bursts of the live run; results are bit-identical"
+    words = "use the bursts of the live run; results are bit-identical where all were recorded"
     parser.add_argument("--as-measured", action="store_true", help=words)
 
 
