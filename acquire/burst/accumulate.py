@@ -96,7 +96,8 @@ def compile_loops(kinds: tuple[str, ...] = ("uint8", "uint16")) -> None:
         image, total = frozen(np.zeros((3, 3), kind)), np.empty(9, of_sum)
         frames, rooms = (image.reshape(-1),) * GROUP, scratch(kind)
         fold(frames, 1, frames[0], *rooms, total, mean, clipped, 255, True, 1)
-        mean_of_sum(total, 1, mean)
+        for one in (total, frozen(total.copy())):  # of a recording; of a live burst
+            mean_of_sum(one, 1, mean)
         tile_sums(image, image, 1, 1, 1)
 
 

@@ -112,7 +112,7 @@ def _common(out: Floats, known: ReferenceArgs, every: int, given: bool) -> Poole
     groups = _alike(count)
     middle, usual = medians(contrast[groups]), medians(ratio[groups])
     number, shares = count * min(1.0, every * known.independent), np.array(cubic) / known.white[:, None]
-    usual_bend = medians(np.ascontiguousarray(bends)[None]) / (WHITE_BENT * known.bends)
+    usual_bend = medians(bends[None]) / (WHITE_BENT * known.bends)
     bent = max(1.0, float(_shrunk(usual_bend, number)[0]))
     if given and usual.min() > AGREES[0] and usual.max() < AGREES[1]:
         colour = _shrunk(medians(shares), number)
@@ -133,12 +133,20 @@ def _common(out: Floats, known: ReferenceArgs, every: int, given: bool) -> Poole
 
 def median(values: Floats) -> float:
     """The median of (N,) finite values."""
-    return float(medians(np.ascontiguousarray(values)[None])[0])
+    return float(medians(values[None])[0])
+
+
+def medians(rows: Floats) -> Floats:
+    """The median of each row of (K, N) finite values, (K,); in any order in memory."""
+    medians_of_rows: Floats = row_medians(
+        np.ascontiguousarray(rows)
+    )  # another order would be compiled in a test
+    return medians_of_rows
 
 
 @helper
-def medians(rows: Any) -> Any:
-    """The median of each row of (K, N) finite values, (K,)."""
+def row_medians(rows: Any) -> Any:
+    """As ``medians``, of rows one after the other in memory."""
     out = np.empty(len(rows))
     for i in range(len(rows)):
         out[i] = np.median(_middle(rows[i]))

@@ -51,7 +51,7 @@ def _loops(phase: bool) -> list[Any]:
     loops = [
         sensitivity.prepare, iteration.track, shared.share_warps, search.match, hill_climb.climb,
         prediction.advance, verdict.judge, coherence.stand_out, coherence.label,
-        assembly.expect, assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.medians,
+        assembly.expect, assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.row_medians,
         pooling.interpolate, assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
         sparse_sums.row_sums, sparse_sums.overlapping,
     ]  # fmt: skip

@@ -222,6 +222,13 @@ def test_what_those_that_do_not_bend_decide_has_no_step() -> None:
     assert apart[0] and not apart[-1]
 
 
+def test_medians_are_compiled_once_for_any_order_in_memory() -> None:
+    rows = np.random.default_rng(3).normal(size=(3, 5000))
+    for one in (rows, np.asfortranarray(rows), rows[:, ::2]):
+        np.testing.assert_array_equal(pooling.medians(one), np.median(one, axis=1))
+    assert len(pooling.row_medians.signatures) == 1
+
+
 def test_given_noise_stands_where_what_is_left_agrees_and_few_zois_decide_nothing() -> None:
     signal = np.full(200, 900.0)
     found, known = zois(200, np.full(200, 0.9), signal)

@@ -1,4 +1,4 @@
-"""After ``make demo`` the README's next commands compile nothing: a newcomer waits for it once."""
+"""What is compiled ahead is all that is: nothing in a first test, and nothing by the README's next commands."""
 
 from __future__ import annotations
 
@@ -49,18 +49,46 @@ for line in sys.argv[1:]:
 """
 
 
+def run(folder: Path, lines: list[str], **added: str) -> tuple[list[str], str]:
+    """The exit codes of commands of one process; its errors and names of loops are in ``folder`` afterwards."""
+    listener = folder / "listener"
+    listener.mkdir()
+    (listener / "sitecustomize.py").write_text(AND_COMPILED)
+    added |= {"PYTHONPATH": f"{listener}{os.pathsep}{ROOT}", "COMPILED": str(folder / "compiled")}
+    done = subprocess.run(
+        [sys.executable, "-c", COMMANDS, *lines],
+        cwd=folder, env={**os.environ, **added}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    return [line.split()[1] for line in done.stdout.splitlines() if line.startswith("exit:")], done.stderr
+
+
+def compiled(folder: Path) -> list[str]:
+    """The loops that ``run`` compiled, but those of simulated devices, which no camera has, and numba's own parts."""
+    names = folder / "compiled"
+    found = names.read_text().split() if names.exists() else []
+    return [name for name in found if not name.startswith(("hw_mocks.", "numba."))]
+
+
 @pytest.mark.slow
 def test_nothing_is_compiled_after_the_demo(tmp_path: Path) -> None:
     """Every test begins with what the demo compiles (tests/conftest.py)."""
-    listener, compiled = tmp_path / "listener", tmp_path / "compiled"
-    listener.mkdir()
-    (listener / "sitecustomize.py").write_text(AND_COMPILED)
-    added = {"PYTHONPATH": f"{listener}{os.pathsep}{ROOT}", "COMPILED": str(compiled)}
-    done = subprocess.run(
-        [sys.executable, "-c", COMMANDS, *NEXT],
-        cwd=tmp_path, env={**os.environ, **added}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    lines = done.stdout.splitlines()
-    assert [line.split()[1] for line in lines if line.startswith("exit:")] == ["0"] * len(NEXT), done.stderr
-    names = compiled.read_text().split() if compiled.exists() else []
-    assert [name for name in names if not name.startswith("hw_mocks.")] == []  # no camera has its loops
+    exits, errors = run(tmp_path, NEXT)
+    assert exits == ["0"] * len(NEXT), errors
+    assert compiled(tmp_path) == []
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_nothing_is_compiled_in_the_first_test(tmp_path: Path) -> None:
+    """Where nothing has ever been compiled: all that the demo uses is compiled before it begins."""
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "loops")}
+    ahead, test = tmp_path / "ahead", tmp_path / "test"
+    for folder in (ahead, test):
+        folder.mkdir()
+    exits, errors = run(ahead, ["warm-up"], **cache)
+    assert exits == ["0"] and len(compiled(ahead)) > 50, errors
+    exits, errors = run(test, ["demo --seconds 14 --no-view --no-rrd --out out"], **cache)
+    assert len(exits) == 1 and (test / "out" / "strain.h5").exists(), (
+        errors
+    )  # how well it measures is not asked
+    assert compiled(test) == []
