@@ -3,6 +3,23 @@
 ``Deformation`` is all that the renderer asks for; ``Affine`` and ``Wave`` serve accuracy tests,
 ``SpecimenDeformation`` is that of a specimen at one instant. Displacements are px on the reference grid,
 x right and y down: ``deformed(x + u, y + v) = reference(x, y)``.
+
+The strain fields of the virtual specimens, each linear in the two mean strains.
+
+A field is ``axial * A(x, y) + transverse * T(x, y)``; A and T are closed forms with exact
+gradients, so that they are computed once for the places that matter and combined at each instant.
+
+- uniform: homogeneous.
+- hole: Kirsch's plate with a round hole in uniaxial tension, plane stress and small strain
+  (Muskhelishvili's potentials). Kinematic beyond yield: the field keeps its elastic shape with the
+  transverse strain of the moment, plasticity does not spread from the hole.
+- woven: homogeneous plus a periodic part with over-strain where the yarns of a plain weave cross;
+  its mean over a cell is the mean strain.
+
+- halves: homogeneous in each of two halves along the load, which flow at different stresses.
+
+Beside these a neck may grow: a band across the load whose strains, beyond those elsewhere, fall off as sech^2. The
+first half is such a part too: what it has beyond the second one falls off at its edge as tanh.
 """
 
 from __future__ import annotations

@@ -1,4 +1,10 @@
-"""The pictures that a folder, a glob or the name of a file stands for, and their order in time."""
+"""The pictures that a folder, a glob or the name of a file stands for, and their order in time.
+
+The order of the pictures of a test by their names, and by their times where names do not say it.
+
+Numbers count by their value. What a name may mean is put in ``_Reading``: where two readings give two orders, times
+of the pictures decide if they follow one of them and not merely the alphabet, as copied files do; else it is asked.
+"""
 
 from __future__ import annotations
 

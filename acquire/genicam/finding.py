@@ -1,4 +1,7 @@
-"""Which GenICam cameras are there, and which of them an address means."""
+"""Which GenICam cameras are there, and which of them an address means.
+
+Which GenICam cameras there are and what they offer: for ``phasedic devices``. Looks and never streams.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,11 @@
 numba keeps compiled code beside this package where that folder can be written, else in the
 user's cache folder; NUMBA_CACHE_DIR overrides both. Importing this module imports numba, so the
 rest of the package does that only when a kernel is made.
+
+Numba's files of compiled loops, each with a checksum behind it: one that is cut or damaged is compiled anew.
+
+A power cut leaves files that are empty, cut, or of zeros. Numba would raise an error on them, or run what they hold.
+It reads the files of this module too, since it ignores what follows. ``acquire.compiled_loops`` does the same.
 """
 
 from __future__ import annotations

@@ -1,4 +1,17 @@
-"""What each place does over all instants of a test: a line by sums that add up, and where it leaves its line."""
+"""What each place does over all instants of a test: a line by sums that add up, and where it leaves its line.
+
+The straight line y = a + b x of each place through all instants, from sums that add up.
+
+Weights are 1 / sigma^2. What is common to all instants measured against one reference, such as its noise, is in the
+intercept of that reference and not in the slope. Where x has noise too, the slope is that of the moments without it
+(W. A. Fuller, Measurement Error Models, 1987, doi:10.1002/9780470316665, sections 1.2 and 1.3).
+
+Where each place leaves its line: local yield, first cracks, debonding, in the order in which places give in.
+
+The mean of ``WINDOW`` instants, of a thirtieth of them where there are many, is held against the line of all before.
+The limit is that of a normal deviate which all looks together pass at ``CHANCE`` of the places; it is never below
+``LIMIT``.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 ``evaluate_test`` takes a ``Curve`` and a ``Standard``. The curve itself stays as it was measured; the zero of its
 strain is an option that the result names.
+
+The strain rate of parts of a test, and its duration, held against a standard.
 """
 
 from __future__ import annotations

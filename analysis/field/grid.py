@@ -4,6 +4,10 @@ A ZOI (zone of interest) is a square of ``size`` pixels; its values stand at its
 least-squares weight of its pixels: a product of one line along x and the same line along y. ``gaussian`` has
 sigma = size/6. Where the paper has an analysis window, the weight of its least squares is the square of that
 window (docs/method.md); here the window is the weight.
+
+Why a ZOI has a value, or has none.
+
+The motion that a field predicts for the next one.
 """
 
 from __future__ import annotations

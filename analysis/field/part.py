@@ -1,4 +1,9 @@
-"""A rectangular part of a field as a field of its own."""
+"""A rectangular part of a field as a field of its own.
+
+Blocks of ZOIs without a value, and the share of an area that is left.
+
+How much less sharp a picture is than its reference: a width in px, from the variance that its blur has grown by.
+"""
 
 from __future__ import annotations
 

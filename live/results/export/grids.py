@@ -1,4 +1,16 @@
-"""Maps as pictures of numbers (TIFF) and as grids with fields (VTK)."""
+"""Maps as pictures of numbers (TIFF) and as grids with fields (VTK).
+
+``tiff``: one map at all instants as a stack of 32-bit floats, with the units that ImageJ reads.
+
+tifffile writes the TIFF of ImageJ: units and notes in its description, and time and force as the label of each slice
+in private tags. For other readers the pages are plain; a ZOI without a value is NaN.
+
+``vtk``: a ``.vti`` an instant and a ``.pvd`` with their times, for ParaView and other readers of VTK.
+
+XML image data with appended raw data (VTK File Formats, https://docs.vtk.org/en/latest/vtk_file_formats/):
+the points are the centres of the ZOIs. Values are arrays of the points; ``displacement`` is the vector to warp
+by; time and force are in the field data. VTK's y axis points up: without ``--y-up`` a map is upside down.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
 """What a person asks of a test: can its figures be believed, what is missing, and what to type for it.
 
 Summary and report show the same lines, made of the figures and checks that ``figures.json`` has.
+
+Whether the first figures of a test can be believed, as one sentence for page and report.
 """
 
 from __future__ import annotations

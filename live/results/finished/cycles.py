@@ -1,4 +1,7 @@
-"""The cycles of a finished test: ``cycles.csv``, and what summary, page, report and figures.json say of them."""
+"""The cycles of a finished test: ``cycles.csv``, and what summary, page, report and figures.json say of them.
+
+What summary, page, report and figures.json say of the creep of a finished test.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Maps painted over pictures by OpenCV: each ZOI at its place at that instant, with title, colour bar or legend."""
+"""Maps painted over pictures by OpenCV: each ZOI at its place at that instant, with title, colour bar or legend.
+
+The maps of a field in colours during a test: strains, principal strains, displacements, sigma, status.
+"""
 
 from __future__ import annotations
 

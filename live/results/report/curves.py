@@ -1,4 +1,7 @@
-"""The plots of a report."""
+"""The plots of a report.
+
+The sections of cyclic tests, figures of cycles against the logarithm of their number, and of a creep.
+"""
 
 from __future__ import annotations
 

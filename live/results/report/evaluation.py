@@ -1,4 +1,7 @@
-"""The evaluation of a finished run: its curve with the tensile figures, the lag of the load, the instants to show."""
+"""The evaluation of a finished run: its curve with the tensile figures, the lag of the load, the instants to show.
+
+The still phase of a finished test and the noise floor measured in it, for report, comparison and batch.
+"""
 
 from __future__ import annotations
 

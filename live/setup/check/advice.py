@@ -1,4 +1,9 @@
-"""What a check advises on motion and on noise."""
+"""What a check advises on motion and on noise.
+
+Lines of a check on what moves: drift, distance, tilt, vibration.
+
+What to change for a strain noise that is asked for: larger ZOIs, longer bursts, more light.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""A line of the check, and those of the disk and of the budget of E."""
+"""A line of the check, and those of the disk and of the budget of E.
+
+How long the disk lasts for the recording of a test, from the pictures of a check.
+
+The budget of E before a test: what is given, the noise of the pictures, and what is not stated.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The check, repeated several times a second while lens, light and exposure are adjusted."""
+"""The check, repeated several times a second while lens, light and exposure are adjusted.
+
+How much less sharp the picture is than the sharpest one so far, while lens and distance are adjusted.
+"""
 
 from __future__ import annotations
 

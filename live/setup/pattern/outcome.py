@@ -1,6 +1,8 @@
 """The outcome of a characterisation: what it consists of, its file, its progress.
 
 An ``ExperimentOutcome`` is text, tables and verdicts, stored as JSON without loss; figures and CSV files are beside it.
+
+The Markdown page of a characterisation: verdicts first, then section by section.
 """
 
 from __future__ import annotations

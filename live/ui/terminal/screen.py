@@ -2,6 +2,8 @@
 
 A terminal that was closed must not end a recording: what cannot be printed is dropped. Text from a file or a
 device may contain control characters; they are escaped.
+
+The terminal of a test with several cameras: lines with the name of their camera, and one status line of all.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The map over the picture of a running test: its range, its histogram, and the value at a place."""
+"""The map over the picture of a running test: its range, its histogram, and the value at a place.
+
+Small pictures for the page: grey levels, saturated pixels, and the noise of ZOIs in colours.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The initial layout of the viewer: the views, what each shows, and their sizes (rerun blueprint)."""
+"""The initial layout of the viewer: the views, what each shows, and their sizes (rerun blueprint).
+
+Paints the large figures, readable from two metres; red while an alarm is active.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Set-up before a test: camera, load cell, region, gauges and check of one rig, joined for the page."""
+"""Set-up before a test: camera, load cell, region, gauges and check of one rig, joined for the page.
+
+The set-up of all cameras of a test, which are checked, saved and started together.
+"""
 
 from __future__ import annotations
 
