@@ -83,10 +83,8 @@ class FramePace:
     """The rate at which a camera gives its frames, whatever its driver says: the median of the last intervals."""
 
     KNOWN, KEPT = 5, 20  # intervals: from which the rate is known, and of which it is the median
-    GAP, ALIKE = (
-        1.5,
-        0.25,
-    )  # a gap is longer than so many intervals, and differs by so much from the one before
+    # A gap is longer than so many intervals, and differs by so much from the one before
+    GAP, ALIKE = 1.5, 0.25
 
     def __init__(self) -> None:
         self._intervals: deque[float] = deque(maxlen=self.KEPT)

@@ -23,10 +23,8 @@ class StoredReadings:
         self._filed: list[Block | int] = []
         self._starts = array("d")  # first time of each block that is filed
         self._times, self._forces = array("d"), array("d")  # of the block that is not full yet
-        self._used: tuple[int, Block] = (
-            -1,
-            np.empty((2, 0)),
-        )  # number and content of the block that was used last
+        # Number and content of the block that was used last.
+        self._used: tuple[int, Block] = -1, np.empty((2, 0))
 
     def append(self, t: float, force: float) -> None:
         """Add the newest."""

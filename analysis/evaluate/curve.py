@@ -17,10 +17,8 @@ Floats = NDArray[np.float64]
 _BROKEN = 0.02  # of the highest stress: below it there is no specimen any more
 _FALL = 5.0  # times what is usual from one sample to the next
 _BACK = 0.2  # of the highest stress: what has broken does not carry as much again
-_UNLOADED, _TOGETHER = (
-    3,
-    0.9,
-)  # samples of a fall in which strain and stress go down together, and their correlation
+# Samples of a fall in which strain and stress go down together, and their correlation
+_UNLOADED, _TOGETHER = 3, 0.9
 _SURE, _LOOP = 8.0, 0.02  # of an unloading: standard deviations, and share of the highest stress
 _PARTS, _WIDEST = 60, 4  # of a loading: half the width of its running means, and the most, samples
 _MEDIAN_OF_NORMAL = 0.6745

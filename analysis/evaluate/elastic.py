@@ -29,10 +29,8 @@ _CLEAR = 20.0  # standard deviations of the noise that strains must move to have
 _CLEAR_STRAIN, _CLEAR_RATIO = 1e-4, 1.5  # above vibration and warming; and over the strain across
 _UNEVEN_SIGMA, _UNEVEN_SHARE = 3.0, 0.02  # of a strain that is not uniform: over its noise, and of the strain
 _CLEAR_BLUR = 3.0  # standard uncertainties of the rise of that variance with the strain
-_END, _BESIDE = (
-    0.1,
-    1.5,
-)  # of the points of the interval: read at each end of a chord; and of their usual distance
+# Of the points of the interval: read at each end of a chord; and of their usual distance
+_END, _BESIDE = 0.1, 1.5
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ a cyclic test, a loop of the material explains as much.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +49,13 @@ class Track:
         """Without what is not known."""
         good = np.isfinite(self.t) & np.isfinite(self.values)
         return Track(self.t[good], self.values[good])
+
+    @classmethod
+    def joined(cls, pieces: Iterable[Track]) -> Track:
+        """One after the other; without pieces it is empty."""
+        none, parts = np.empty(0), [*pieces]
+        t, values = np.concatenate([none, *(one.t for one in parts)]), [none, *(one.values for one in parts)]
+        return cls(t, np.concatenate(values))
 
 
 def find_lag(strain: Track, force: Track, max_lag: float = 1.0, max_half_width: float = 0.1) -> Figure:

@@ -19,14 +19,10 @@ from analysis.evaluate.figure import Figure, quantile
 
 Indices = NDArray[np.intp]
 
-_DROP, _RANGE = (
-    0.005,
-    0.0005,
-)  # annex A: a yield point falls by 0.5 % and is not passed again for 0.05 % strain
-_TRANSIENT, _PLATEAU = (
-    0.0005,
-    0.0025,
-)  # strain after ReH: its undershoot, and where ReL is looked for (clause 12)
+# Annex A: a yield point falls by 0.5 % and is not passed again for 0.05 % strain
+_DROP, _RANGE = 0.005, 0.0005
+# Strain after ReH: its undershoot, and where ReL is looked for (clause 12)
+_TRANSIENT, _PLATEAU = 0.0005, 0.0025
 _BEGINS = 0.002  # plastic strain before which flow begins
 _FINE = 2.5e-4  # strain that the means may reach over where the stress waves
 _ABOUT = 0.25  # of a proof strain: the part of the curve that its stress is read from

@@ -21,12 +21,8 @@ ALLOWED_PX, ALLOWED_SIGMAS, ALLOWED_SPREADS = 0.05, 10.0, 6.0
 SUPPORT = 3
 """Neighbours that move as a ZOI does, by their gradients, with which it does not stand alone: beside a crack."""
 ROUGH, ALONE = 1, 2
-_STEPS, _FEW, _FLAT, _LEAST = (
-    8,
-    9,
-    4,
-    1e-4,
-)  # of the fit: steps, ZOIs for the second degree, for the first; px
+# Of the fit: steps, ZOIs for the second degree, for the first; px
+_STEPS, _FEW, _FLAT, _LEAST = 8, 9, 4, 1e-4
 
 
 def _others() -> NDArray[np.float64]:

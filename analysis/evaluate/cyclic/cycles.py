@@ -29,10 +29,8 @@ from analysis.evaluate.programme import reversals
 Floats = NDArray[np.float64]
 MIN_CYCLES = 4
 """Fewer are none."""
-_SURE, _LEAST = (
-    12.0,
-    0.1,
-)  # standard deviations of the noise, and share of the whole range: what a cycle exceeds
+# Standard deviations of the noise, and share of the whole range: what a cycle exceeds
+_SURE, _LEAST = 12.0, 0.1
 _SHARE, _FACTOR = 0.8, 1.2  # of the cycles that must be like the one before, and how like
 _KEPT = 16_384  # readings, of a cycle that goes on
 _BLOCK = 32_768  # readings and bursts that are taken at once, of a test that is over
@@ -86,7 +84,7 @@ class CycleCounter:
 
     def __init__(self, *, loaded: bool) -> None:
         self._loaded = loaded
-        self._load, self._bursts = Track(*np.empty((2, 0))), BurstStrains(*np.empty((3, 0)))
+        self._load, self._bursts = Track.joined(()), BurstStrains(*np.empty((3, 0)))
         self._low, self._high, self._middle = math.inf, -math.inf, math.nan
         self._last: tuple[float, float] | None = None  # duration and range
         self._alike = self.count = 0
@@ -193,7 +191,7 @@ def _crossing(t: Floats, y: Floats, i: int, level: float) -> float:
 
 def _side_by_side(load: Iterable[Track], bursts: BurstStrains) -> Iterator[tuple[Track, BurstStrains, bool]]:
     """Load and bursts of the same times, at most ``_BLOCK`` of each, and whether nothing follows."""
-    waiting, first, done = Track(*np.empty((2, 0))), 0, -math.inf
+    waiting, first, done = Track.joined(()), 0, -math.inf
     for block in itertools.chain(_blocks(load), [None]):
         until = math.inf if block is None else float(block.t[0])
         if len(waiting.t) or block is None:
@@ -205,24 +203,20 @@ def _side_by_side(load: Iterable[Track], bursts: BurstStrains) -> Iterator[tuple
                     done == math.inf,
                 )
                 waiting, first = Track(waiting.t[n:], waiting.values[n:]), last
-        waiting = waiting if block is None else _joined(waiting, block)
+        waiting = waiting if block is None else Track.joined((waiting, block))
 
 
 def _blocks(pieces: Iterable[Track]) -> Iterator[Track]:
     """The same in blocks of ``_BLOCK``; the last has fewer."""
-    rest = Track(*np.empty((2, 0)))
+    rest = Track.joined(())
     for piece in pieces:
-        rest = _joined(rest, piece)
+        rest = Track.joined((rest, piece))
         whole = len(rest.t) - len(rest.t) % _BLOCK
         for k in range(0, whole, _BLOCK):
             yield Track(rest.t[k : k + _BLOCK], rest.values[k : k + _BLOCK])
         rest = Track(rest.t[whole:], rest.values[whole:])
     if len(rest.t):
         yield rest
-
-
-def _joined(one: Track, other: Track) -> Track:
-    return Track(np.concatenate([one.t, other.t]), np.concatenate([one.values, other.values]))
 
 
 class CycleTable:

@@ -27,10 +27,8 @@ SHOWN = 3
 """Findings at the top of summary and report."""
 Outcome = Literal["good", "doubt", "not checked"]
 
-_CLEAR, _CLEAR_STRAIN = (
-    10.0,
-    1e-4,
-)  # of a strain or stress that has changed: in its noise; and a strain at least
+# Of a strain or stress that has changed: in its noise; and a strain at least
+_CLEAR, _CLEAR_STRAIN = 10.0, 1e-4
 _FOLLOWS = 0.5  # correlation of stress and strain from which on one follows the other
 _MODULUS_GPa = (0.1, 1000.0)  # of solids
 _MODULUS_OFF = 0.2

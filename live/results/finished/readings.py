@@ -20,7 +20,6 @@ from analysis.evaluate import Figure, Track, find_lag
 MOST = 1 << 21
 """Readings that are held at once: 35 minutes at 1 kHz."""
 _BEFORE_S = 2.0  # of readings that come before the first picture: a lag may be as large
-_NONE = Track(np.empty(0), np.empty(0))
 
 
 class Readings:
@@ -58,7 +57,7 @@ class Readings:
     def thinned(self, most: int) -> Track:
         """At most about so many; all where there are no more."""
         each = math.ceil(3 * self.count / most) if self.count > most else 1
-        return _joined([_thinned(piece, each) for piece in self.pieces()])
+        return Track.joined([_thinned(piece, each) for piece in self.pieces()])
 
     def first(self, since: float = -math.inf) -> Track:
         """All, or the first ``MOST`` from the time ``since`` on."""
@@ -71,7 +70,7 @@ class Readings:
             left -= len(found[-1].t)
             if not left:
                 break
-        return _joined(found)
+        return Track.joined(found)
 
     def lag_behind(self, strain: Track) -> Figure:
         """By how much they are stamped later than the strain that they belong to, s."""
@@ -80,13 +79,6 @@ class Readings:
         force = self.first(float(strain.t[0]) - _BEFORE_S)
         stop = int(np.searchsorted(strain.t, force.t[-1])) if len(force.t) else 0
         return find_lag(Track(strain.t[:stop], strain.values[:stop]), force)
-
-
-def _joined(pieces: list[Track]) -> Track:
-    t, values = (
-        np.concatenate(one) for one in zip(*((one.t, one.values) for one in [_NONE, *pieces]), strict=True)
-    )
-    return Track(t, values)
 
 
 def _thinned(piece: Track, each: int) -> Track:
