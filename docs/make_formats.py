@@ -93,6 +93,22 @@ def flags() -> str:
     return f"Bits of `load/flags`: {bits}.\n\nKinds of events: {', '.join(EventKind)}."
 
 
+SIM = [
+    "programme",
+    "seconds",
+    "hold",
+    "E_GPa",
+    "nu",
+    "yield_MPa",
+    "section_mm2",
+    "bits",
+    "noise",
+    "fps",
+    "faults",
+]
+"""Settings of ``sim:`` that are in the page; ``phasedic devices --settings`` has all."""
+
+
 def settings_table(scheme: str) -> str:
     """The settings of an address of a kind of camera."""
     rows = (
@@ -103,6 +119,7 @@ def settings_table(scheme: str) -> str:
             one.words + f"; {one.stands}" * bool(one.stands),
         )
         for one in settings_of(camera_settings()[scheme])
+        if scheme != "sim" or one.key in SIM
     )
     return table(("setting", "unit", "allowed", "meaning"), rows)
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from typing import Any, Self
 
-from acquire.text.quantity import Amount
+from acquire.text.quantity import Amount, number
 
 FIELD = re.compile(r"\{\{|\}\}|\{(\w+)(?::((?:(?!\d{3})[^{}])*))?\}")
 """A named field of a template, with its format (of a file's, no width of a gigabyte), or a doubled brace, which is one
@@ -33,13 +33,11 @@ def filled(template: str, values: Mapping[str, Any], shown: Callable[[Any, str],
 
 
 def formatted(value: Any, spec: str) -> str:
-    """As ``format``, but no exponent for what a person reads as a whole number: 6350, not 6.35e+03."""
+    """As ``format``, but no exponent for what a person reads as a whole number: 6 350, not 6.35e+03."""
     text = format(value, spec)
-    return (
-        format(float(text), spec[: spec.startswith("+")] + ".0f")
-        if "e+0" in text and spec.endswith("g")
-        else text
-    )
+    if "e+0" in text and spec.endswith("g"):
+        return "+" * (spec.startswith("+") and value > 0) + number(float(text))
+    return text
 
 
 @cache

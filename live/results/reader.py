@@ -37,7 +37,7 @@ from acquire.hdf5 import (
     stored_rows,
 )
 from acquire.text import Message
-from acquire.text.message import about
+from acquire.text.message import about, word
 from analysis.field import ZoiGrid
 from live.results import layout
 from live.results.quantities import Display, mean_name, quantity_of
@@ -260,7 +260,7 @@ def _open(path: Path, probed: bool) -> tuple[Any, bool]:
             "{path}: cannot be opened ({why}); make it again with phasedic replay", path, error
         ) from error
     if block.unfinished:
-        _log.warning("%s was not closed by its writer; reading all its complete rows", path)
+        _log.warning(Message("{path} was not closed by its writer; reading all its complete rows", path))
     return file, block.unfinished
 
 
@@ -319,11 +319,11 @@ def _rows(path: Path, datasets: Sequence[Any], *, whole: bool) -> int:
 
 def _warn_of_times(path: Path, times: NDArray[np.float64]) -> None:
     for count, what in (
-        (np.count_nonzero(np.isnan(times)), "rows have no time"),
-        (np.count_nonzero(np.diff(times) < 0), "times run backwards"),
+        (np.count_nonzero(np.isnan(times)), word("rows have no time")),
+        (np.count_nonzero(np.diff(times) < 0), word("times run backwards")),
     ):
         if count:
-            _log.warning("%s: %d %s; they are used as they are", path, count, what)
+            _log.warning(Message("{path}: {n} {what}; they are used as they are", path, count, what))
 
 
 def whole_maps(path: Path) -> dict[str, NDArray[Any]]:
