@@ -69,9 +69,9 @@ def means() -> str:
 def channels() -> str:
     """The channels of alarms and strain output."""
     rows = (
-        (f"`{one.name}`", one.unit, one.words or quantity_of(one.name).words)
+        (f"`{one.name}`", one.unit, one.words)
         for one in FIGURES
-        if one.channel
+        if one.channel and one.words  # others are columns of strain.csv
     )
     return table(("channel", "unit", "meaning"), rows)
 
@@ -115,13 +115,12 @@ def settings_table(scheme: str) -> str:
         (
             f"`{one.key}`" if one.key else "others",
             one.unit,
-            one.allowed,
-            one.words + f"; {one.stands}" * bool(one.stands),
+            "; ".join(filter(None, (one.words, one.allowed * ("one of" in one.allowed), one.stands))),
         )
         for one in settings_of(camera_settings()[scheme])
         if scheme != "sim" or one.key in SIM
     )
-    return table(("setting", "unit", "allowed", "meaning"), rows)
+    return table(("setting", "unit", "meaning"), rows)
 
 
 def _described(path: str, one: Declared) -> Row:
