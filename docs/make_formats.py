@@ -63,7 +63,10 @@ def means() -> str:
     """The columns of strain.csv."""
     names = (*COLUMNS, *columns(["section", "lag"]), "gauge_NAME", "sigma_gauge_NAME", "share_gauge_NAME")
     quantities = ((name, quantity_of(name)) for name in names)
-    return table(("column", "unit", "meaning"), ((f"`{n}`", q.unit, q.words) for n, q in quantities))
+    return table(
+        ("column", "unit", "meaning"),
+        ((f"`{n}`", q.unit, q.words) for n, q in quantities if "sigma_" not in n),
+    )
 
 
 def channels() -> str:
@@ -78,7 +81,10 @@ def channels() -> str:
 
 def cycles() -> str:
     """The columns of cycles.csv."""
-    return table(("column", "unit", "meaning"), ((f"`{name}`", *about) for name, about in CYCLES.items()))
+    return table(
+        ("column", "unit", "meaning"),
+        ((f"`{n}`", *about) for n, about in CYCLES.items() if "sigma_" not in n),
+    )
 
 
 def statuses() -> str:

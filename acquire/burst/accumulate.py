@@ -307,7 +307,7 @@ class FrameSums:
         self._previous, self._waiting = images[-1], []
 
     def noise(self, n: int) -> float:
-        """Of one frame, GL: from successive differences, so that slow motion hardly counts."""
+        """Noise of one frame, GL, from successive differences, so that slow motion hardly counts."""
         return math.sqrt(self._squares / (2 * (n - 1) * self._like.image.size)) if n > 1 else math.nan
 
     def motion(self, last: Frame, n: int, noise: float) -> float:

@@ -24,7 +24,7 @@ class LoadCell(Protocol):
     - Opening (``open_load_cell``) claims the port and raises ``ConfigError`` or
       ``DeviceError`` where that fails; ``info`` is complete from then on.
     - ``with`` starts the stream and closes everything at its end; one never entered is closed
-      with ``close()``. Both may be called again without effect.
+      with ``close()``. Both are idempotent.
     - Iterating gives ``LoadSample`` objects with non-decreasing ``t`` until ``stop()``, or until
       a finite source is exhausted. A lost or silent port is an event and a reconnection, never
       an exception: a test goes on without its load.

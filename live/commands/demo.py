@@ -273,7 +273,7 @@ class ZoiTruth:
 
 
 def _product(a: Array, b: Array) -> Array:
-    """Of two matrices, by this thread alone: those of BLAS wait for each other on a busy machine."""
+    """Product of two matrices, by this thread alone: threads of BLAS wait for each other on a busy machine."""
     return np.asarray(np.einsum("ij,jk->ik", a, b))
 
 

@@ -13,6 +13,7 @@ from acquire.errors import LOSS, DeviceError
 from acquire.files.picture import write_picture
 from acquire.text.message import Message, about, joined, word
 from acquire.text.printable import printable
+from acquire.text.quantity import Amount
 from live.commands.options import (
     PICTURES,
     add_help_all,
@@ -186,7 +187,8 @@ def _draw(p: Proposal, png: Path) -> None:
 def _print(p: Proposal, rig: Path, png: Path, screen: Screen) -> None:
     grid = p.region.grid(p.config, *p.first_look.size)
     screen.print(p.region.words)
-    zois = Message("{n} ZOIs of {size} px, {step} px apart", grid.n_active, grid.size, grid.step)
+    n = Amount("count", grid.n_active)
+    zois = Message("{n} ZOIs of {size} px, {step} px apart", n, grid.size, grid.step)
     screen.print(zois + Message("; load along {axis}", p.config.specimen.axis))
     screen.print(Message("gauges: {names}", ", ".join(p.config.gauges) or Message("none")))
     for box in p.plates.plates:

@@ -45,9 +45,7 @@ def command(arguments: argparse.Namespace) -> int:
         if not (0 <= row < rows and 0 <= column < columns):
             raise ConfigError(
                 "--zoi {given}: the grid has rows 0 to {last_row} and columns 0 to {last_column}",
-                arguments.zoi,
-                rows - 1,
-                columns - 1,
+                *(arguments.zoi, rows - 1, columns - 1),
             )
         pictures = [_picture(session, n) for n in (arguments.reference, arguments.frame)]
     left, top = int(grid.first_x[column]), int(grid.first_y[row])

@@ -279,9 +279,7 @@ def _grid(strain: Any, text: Any, path: Path) -> ZoiGrid:
     if active.shape != shape:
         raise DataError(
             "{where} is described as {shape} ZOIs, but {found} are there; make it again",
-            where,
-            shape,
-            active.shape,
+            *(where, shape, active.shape),
         )
     grid = ZoiGrid.from_dict(described, read_scalar(active, layout.GRID["active"]).astype(bool))
     for name, places in (("x", grid.x), ("y", grid.y)):

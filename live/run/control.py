@@ -324,5 +324,5 @@ class ControlPort:
         return server.port
 
     def close(self) -> None:
-        """Take no more commands; again without effect."""
+        """Take no more commands; idempotent."""
         self._closing.close()

@@ -91,9 +91,7 @@ def lens_words(lens: LensModel, grid: ZoiGrid) -> str:
     return Message(
         "a shift of {SHOWN_SHIFT_PX:g} px shows {strain:.1f} µm/m in the region; removed, known to "
         "{sigma:.2g} µm/m",
-        SHOWN_SHIFT_PX,
-        strain * 1e6,
-        sigma * 1e6,
+        *(SHOWN_SHIFT_PX, strain * 1e6, sigma * 1e6),
     )
 
 
@@ -197,9 +195,7 @@ def from_boards(pictures: Iterable[NDArray[Any]], board: Board, *, k3: bool = Fa
         raise DataError(
             "{found} of {count} pictures show the board; it takes {needed}, at many places and tilted by 10 to 30"
             " degrees in all directions; look at its corners, focus, light",
-            len(found),
-            count,
-            MIN_BOARDS,
+            *(len(found), count, MIN_BOARDS),
         )
     fit = lens_of_corners(found, size, k3)
     kind = word("ChArUco board" if board.marker_mm else "checkerboard")

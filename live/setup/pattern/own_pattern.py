@@ -93,9 +93,7 @@ def _picture(path: Path, roi: str | None) -> tuple[NDArray[Any], int]:
         if min(x, y) < 0 or x + width > columns or y + height > rows or min(width, height) < 1:
             raise ConfigError(
                 "--roi {roi} leaves the picture of {width} x {height} px",
-                roi,
-                picture.shape[1],
-                picture.shape[0],
+                *(roi, picture.shape[1], picture.shape[0]),
             )
         picture = picture[y : y + height, x : x + width]
     top, left = (max(0, (side - LARGEST) // 2) for side in picture.shape)

@@ -1,7 +1,7 @@
 // The texts of the page and the messages of the program in the language of the operator. The entries of a language come
 // from live/words: English text or template -> its own. A message has a template (say) and values (with); the page fills
 // them in, as acquire/text/message.py does it in English. Names of files, devices and settings stay as they are.
-import { decimalMark, fixed, quantityText } from "./numbers.js";
+import { decimalMark, fixed, MINUS, quantityText } from "./numbers.js";
 
 const FIELD = /\{\{|\}\}|\{(\w+)(?::([^{}]*))?\}/g;
 const tables = { en: {} };
@@ -80,6 +80,7 @@ export function number(value, format) {
   else if (kind === "x") text = value.toString(16);
   else if (kind === "g") text = general(value, Number(digits ?? 6) || 1);
   if (sign && value >= 0) text = `+${text}`;
+  if (format.length > 1 && value < 0) text = text.replace("-", MINUS);
   return width ? text.padStart(Number(width), zero ? "0" : " ") : text;
 }
 
