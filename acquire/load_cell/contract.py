@@ -15,6 +15,7 @@ from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.text import Message
+from acquire.text.message import word
 
 
 @runtime_checkable
@@ -90,7 +91,7 @@ def open_load_cell(address: str, on_event: EventSink = ignore_event) -> LoadCell
 class NoLoadCell(Closing):
     """Gives no samples and ends at once."""
 
-    info = LoadCellInfo(address="none:", name="no load cell", protocol="none", clock="nominal")
+    info = LoadCellInfo(address="none:", name=word("no load cell"), protocol="none", clock="nominal")
 
     def __iter__(self) -> Iterator[LoadSample]:
         return iter(())

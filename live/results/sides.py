@@ -267,7 +267,7 @@ class SidesOfTest:
         for where, figures in self.figures.items():
             rows = (row for row in headline(figures, stresses=stresses) if row.figure.known)
             known = joined("  ", [Message("{name} = {text}", row.name, row.text) for row in rows])
-            yield Message("{where:<7}{known}", word(f"{where}:"), known or Message("no figure is known"))
+            yield Message("{where:<8}{known}", word(f"{where}:"), known or Message("no figure is known"))
         if held := beyond_scatter(self.figures["both"]):
             yield Message("±: {CONFIDENCE:.0%} interval, of E with {held}", CONFIDENCE, held)
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
 from acquire.opencv.images import read_image
+from acquire.text import Message
 from analysis.picture.pattern import PatternReport, describe_pattern
 from live.config.values import numbers_of
 from live.setup.pattern.imposed import ExpectedErrors, Imposed, expected
@@ -29,6 +30,7 @@ from live.setup.pattern.outcome import (
     write_outcome,
     write_page,
 )
+from live.words.language import told
 
 SIZES = (16, 24, 32, 48, 64, 96, 128)
 BURSTS = (1, 4, 16, 64)
@@ -76,7 +78,7 @@ def characterise_pattern(arguments: argparse.Namespace, folder: Path) -> int:
         f"phasedic characterise --pattern {Path(arguments.pattern).name}",
         INTRODUCTION,
     )
-    print(f"page: {target}")
+    print(told(Message("page: {path}", target)))
     return 0
 
 
