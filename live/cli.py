@@ -13,8 +13,7 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from acquire.errors import DEFECT, EXIT_INTERRUPTED, ConfigError, DataError, PhasedicError
-from acquire.text import Message
-from acquire.text.message import about, word
+from acquire.text.message import Message, about, word
 from acquire.text.printable import brief, printable
 from live.commands.arguments import Command, parse
 from live.commands.environment import check_environment, limit_resources, nonblocking_streams
@@ -92,8 +91,6 @@ class _PrintableFormatter(logging.Formatter):
         record = copy.copy(record)
         record.levelname = told(word(record.levelname.lower())).upper()
         record.msg = told(record.msg)
-        if isinstance(record.args, tuple):
-            record.args = tuple(told(one) if isinstance(one, Message) else one for one in record.args)
         return printable(super().format(record))
 
 

@@ -35,6 +35,8 @@ def filled(template: str, values: Mapping[str, Any], shown: Callable[[Any, str],
 
 def formatted(value: Any, spec: str) -> str:
     """As ``format``, but 6 350, not 6.35e+03, and a true minus; a value without digits (``g``) may be typed again."""
+    if isinstance(value, Real) and re.fullmatch(r"\.\d+f", spec):
+        return number(float(value), int(spec[1:-1]))
     text = format(value, spec)
     if "e+0" in text and spec.endswith("g"):
         return "+" * (spec.startswith("+") and value > 0) + number(float(text))

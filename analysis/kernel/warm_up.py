@@ -119,7 +119,7 @@ def warm_up(part: str = ALL, kinds: Sequence[str] = PICTURE_KINDS, *, phase: boo
         _phase()
         return
     if not_compiled(kinds, phase=phase):
-        log.info("compiling the kernel for this machine, once, about %d s", COMPILE_SECONDS)
+        log.info(Message("compiling the kernel for this machine, once, about {s} s", COMPILE_SECONDS))
     _everything(kinds, phase)
 
 

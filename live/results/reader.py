@@ -36,8 +36,7 @@ from acquire.hdf5 import (
     read_superblock,
     stored_rows,
 )
-from acquire.text import Message
-from acquire.text.message import about, word
+from acquire.text.message import Message, about, word
 from analysis.field import ZoiGrid
 from live.results import layout
 from live.results.quantities import Display, mean_name, quantity_of

@@ -102,8 +102,7 @@ class Cluster:
         if self._quiet_s > _QUIET_S and self._client.status == "running":
             self._quiet_s = 0.0
             if not self._client.nthreads():
-                text = Message("{address} has no workers any more; waiting for some", self._address)
-                self._screen.print(Message("note: {what}", text))
+                self._screen.print(Message("{address} has no workers; waiting for some", self._address))
 
     def close(self) -> None:
         """Cancel what has not begun, and close the connection; a worker completes a task that it has begun."""
@@ -303,5 +302,5 @@ def _row_without_result(task: Task, future: Any) -> BatchRow:
         return row
     error = future.exception() if future.status == "error" else None
     why = f"{type(error).__name__}: {error}" if error else f"no result arrived ({future.status})"
-    text = Message("the cluster gave it up: {why}", printable(why)[:300])
-    return failed(task.title, task.source, text, 1)
+    words = Message("the cluster gave it up: {why}", printable(why)[:300])
+    return failed(task.title, task.source, words, 1)

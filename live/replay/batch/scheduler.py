@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DEFECT, PhasedicError
-from acquire.text import Message
-from acquire.text.message import about, joined
+from acquire.text.message import Message, about, joined
 from acquire.text.printable import duration
 from acquire.text.quantity import Amount
 from live.pipeline.consumer import Screen

@@ -29,8 +29,7 @@ from acquire.system import (
     send_within,
     start_with_socket,
 )
-from acquire.text import Message
-from acquire.text.message import from_json, word
+from acquire.text.message import Message, from_json, word
 from live.pipeline.latency import OUTPUT
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox

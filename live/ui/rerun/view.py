@@ -246,7 +246,7 @@ def spawn_viewer(
         )
     except OSError as error:
         words.close()
-        _log.warning("the viewer %s did not start: %s", binary, error)
+        _log.warning(Message("the viewer {path} did not start: {error}", binary, error))
         return None
     threading.Thread(target=_watch_start, args=(process, words, notify), name="viewer", daemon=True).start()
     return process

@@ -74,6 +74,7 @@ function shown(value, format) {
 export function number(value, format) {
   const [, sign, zero, width, digits, kind] = /^(\+?)(0?)(\d*)(?:\.(\d+))?([fgedx%]?)$/.exec(format) ?? [];
   let text = exponent(String(value));
+  if (kind === "f" && /^\./.test(format)) return fixed(value, Number(digits));
   if (kind === "f") text = value.toFixed(digits ?? 6);
   else if (kind === "%") text = `${(100 * value).toFixed(digits ?? 6)}%`;
   else if (kind === "e") text = exponent(value.toExponential(digits ?? 6));

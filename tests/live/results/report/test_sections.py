@@ -240,7 +240,7 @@ def test_each_map_lies_beside_the_picture_of_its_instant(run: RunFolder) -> None
         "eyy, last",
     ]
     shown = plain(text)
-    assert "first: t = 0.000 s   F = 0.0 N" in shown and "last: t = 9.500 s   F = 4210.0 N" in shown
+    assert "first: t = 0.000 s   F = 0.0 N" in shown and "last: t = 9.500 s   F = 4\u202f210.0 N" in shown
     run.__dict__["pictures"] = None
     without = map_pictures(run, [3])
     assert (without.images, without.levels, without.size) == ({3: None}, None, (128, 96))
