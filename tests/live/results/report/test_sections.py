@@ -90,7 +90,7 @@ def test_repeated_events_are_one_line_with_their_number_and_the_time_of_the_last
     ]
     found = plain(events(run))
     assert found.count("alarm high") == 4
-    assert "|1493.000|warning|alarm|alarm|alarm high: force is 1493 N (1 494 times)|" in found
+    assert "|1\u202f493.000|warning|alarm|alarm|alarm high: force is 1493 N (1 494 times)|" in found
 
 
 def test_versions_then_and_now(run: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
