@@ -347,7 +347,7 @@ def _print_modulus(
     true_nu = Message("true {value}", Amount("", specimen.nu, digits=2))
     if figures.E.known:
         off = abs(rows["E"].figure.value - there[0] / 1e9) / rows["E"].half
-        held = word("within its interval") if off <= 1 else Message("{n:.1f} times its interval off", off)
+        held = word("within its interval") if off <= 1 else Message("off by {n:.1f} times its interval", off)
         here, here_nu = Amount.rough("stress", there[0], 5), Amount.rough("", there[1], 4)
         true = Message(
             "by {strain}: {held}, true {here} there ({true} of the material)",
