@@ -63,22 +63,28 @@ def means() -> str:
     """The columns of strain.csv."""
     names = (*COLUMNS, *columns(["section", "lag"]), "gauge_NAME", "sigma_gauge_NAME", "share_gauge_NAME")
     quantities = ((name, quantity_of(name)) for name in names)
-    return table(("column", "unit", "meaning"), ((f"`{n}`", q.unit, q.words) for n, q in quantities))
+    return table(
+        ("column", "unit", "meaning"),
+        ((f"`{n}`", q.unit, q.words) for n, q in quantities if "sigma_" not in n),
+    )
 
 
 def channels() -> str:
     """The channels of alarms and strain output."""
     rows = (
-        (f"`{one.name}`", one.unit, one.words or quantity_of(one.name).words)
+        (f"`{one.name}`", one.unit, one.words)
         for one in FIGURES
-        if one.channel
+        if one.channel and one.words  # others are columns of strain.csv
     )
     return table(("channel", "unit", "meaning"), rows)
 
 
 def cycles() -> str:
     """The columns of cycles.csv."""
-    return table(("column", "unit", "meaning"), ((f"`{name}`", *about) for name, about in CYCLES.items()))
+    return table(
+        ("column", "unit", "meaning"),
+        ((f"`{n}`", *about) for n, about in CYCLES.items() if "sigma_" not in n),
+    )
 
 
 def statuses() -> str:
@@ -93,18 +99,34 @@ def flags() -> str:
     return f"Bits of `load/flags`: {bits}.\n\nKinds of events: {', '.join(EventKind)}."
 
 
+SIM = [
+    "programme",
+    "seconds",
+    "hold",
+    "E_GPa",
+    "nu",
+    "yield_MPa",
+    "section_mm2",
+    "bits",
+    "noise",
+    "fps",
+    "faults",
+]
+"""Settings of ``sim:`` that are in the page; ``phasedic devices --settings`` has all."""
+
+
 def settings_table(scheme: str) -> str:
     """The settings of an address of a kind of camera."""
     rows = (
         (
             f"`{one.key}`" if one.key else "others",
             one.unit,
-            one.allowed,
-            one.words + f"; {one.stands}" * bool(one.stands),
+            "; ".join(filter(None, (one.words, one.allowed * ("one of" in one.allowed), one.stands))),
         )
         for one in settings_of(camera_settings()[scheme])
+        if scheme != "sim" or one.key in SIM
     )
-    return table(("setting", "unit", "allowed", "meaning"), rows)
+    return table(("setting", "unit", "meaning"), rows)
 
 
 def _described(path: str, one: Declared) -> Row:

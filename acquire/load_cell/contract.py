@@ -15,6 +15,7 @@ from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.text import Message
+from acquire.text.message import word
 
 
 @runtime_checkable
@@ -24,7 +25,7 @@ class LoadCell(Protocol):
     - Opening (``open_load_cell``) claims the port and raises ``ConfigError`` or
       ``DeviceError`` where that fails; ``info`` is complete from then on.
     - ``with`` starts the stream and closes everything at its end; one never entered is closed
-      with ``close()``. Both may be called again without effect.
+      with ``close()``. Both are idempotent.
     - Iterating gives ``LoadSample`` objects with non-decreasing ``t`` until ``stop()``, or until
       a finite source is exhausted. A lost or silent port is an event and a reconnection, never
       an exception: a test goes on without its load.
@@ -90,7 +91,7 @@ def open_load_cell(address: str, on_event: EventSink = ignore_event) -> LoadCell
 class NoLoadCell(Closing):
     """Gives no samples and ends at once."""
 
-    info = LoadCellInfo(address="none:", name="no load cell", protocol="none", clock="nominal")
+    info = LoadCellInfo(address="none:", name=word("no load cell"), protocol="none", clock="nominal")
 
     def __iter__(self) -> Iterator[LoadSample]:
         return iter(())

@@ -93,7 +93,7 @@ def read_image(path: str | Path, gray: str | None = None, page: int = 0) -> NDAr
 # fmt: off
 @dataclass(frozen=True, slots=True)
 class FileSettings:
-    """Of ``files:shots/*.tif``."""
+    """Settings of ``files:shots/*.tif``."""
 
     fps: float = setting(number(1e-6, 1e6), 1.0, "pictures a second", "1/s")
     gray: str | None = setting(choice(*GRAYS), None, "what is grey in a colour picture")

@@ -5,7 +5,7 @@ unstable, OL overload, UL underload, TL tilt, QT counting; GS gross, NT net, TR 
 an RS-485 number such as ``01`` may stand before. A data field of spaces with only its point is an
 overflow. Pieces, percent and the stored tare are no load and give no value.
 
-What cannot be detected: no check digit, so a changed digit reads as another value; a lost one is only
+What cannot be detected: transmission errors. A changed digit reads as another value; a lost one is only
 where ``digits=`` tells the width of the data field.
 """
 

@@ -8,7 +8,7 @@ value, nor does one that leaves a choice: ``12,5 kg``, ``1.234,5 N`` or ``1,234.
 until ``decimal=comma`` says one or ``decimal=point`` says two. With ``decimal=comma`` points stand between
 thousands, if they stand there.
 
-What cannot be detected: there is no check digit, so a digit lost or changed within a line, or two
+What cannot be detected: transmission errors. A digit lost or changed within a line, or two
 lines run together into one number, reads as another value; ``capacity=`` and ``max_step=`` flag the
 gross ones.
 """

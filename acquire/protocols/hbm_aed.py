@@ -5,7 +5,7 @@ Eight characters of counts, optionally with address and status: ``xxxxxxxx,aa,ss
 ``nominal=`` (what the factory scale of 1 000 000 counts stands for, in ``unit``), or by
 ``decimals=`` where the device's NOV scale gives units times a power of ten.
 
-What cannot be detected: no check digit; without status (``COF3``) no overflow (say ``capacity=``).
+What cannot be detected: transmission errors, and without status (``COF3``) an overflow (say ``capacity=``).
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 ``-18.78 lbF``, ``4.285 N``, or the number alone (``NUM`` setting). ``*10`` illegal, ``*11`` not applicable,
 ``*12`` invalid, ``*22`` too large. These gauges show tension as negative, so the sign is -1 by default.
 
-What cannot be detected: an overload has no mark on the line (say ``capacity=``); no check digit.
+What cannot be detected: transmission errors, and an overload (say ``capacity=``).
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 (A&D: ``SI+``, ``SI-``) over- and underload; ``ES``, ``ET``, ``EL`` are errors. Other replies (tare, zero,
 serial number) are no readings.
 
-What cannot be detected: no check digit, so a changed digit reads as another value.
+What cannot be detected: transmission errors. A changed digit reads as another value.
 """
 
 from __future__ import annotations

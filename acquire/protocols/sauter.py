@@ -4,7 +4,7 @@ To a ``9`` the gauge answers one sign digit (1 tension, 0 compression) and six c
 ``1021.15`` is +21.15, ``0011.70`` is -11.70. No unit and no terminator: an answer is the seven bytes
 between two silences, so that a lost byte can never shift one answer into the next.
 
-What cannot be detected: no check digit, no overload mark (say ``capacity=``).
+What cannot be detected: transmission errors, and an overload (say ``capacity=``).
 """
 
 from __future__ import annotations

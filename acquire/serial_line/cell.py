@@ -373,7 +373,7 @@ class SerialCell(Closing):
         self._link.wake()
 
     def close(self) -> None:
-        """Stop and close the port; may be called again without effect."""
+        """Stop and close the port; idempotent."""
         self.stop()
         with self._busy:
             self._command("stop")

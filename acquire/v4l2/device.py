@@ -298,7 +298,7 @@ class V4L2Device:
                 self.request(api.REQBUFS, api.RequestBuffers(type=api.CAPTURE, memory=api.MMAP))
 
     def close(self) -> None:
-        """Give everything back; may be called again without effect."""
+        """Give everything back; idempotent."""
         if self._fd is not None:
             self.stop()
             fd, self._fd = self._fd, None

@@ -107,16 +107,19 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
 def peak_line(quick: QuickCheck) -> str:
     """The sharpness as a bar that ends at the peak."""
     if not math.isfinite(quick.of_peak):
-        return "sharpness: no pattern is visible"
+        return Message("sharpness: no pattern is visible")
     full = round(BAR_LENGTH * min(quick.of_peak, 1.0))
     bar = "#" * full + "." * (BAR_LENGTH - full)
-    return f"sharpness {quick.figures.sharpness:.3f} [{bar}] {quick.of_peak:.0%} of the peak {quick.peak:.3f}"
+    return Message(
+        "sharpness {sharpness:.3f} [{bar}] {share:.0%} of the peak {peak:.3f}",
+        *(quick.figures.sharpness, bar, quick.of_peak, quick.peak),
+    )
 
 
 def blur_line(quick: QuickCheck) -> list[str]:
     """The blur since the sharpest picture; nothing where it is not known."""
     text = quick.blur.text
-    return [f"          {text} than the sharpest picture so far"] if text else []
+    return [Message("          {blur} than the sharpest picture so far", text)] if text else []
 
 
 def short_line(quick: QuickCheck, lines: list[CheckLine]) -> str:

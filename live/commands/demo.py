@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from acquire.addresses import parse_address, with_setting
 from acquire.errors import LOSS
 from acquire.frame import Frame
-from acquire.text import Message
+from acquire.text.message import Message, word
+from acquire.text.quantity import Amount
 from analysis import PICTURE_KINDS
 from analysis.evaluate import AreaStrain
 from analysis.field import Status, StrainField, Sums
@@ -272,7 +273,7 @@ class ZoiTruth:
 
 
 def _product(a: Array, b: Array) -> Array:
-    """Of two matrices, by this thread alone: those of BLAS wait for each other on a busy machine."""
+    """Product of two matrices, by this thread alone: threads of BLAS wait for each other on a busy machine."""
     return np.asarray(np.einsum("ij,jk->ik", a, b))
 
 
@@ -325,7 +326,10 @@ def compare(
     agreed &= _print_modulus(figures, specimen, there, print_line)
     if agreed and not figures.E.known and not outcome.exit_code:
         print_line(
-            f"exit code {LOSS}: E was not measured ({figures.E.why}); end other programs, or give a smaller --burst"
+            Message(
+                "exit code {code}: E was not measured ({why}); end other programs, or give a smaller --burst",
+                *(LOSS, figures.E.why),
+            )
         )
         return LOSS
     return 0 if agreed else 1
@@ -339,14 +343,19 @@ def _print_modulus(
 ) -> bool:
     """E and nu against the truth ``there``; False where E is far off."""
     rows, off = tensile_table(figures, stresses=True), 0.0
-    true, true_nu = f"true {specimen.E / 1e9:g} GPa", f"true {specimen.nu:g}"
+    true = Message("true {value}", Amount("stress", specimen.E, digits=2))
+    true_nu = Message("true {value}", Amount("", specimen.nu, digits=2))
     if figures.E.known:
         off = abs(rows["E"].figure.value - there[0] / 1e9) / rows["E"].half
-        held = "within its interval" if off <= 1 else f"off by {off:.1f} times its interval"
-        true = f"by {figures.elastic_strain}: {held}, true {there[0] / 1e9:.5g} GPa there ({true} of the material)"
-        true_nu = f"true {there[1]:.4g} there ({true_nu})"
-    show(f"  E  {rows['E'].text}, {true}")
-    show(f"  nu {rows['nu'].text}, {true_nu}")
+        held = word("within its interval") if off <= 1 else Message("off by {n:.1f} times its interval", off)
+        here, here_nu = Amount.rough("stress", there[0], 5), Amount.rough("", there[1], 4)
+        true = Message(
+            "by {strain}: {held}, true {here} there ({true} of the material)",
+            *(figures.elastic_strain, held, here, true),
+        )
+        true_nu = Message("true {here} there ({true})", here_nu, true_nu)
+    show(Message("  E  {E}, {true}", rows["E"].text, true))
+    show(Message("  nu {nu}, {true}", rows["nu"].text, true_nu))
     return off <= FAR
 
 
@@ -358,11 +367,16 @@ def _print_strain(ratios: Array, errors: Array, print_line: Callable[[str], None
     within, rms = ratios[:, 0] <= 1, np.sqrt(np.mean(errors**2, axis=0)) * 1e6
     beyond = int(np.sum(~(ratios[:, 1] <= 1)))
     print_line(
-        f"  strain of the region: error {rms[0]:.2f}, {rms[1]:.2f}, {rms[2]:.2f} µm/m rms in {len(ratios)} instants"
+        Message(
+            "  strain of the region: error {x:.2f}, {y:.2f}, {xy:.2f} µm/m rms in {n} instants",
+            *(*rms, len(ratios)),
+        )
     )
     print_line(
-        f"  {within.mean():.1%} of these {within.size} values within {RELATIVE:.2%} of the strain + 3 sigma,"
-        f" {beyond} beyond 5 sigma"
+        Message(
+            "  {share:.1%} of these {n} values within {relative:.2%} of the strain + 3 sigma, {beyond} beyond 5 sigma",
+            *(within.mean(), within.size, RELATIVE, beyond),
+        )
     )
     return float(within.mean()) >= MIN_WITHIN and beyond == 0
 
@@ -372,6 +386,7 @@ def _print_force(outcome: Outcome, specimen: VirtualSpecimen, print_line: Callab
     true = specimen.force(np.array([specimen.elapsed(time) for time in t]))
     error = (force - true)[np.isfinite(force)]
     if error.size:
+        mean, scatter = (Amount.rough("force", float(one)) for one in (error.mean(), error.std()))
         print_line(
-            f"  force: mean error {error.mean():+.2f} N, scatter {error.std():.2f} N in {error.size} samples"
+            Message("  force: mean error {mean}, scatter {scatter} in {n} samples", mean, scatter, error.size)
         )

@@ -30,7 +30,7 @@ from acquire.frame import CameraInfo, Frame
 from acquire.load_cell import check
 from acquire.serial_line import identify
 from acquire.serial_line.ports import list_serial_ports
-from acquire.text import Message
+from acquire.text.message import Message, word
 from acquire.text.printable import brief, printable
 from live import VERSION
 from live.setup.devices import open_load
@@ -66,7 +66,7 @@ def report_lines(cameras: Sequence[str], loads: Sequence[str], seconds: float) -
         yield from _guarded(f"load cell {address}", _load_lines(address, seconds))
     for what, found, option in ("camera", listed, "--camera"), ("serial port", ports, "--load"):
         if everything and not found:
-            yield f"no {what} was found; {option} ADDRESS gives one"
+            yield Message("no {what} was found; {option} ADDRESS gives one", word(what), option)
 
 
 def without_names(line: str) -> str:

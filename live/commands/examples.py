@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 from live.commands.docs import shipped
+from live.ui.terminal.screen import print_line
 
 FOLDER = "phasedic-examples"
 CELL = "# %%"
@@ -32,10 +34,11 @@ def command(arguments: argparse.Namespace) -> int:
     shutil.copytree(shipped("examples"), folder, ignore=ignored)
     cells = (folder / "notebook.py").read_text(encoding="utf-8").split(f"\n{CELL}")
     (folder / "notebook.ipynb").write_text(notebook(cells), encoding="utf-8")
-    print("rendering the pictures ...", flush=True)
+    print_line(Message("rendering the pictures ..."))
     write_pictures(folder)
-    print(f"{folder}: {folder / 'README.md'} has a command for each, and what it gives. The first:")
-    print(
+    page = folder / "README.md"
+    print_line(Message("{page} has a command for each example, and what it gives. The first:", page))
+    print_line(
         f"  cd {folder}\n  phasedic replay shots --load forces.csv --section 20,2 --config gauges.toml --report"
     )
     return 0

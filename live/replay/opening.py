@@ -81,14 +81,15 @@ def _notes(session: Session, request: ReplayRequest) -> Iterator[str]:
     if session.recovered:
         yield session.recovered
     if session.mode.every > 1:
-        yield f"one frame in {session.mode.every} was recorded; measured as a slower camera"
+        yield Message("one frame in {every} was recorded; measured as a slower camera", session.mode.every)
     elif session.mode.kind == "all" and not request.as_measured and _were_shortened(session):
-        yield (
-            "the run shortened its bursts while the picture moved; here they have one length, with --as-measured"
-            " they are those of the run"
+        yield Message(
+            "the run shortened its bursts while the picture moved; here they have one length (as in the run:"
+            " --as-measured)"
         )
     if request.as_measured and (otherwise := differing_versions(session.versions)):
-        yield f"recorded with {', '.join(otherwise)}; the last digits of the results may differ"
+        versions = ", ".join(otherwise)
+        yield Message("recorded with {versions}; the last digits of the results may differ", versions)
 
 
 def _were_shortened(session: Session) -> bool:

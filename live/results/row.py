@@ -174,7 +174,7 @@ def _plates(measurement: Measurement) -> dict[str, float]:
 
 
 def _strains(measurement: Measurement, measure: StrainMeasure) -> dict[str, float]:
-    """Of the region, in ``measure``: those of the time step, where its field has that measure."""
+    """Strains of the region, in ``measure``: those of the time step, where its field has that measure."""
     if measurement.field.measure == measure:
         return {name: getattr(measurement.time_step, name) for name in STRAINS}
     area = AreaStrain.of(replace(measurement.field, measure=measure))

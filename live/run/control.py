@@ -208,7 +208,9 @@ class TareControl:
         sample, capacity = self._latest(), self._cell.info.capacity_N
         if sample is None or not self._measured() or abs(sample.force) <= NO_LOAD * (capacity or 0.0):
             return ""
-        load = Message("an unknown load") if math.isnan(sample.force) else f"{sample.force:.6g} N"
+        load = (
+            Message("an unknown load") if math.isnan(sample.force) else Message("{force:.6g} N", sample.force)
+        )
         return Message("not tared yet: {load} in mid-test", load)
 
 
@@ -324,5 +326,5 @@ class ControlPort:
         return server.port
 
     def close(self) -> None:
-        """Take no more commands; again without effect."""
+        """Take no more commands; idempotent."""
         self._closing.close()

@@ -106,7 +106,7 @@ class LiveRun:
 
     @property
     def states(self) -> dict[str, RunState]:
-        """That of each camera."""
+        """The state of each camera."""
         return {name: run.run_state for name, run in self.cameras.items()}
 
     def stop(self, reason: str) -> None:

@@ -70,7 +70,7 @@ class OutcomeOfTest:
 
     @property
     def exit_code(self) -> int:
-        """That of all (``acquire.errors.exit_code_of_all``)."""
+        """Exit code of all cameras (``acquire.errors.exit_code_of_all``)."""
         return exit_code_of_all(outcome.exit_code for outcome in self.cameras.values())
 
 

@@ -25,6 +25,7 @@ from acquire.system import (
     signal_handler,
     unblock_signals,
 )
+from acquire.text import Message
 
 log = logging.getLogger(__name__)
 _POLL_S, _MODULE = 0.25, "live.setup.compiling"
@@ -87,20 +88,18 @@ def compile_ahead(
                 process.terminate()
             process.wait()
     if not_compiled(kinds, phase=phase):
-        log.warning("what was compiled could not be kept; make numba's cache writable (NUMBA_CACHE_DIR)")
+        log.warning(Message("compiled code could not be kept; set NUMBA_CACHE_DIR to a writable folder"))
     return time.monotonic() - began
 
 
 def progress_text(share: float, seconds: float) -> str:
     """A bar of what is compiled after so many seconds, and about how long the rest takes."""
     full = round(BAR_LENGTH * share)
-    left = (
-        "about a minute"
-        if share < KNOWN_SHARE
-        else f"about {math.ceil(seconds * (1 / share - 1)) + 1} s left"
-    )
+    left = Message("about a minute")
+    if share >= KNOWN_SHARE:
+        left = Message("about {s} s left", math.ceil(seconds * (1 / share - 1)) + 1)
     bar = "#" * full + "." * (BAR_LENGTH - full)
-    return f"compiling for this processor, once: [{bar}] {seconds:.0f} s, {left}"
+    return Message("compiling for this processor, once: [{bar}] {s:.0f} s, {left}", bar, seconds, left)
 
 
 @contextlib.contextmanager

@@ -20,12 +20,12 @@ _SLOPES = {STRESS: "compliance", TIME: "rate"}
 
 
 def slope_name(channel: str) -> str:
-    """Of the map of slopes over ``channel``: compliance, rate or amplification."""
+    """Name of the map of slopes over ``channel``: compliance, rate or amplification."""
     return _SLOPES.get(channel, "amplification")
 
 
 def leaves_name(channel: str) -> str:
-    """Of the map of where places leave their lines; empty over time."""
+    """Name of the map of where places leave their lines; empty over time."""
     return "" if channel == TIME else "leaves_at_stress" if channel == STRESS else "leaves_at_strain"
 
 
@@ -108,6 +108,6 @@ class ResponseWatch:
 
 
 def _own_share(field: StrainField, name: str) -> float:
-    """Of a sigma, what is not of the reference: that of a typical ZOI."""
+    """Share of the sigma of a typical ZOI that is not of the reference."""
     shares = field.sigma(name, "current")[field.ok] / field.sigma(name)[field.ok]
     return float(np.nanmedian(shares)) if shares.size else 1.0

@@ -147,6 +147,6 @@ def _line(cause: str, *cells: str) -> str:
 
 
 def _noise(figures: CheckFigures) -> float:
-    """Of the gauge along the load, else of the mean of the region."""
+    """Noise of the gauge along the load, else of the mean of the region."""
     known = {gauge.name: gauge.sigma for gauge in figures.gauges}
     return known.get(AXIAL, known.get("", math.nan))

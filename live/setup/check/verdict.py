@@ -123,7 +123,7 @@ def _light(f: CheckFigures) -> Iterator[CheckLine]:
     )
     yield CheckLine(
         "saturated pixels",
-        f"{e.saturated:.3%}",
+        Message("{share:.3%}", e.saturated),
         e.saturated <= MAX_SATURATED,
         "less exposure or light, no glare",
     )

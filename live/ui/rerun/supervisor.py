@@ -29,8 +29,7 @@ from acquire.system import (
     send_within,
     start_with_socket,
 )
-from acquire.text import Message
-from acquire.text.message import word
+from acquire.text.message import Message, from_json, word
 from live.pipeline.latency import OUTPUT
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox
@@ -214,8 +213,9 @@ class Supervisor:
                 self._notify(Message("the view is now on port {port}", meta["port"]), "warning")
             self._on_serving()
         elif message.kind is Kind.TROUBLE:
-            self._notify(meta["text"], "warning")
-            self.failed = meta["text"] if meta["lasting"] else self.failed
+            text = from_json(meta["text"])
+            self._notify(text, "warning")
+            self.failed = text if meta["lasting"] else self.failed
         elif message.kind is Kind.FULL:
             self._cause = Message("had grown to {size} MiB", meta["memory_MiB"])
         elif message.kind is Kind.ENDED:

@@ -176,7 +176,7 @@ def test_the_demo_compares_the_elastic_part_with_its_truth() -> None:
     code = demo.compare(outcome, collector, config, lines.append)
     assert code == 5 and any("exit code 5: E was not measured" in line for line in lines)
     assert any("100.0% of these 6 values" in line for line in lines)
-    assert "  force: mean error +2.00 N, scatter 1.00 N in 2 samples" in lines
+    assert "  force: mean error 2 N, scatter 1 N in 2 samples" in lines
     assert any(line.endswith("true 70 GPa") for line in lines) and any(
         line.endswith("true 0.3") for line in lines
     )

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from acquire.text import Message
 from acquire.text.printable import printable
 from live.results.maps.colours import MICROSTRAIN
 from live.ui.rerun.drawing.layout import blueprint
@@ -165,7 +166,7 @@ def serve(setup: ViewSetup, target: ViewTarget, notify: Callable[[str], None]) -
     wanted = target.port or 0
     proxy = ViewerProxy(wanted, notify)
     if wanted and proxy.port != wanted:
-        notify(f"port {wanted} is taken; the view is on {proxy.port}")
+        notify(Message("port {wanted} is taken; the view is on {port}", wanted, proxy.port))
     host, port = hidden_address()
     memory = FINISHED_MIB if setup.finished else SERVER_MIB
     live = Rates(setup.picture_hz, 1.0 if setup.light else 10.0, repeat_bytes=SERVER_MIB * 2**20 / 4)

@@ -123,7 +123,7 @@ class CameraPreview:
                 self._collect_first()
 
     def _collect_first(self) -> None:
-        """Of a recording: its first frames are those of the check."""
+        """Collect the first frames of a recording for the check."""
         self._collected = deque(self._first, maxlen=len(self._first))
 
     @property

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from acquire.events import Event, EventKind
+from acquire.text import Message
+from acquire.text.message import from_json
 from live.pipeline.snapshot import Snapshot
 from live.ui.rerun.drawing import process
 from live.ui.rerun.drawing.sinks import ALL, Rates, RerunSink, serve, write
@@ -206,7 +208,7 @@ def test_the_exit_code_of_the_process(
     assert process.main() == code
     assert drawn == ([640 + 768] if sinks else [])
     if told:
-        assert [there.next().meta["text"]] == told
+        assert [from_json(there.next().meta["text"])] == told
     for one in (ours, theirs, there):
         one.close()
 
@@ -215,9 +217,10 @@ def test_answers_arrive_and_a_test_that_has_ended_is_ignored() -> None:
     ours, theirs = socket.socketpair()
     here, there = MessagePipe(ours), MessagePipe(theirs)
     channel = process.ReplyChannel(here)
-    channel.notify("a word")
+    channel.notify(Message("{n} words", 2))
     answer = there.next()
-    assert (answer.kind, dict(answer.meta)) == (Kind.TROUBLE, {"text": "a word", "lasting": False})
+    text = {"say": "{n} words", "with": {"n": 2}}
+    assert (answer.kind, dict(answer.meta)) == (Kind.TROUBLE, {"text": text, "lasting": False})
     theirs.close()
     there.close()
     for _ in range(3):
