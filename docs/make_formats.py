@@ -1,4 +1,4 @@
-"""Fills the tables of formats and of the settings of cameras: ``python -m docs.make_formats``.
+"""Fills the tables of formats and of the settings of devices: ``python -m docs.make_formats``.
 
 They list what files and settings are declared to be. A page holds each table between ``<!-- table NAME ... -->`` and
 ``<!-- end -->``. The tests compare the pages with these tables.
@@ -26,7 +26,7 @@ from live.results.finished.cycles import COLUMNS as CYCLES
 from live.results.quantities import quantity_of
 from live.results.response import stored
 from live.results.strain_csv import COLUMNS
-from live.setup.devices import camera_settings
+from live.setup.devices import camera_settings, load_settings
 
 DOCS = Path(__file__).parent
 HEIGHT, WIDTH, ZOIS = 64, 80, (3, 5)
@@ -93,8 +93,8 @@ def flags() -> str:
     return f"Bits of `load/flags`: {bits}.\n\nKinds of events: {', '.join(EventKind)}."
 
 
-def settings_table(scheme: str) -> str:
-    """The settings of an address of a kind of camera."""
+def settings_table(kind: type) -> str:
+    """The settings of an address of a kind of device."""
     rows = (
         (
             f"`{one.key}`" if one.key else "others",
@@ -102,7 +102,7 @@ def settings_table(scheme: str) -> str:
             one.allowed,
             one.words + f"; {one.stands}" * bool(one.stands),
         )
-        for one in settings_of(camera_settings()[scheme])
+        for one in settings_of(kind)
     )
     return table(("setting", "unit", "allowed", "meaning"), rows)
 
@@ -117,13 +117,14 @@ def _described(path: str, one: Declared) -> Row:
 
 
 TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
-    **{name or "v4l2": partial(settings_table, name) for name in camera_settings()},
+    **{name or "v4l2": partial(settings_table, kind) for name, kind in camera_settings().items()},
+    "load": partial(settings_table, load_settings()[""]),
     "session": session_layout, "flags": flags, "means": means, "status": statuses,
     "response": response, "cycles": cycles, "channels": channels,
 })  # fmt: skip
 PAGES = tuple(
     DOCS / f"{name}.md"
-    for name in ("session-format", "strain-format", "control", "cameras", "machine-vision")
+    for name in ("session-format", "strain-format", "control", "cameras", "machine-vision", "load-cells")
 )
 _TABLE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)
 

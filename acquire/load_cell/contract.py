@@ -65,6 +65,8 @@ LOAD_CELLS: Registry[LoadCell] = Registry(
         "session": "acquire.session.devices:open_session_load",
     },
     fallback="acquire.serial_line.cell:open_serial",
+    settings_group="phasedic.load_cell_settings",
+    settings={"": "acquire.serial_line.settings:SerialOptions"},
 )
 
 

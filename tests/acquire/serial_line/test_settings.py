@@ -136,3 +136,8 @@ def test_the_rate_of_a_stream_is_commanded(mode: str, rate: str, start: bytes) -
     """Of a device that is polled the reader keeps the rate."""
     address = f"/dev/fake?protocol=hbm-aed&unit=N&mode={mode}&rate={rate}"
     assert read_settings(parse_address(address)).commands["start"] == start
+
+
+def test_how_an_address_tares_is_not_the_command_of_a_preset() -> None:
+    s = read_settings(parse_address("/dev/fake?protocol=lines&preset=loadstar&unit=N&tare=device&zero=3"))
+    assert (s.tare, s.zero, s.commands["tare"], "zero" in s.commands) == ("device", 3.0, b"CT0\r", False)

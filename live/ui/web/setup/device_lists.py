@@ -16,7 +16,7 @@ from acquire.serial_line.ports import LineSettings, PortInfo, list_serial_ports
 from acquire.settings import settings_of
 from acquire.text import Message
 from acquire.text.printable import brief, printable
-from live.setup.devices import camera_settings
+from live.setup.devices import camera_settings, load_settings
 
 log = logging.getLogger(__name__)
 
@@ -47,11 +47,11 @@ class DeviceLists:
 
     def search(self) -> None:
         """Search again, unless a search is under way."""
-        self._begin(self._search)
+        self._begin()
 
     def identify(self, port: str) -> None:
         """Listen on a serial port for a load cell; nothing is sent."""
-        self._begin(lambda: self._identify(port))
+        self._begin(port)
 
     def state(self) -> dict[str, Any]:
         """The lists as the page shows them."""
@@ -61,13 +61,16 @@ class DeviceLists:
             "finding": self._finding,
         }
 
-    def _begin(self, work: Callable[[], None]) -> None:
+    def _begin(self, port: str | None = None) -> None:
         if self._busy.acquire(blocking=False):
-            threading.Thread(target=self._guarded, args=(work,), name="page-devices", daemon=True).start()
+            threading.Thread(target=self._work, args=(port,), name="page-devices", daemon=True).start()
 
-    def _guarded(self, work: Callable[[], None]) -> None:
+    def _work(self, port: str | None) -> None:
         try:
-            work()
+            if port is None:
+                self._search()
+            else:
+                self._identify(port)
         except PhasedicError as error:
             self._finding = printable(brief(error))
         except Exception as error:
@@ -123,14 +126,17 @@ class DeviceLists:
         self._loads = [{"address": finding.address, "name": finding.protocol}, *known]
 
 
-def camera_kinds() -> dict[str, list[dict[str, str]]]:
-    """The settings of an address of each kind of camera, by scheme, as the page shows them."""
+def kinds_of_devices() -> dict[str, dict[str, list[dict[str, str]]]]:
+    """The settings of an address of each kind of camera and load cell, by scheme, as the page shows them."""
     return {
-        scheme: [
-            {"key": one.key, "default": one.plain_default, "unit": one.unit, "words": one.words}
-            for one in settings_of(kind)
-        ]
-        for scheme, kind in camera_settings().items()
+        what: {
+            scheme: [
+                {"key": one.key, "default": one.plain_default, "unit": one.unit, "words": one.words}
+                for one in settings_of(kind)
+            ]
+            for scheme, kind in kinds.items()
+        }
+        for what, kinds in (("camera", camera_settings()), ("load", load_settings()))
     }
 
 
