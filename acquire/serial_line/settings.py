@@ -62,12 +62,11 @@ class SerialSettings:
     Attributes
     ----------
     address : str
+    given : SerialOptions
     line : LineSettings
     protocol : Protocol
     parser : Parser
     mode : "listen" | "stream" | "poll"
-    unit : str or None
-        Where the line names none.
     sign : int
         1 or -1.
     gain : float or None, N per unit of the line
@@ -76,37 +75,24 @@ class SerialSettings:
         Subtracted from the line's value before anything else.
     calibration : Calibration or None
         Where gain and zero come from, unless the address has them.
-    capacity_N, max_step_N : float or None, N
-    mass_reads_force : bool
-    timeout_s : float, s
-        Silence that is reported.
-    wait_s : float, s
-        How long opening waits for a first reading.
     rate : float, 1/s
         Of polling, or of the stream where the device lets choose.
     commands : mapping of str to bytes
-    tare : "auto" | "device" | "software"
     byte_time_s : float, s
     """
 
     address: str
+    given: SerialOptions
     line: LineSettings
     protocol: Protocol
     parser: Parser
     mode: Mode
-    unit: str | None
     sign: int
     gain: float | None
     zero: float
     calibration: Calibration | None
-    capacity_N: float | None
-    max_step_N: float | None
-    mass_reads_force: bool
-    timeout_s: float
-    wait_s: float
     rate: float
     commands: Mapping[str, bytes]
-    tare: str
     byte_time_s: float
 
 
@@ -140,23 +126,17 @@ def read_settings(address: Address) -> SerialSettings:
     line = _line(options, given, protocol)
     return SerialSettings(
         address=address.text,
+        given=given,
         line=line,
         protocol=protocol,
         parser=parser,
         mode=cast("Mode", mode),
-        unit=given.unit,
         sign=given.sign or (protocol.sign if gain is None else 1),
         gain=gain,
         zero=0.0 if zero is None else zero,
         calibration=calibration,
-        capacity_N=given.capacity,
-        max_step_N=given.max_step,
-        mass_reads_force=given.mass_reads_force,
-        timeout_s=given.timeout,
-        wait_s=given.wait,
         rate=rate,
         commands=_commands(address, protocol, parser, mode, rate),
-        tare=given.tare,
         byte_time_s=line.byte_time_s if given.wire else 0.0,
     )
 
@@ -216,19 +196,19 @@ def describe(settings: SerialSettings, usb: str) -> LoadCellInfo:
         protocol=s.protocol.name,
         clock="host",
         sign=s.sign,
-        capacity_N=s.capacity_N,
+        capacity_N=s.given.capacity,
         settings={
             "port": line.url,
             "line": Message(
                 "{baud} {bytesize}{parity}{stopbits:g}", line.baud, line.bytesize, line.parity, line.stopbits
             ),
             "mode": s.mode,
-            "unit": s.unit,
+            "unit": s.given.unit,
             "gain": s.gain,
             "zero": s.zero,
             "calibration": None if s.calibration is None else asdict(s.calibration),
-            "mass_reads_force": s.mass_reads_force,
-            "max_step_N": s.max_step_N,
+            "mass_reads_force": s.given.mass_reads_force,
+            "max_step_N": s.given.max_step,
             "byte_time_s": s.byte_time_s,
             "usb": usb,
         },

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 
@@ -55,7 +55,7 @@ def signals_of(
                 )
                 screen.print(told)
         opened.pop_all()
-    means = ActionMeans(screen.bell, about.end, outputs)
+    means = ActionMeans(screen, about.end, outputs)
     alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]
     return [*_alarm_watch(alarms, about, run_state, joint), *outputs]
 
@@ -178,14 +178,15 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
 
     def serving(view: View) -> None:
         run_state.health.view_port = view.port
-        _announce(view, v.spawn, screen, lambda text: tell(text, "warning"))
+        _announce(view, v.spawn, screen, run_state)
 
     port = v.port if v.enabled else None
     return View(setup, port=port, rrd=rrd, notify=tell, on_serving=serving)
 
 
-def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], None]) -> None:
+def _announce(view: View, spawn: bool, screen: Screen, run_state: RunState) -> None:
     """Open the viewer if there is a display; else print how to open it."""
+    trouble = partial(_emit, run_state, "view", level="warning")
     if spawn and view.port is not None and spawn_viewer(view.port, trouble) is not None:
         screen.print(Message("the viewer opens in its own window"))
         return

@@ -21,7 +21,7 @@ from acquire.text.quantity import Amount
 from live.config.figures import OF_LOAD, OF_SECTION, figure_of, is_joint
 from live.config.loading import Config
 from live.config.sections import AlarmConfig
-from live.pipeline.consumer import Consumer, Policy
+from live.pipeline.consumer import Consumer, Policy, Screen
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import ActiveAlarms
 from live.pipeline.snapshot import BURST, ChannelValues, Snapshot
@@ -41,14 +41,14 @@ class ActionMeans:
 
     Attributes
     ----------
-    bell : callable
-        Rings the bell of the terminal.
+    screen : Screen
+        Whose bell is rung.
     end : callable taking a str
         Ends the run for this reason.
     outs : sequence of StrainOut
     """
 
-    bell: Callable[[], None]
+    screen: Screen
     end: Callable[[str], None]
     outs: Sequence[StrainOut] = ()
 
@@ -77,7 +77,7 @@ class RingBell(Action):
 
     def fire(self, event: Event) -> None:
         """Ring."""
-        self.means.bell()
+        self.means.screen.bell()
 
 
 class SendLine(Action):

@@ -16,6 +16,7 @@ from acquire.load_sample import LoadFlag, LoadSample
 from acquire.text.message import from_json
 from live.config.loading import load_config
 from live.config.sections import AlarmConfig, SpecimenConfig
+from live.pipeline.consumer import Screen
 from live.pipeline.history import History
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
@@ -87,7 +88,7 @@ class Watched:
     def __init__(self, state: RunState, **config: Any) -> None:
         self.ended, self.events, self.state = list[str](), list[Event](), state
         self.config = AlarmConfig(**{"channel": "force_N", "above": 3000.0, "end": True} | config)
-        means = ActionMeans(lambda: None, self.ended.append)
+        means = ActionMeans(Screen(), self.ended.append)
         self.alarm = Alarm(self.config, actions_of(self.config, means))
         values = ChannelValues(0.0, lambda t, step: self.state.snapshot(t, step), clock=lambda: NOW)
         self.watch = AlarmWatch(

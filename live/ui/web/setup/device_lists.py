@@ -17,6 +17,7 @@ from acquire.settings import settings_of
 from acquire.text import Message
 from acquire.text.printable import brief, printable
 from live.setup.devices import camera_settings, load_settings
+from live.ui.web.setup.config_draft import ConfigDraft
 
 log = logging.getLogger(__name__)
 
@@ -30,16 +31,16 @@ class DeviceLists:
 
     Parameters
     ----------
-    runs : callable giving a Path
-        The folder of the recorded sessions.
+    draft : ConfigDraft
+        Its folder of results has the recorded sessions.
     cameras, ports : callable
         Give what there is; for tests.
     """
 
     def __init__(
-        self, runs: Callable[[], Path], cameras: Cameras = list_cameras, ports: Ports = list_serial_ports
+        self, draft: ConfigDraft, cameras: Cameras = list_cameras, ports: Ports = list_serial_ports
     ) -> None:
-        self._runs, self._list_cameras, self._list_ports = runs, cameras, ports
+        self._draft, self._list_cameras, self._list_ports = draft, cameras, ports
         self._cameras: list[CameraListing] = []
         self._loads: list[dict[str, str]] = []
         self._finding = ""
@@ -96,7 +97,8 @@ class DeviceLists:
         self._finding = ""
 
     def _sessions(self) -> Iterator[str]:
-        files = sorted(self._runs().glob("*/session*.h5"), key=lambda path: path.stat().st_mtime)
+        runs = Path(self._draft.config.output.dir or "runs")
+        files = sorted(runs.glob("*/session*.h5"), key=lambda path: path.stat().st_mtime)
         return (f"session:{path}" for path in files[-MAX_SESSIONS:])
 
     def _identify(self, port: str) -> None:
