@@ -69,17 +69,8 @@ def _alarm_watch(
 ) -> list[Consumer]:
     if not alarms:
         return []
-    values, of_machine = ChannelValues(about.start.monotonic, run_state.snapshot), run_state.health.channels
-    if joint is None:
-        return [AlarmWatch(alarms, values, of_machine, run_state.alarms, run_state.event_log)]
-    both = joint
-
-    def channels(now: float) -> dict[str, float]:
-        return of_machine(now) | both.read(about.start.monotonic)
-
-    return [
-        AlarmWatch(alarms, values, channels, run_state.alarms, run_state.event_log, lost=lambda: both.lost)
-    ]
+    values = ChannelValues(about.start.monotonic, run_state)
+    return [AlarmWatch(alarms, values, run_state, joint=joint)]
 
 
 def _lines(about: RunInfo, run_state: RunState, joint: JointChannels | None) -> LineFormat:
@@ -92,8 +83,7 @@ def _lines(about: RunInfo, run_state: RunState, joint: JointChannels | None) -> 
         *(() if config.specimen.area_m2 else ("stress_MPa",)),
     }
     channels = [channel for channel in wanted if channel not in absent]
-    more = dict if joint is None else partial(joint.read, start)
-    return LineFormat(ChannelValues(start, run_state.snapshot, more), channels, config.strain_out.format)
+    return LineFormat(ChannelValues(start, run_state, joint), channels, config.strain_out.format)
 
 
 def _tcp(config: Config, lines: LineFormat) -> StrainOut | None:

@@ -77,7 +77,7 @@ def page_of(state: RunState, *, paused: bool = False) -> dict[str, Any]:
 
 
 def line_of(state: RunState, *channels: str) -> dict[str, Any]:
-    values = ChannelValues(0.0, state.snapshot, clock=lambda: NOW)
+    values = ChannelValues(0.0, state, clock=lambda: NOW)
     found: dict[str, Any] = json.loads(LineFormat(values, channels, "json").of(None))
     return found
 
@@ -90,15 +90,10 @@ class Watched:
         self.config = AlarmConfig(**{"channel": "force_N", "above": 3000.0, "end": True} | config)
         means = ActionMeans(Screen(), self.ended.append)
         self.alarm = Alarm(self.config, actions_of(self.config, means))
-        values = ChannelValues(0.0, lambda t, step: self.state.snapshot(t, step), clock=lambda: NOW)
-        self.watch = AlarmWatch(
-            [self.alarm],
-            values,
-            lambda t: self.state.health.channels(t),
-            state.alarms,
-            self.events.append,
-            lambda: NOW,
-        )
+        values = ChannelValues(0.0, state, clock=lambda: NOW)
+        state.event_log.add_listener(self.events.append)
+        self.events.clear()  # those of before
+        self.watch = AlarmWatch([self.alarm], values, state, lambda: NOW)
         self.watch.idle()
 
     @property

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import math
 import socket
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -24,6 +25,7 @@ from live.config.loading import from_dict, load_config
 from live.config.sections import AlarmConfig
 from live.pipeline.consumer import Screen
 from live.pipeline.run_state import ActiveAlarms, Health
+from live.pipeline.snapshot import Snapshot
 from live.run.alarms import ACTIONS, ActionMeans, Alarm, AlarmWatch, actions_of, check_alarms
 from live.run.control import SOCKET_NAME, ControlPort, answer
 from live.run.live_run import run_live
@@ -101,18 +103,15 @@ class WatchSetup:
         self.active, self.values, self.now = ActiveAlarms(), dict[str, float](), 100.0
         self.screen, self.ended, self.sent, self.lost = RecordingScreen(), list[str](), Kept(), ""
         means = ActionMeans(self.screen, self.ended.append, [self.sent])  # type: ignore[list-item]
-        self.watch = AlarmWatch(
-            [Alarm(config, actions_of(config, means)) for config in alarms],
-            None,
-            self._machine,
-            self.active,
-            self.events.append,
-            lambda: self.now,  # type: ignore[arg-type]
-            lambda: self.lost,
-        )
+        channels: Any = SimpleNamespace(read=dict, now=Snapshot(0.0), start=0.0)
+        health = SimpleNamespace(channels=lambda now: self.values)
+        run_state: Any = SimpleNamespace(health=health, alarms=self.active, event_log=self.events.append)
+        made = [Alarm(config, actions_of(config, means)) for config in alarms]
+        self.watch = AlarmWatch(made, channels, run_state, lambda: self.now, self)
 
-    def _machine(self, now: float) -> Mapping[str, float]:
-        return self.values
+    def read(self, start: float) -> dict[str, float]:
+        """As channels of two cameras that have none."""
+        return {}
 
     def check(self, **values: float) -> list[dict[str, Any]]:
         self.values = values
