@@ -295,7 +295,9 @@ def _floor(f: CheckFigures, target: float | None) -> CheckLine:
     if noise is not None and noise.measured > MAX_OVER_PREDICTED * noise.predicted:
         return CheckLine(what, value, False, "something moves or flickers: vibration, air, lamp")
     wanted = DEFAULT_TARGET if target is None else target
-    limit = Message("asked for") if target is not None else Message("that are the limit where no target is given")
+    limit = (
+        Message("asked for") if target is not None else Message("that are the limit where no target is given")
+    )
     enough = known <= wanted
     words = Message(
         "more than the {wanted:.1f} µm/m {limit}: {value}",
