@@ -10,6 +10,7 @@ from typing import Any
 
 from acquire.errors import ConfigError
 from live.commands.docs import shipped
+from live.config.new_files import new_folder
 
 FOLDER = "phasedic-examples"
 CELL = "# %%"
@@ -29,11 +30,15 @@ def command(arguments: argparse.Namespace) -> int:
     if folder.exists() or folder.is_symlink():
         raise ConfigError("{path} exists; nothing is overwritten, choose another name", folder)
     ignored = shutil.ignore_patterns("__*", "*.egg-info", "build")
-    shutil.copytree(shipped("examples"), folder, ignore=ignored)
-    cells = (folder / "notebook.py").read_text(encoding="utf-8").split(f"\n{CELL}")
-    (folder / "notebook.ipynb").write_text(notebook(cells), encoding="utf-8")
-    print("rendering the pictures ...", flush=True)
-    write_pictures(folder)
+    with new_folder(folder) as part:
+        try:
+            shutil.copytree(shipped("examples"), part, ignore=ignored, dirs_exist_ok=True)
+        except shutil.Error as error:  # it has the errors of all files
+            raise OSError(error.args[0][0][2].partition(": ")[0]) from error
+        cells = (part / "notebook.py").read_text(encoding="utf-8").split(f"\n{CELL}")
+        (part / "notebook.ipynb").write_text(notebook(cells), encoding="utf-8")
+        print("rendering the pictures ...", flush=True)
+        write_pictures(part)
     print(f"{folder}: {folder / 'README.md'} has a command for each, and what it gives. The first:")
     print(
         f"  cd {folder}\n  phasedic replay shots --load forces.csv --section 20,2 --config gauges.toml --report"
