@@ -19,6 +19,7 @@ from acquire.text.quantity import Amount
 from analysis.evaluate import CONFIDENCE, Figure
 from analysis.evaluate.curve import noise
 from analysis.evaluate.figure import quantile
+from analysis.evaluate.seen import leap
 from live.results.figures import LAG_MATTERS_S, figure_text
 from live.results.finished.finished_test import FinishedTest
 
@@ -158,10 +159,23 @@ def _coverage(test: FinishedTest) -> str | None:
     return ""
 
 
+def _leaps(test: FinishedTest) -> str | None:
+    """No leap of the force to another level that the strain does not follow."""
+    found = leap(test.curve)
+    if found is None:
+        return ""
+    return Message(
+        "the force leaps by {force} at {t:.4g} s and the strain does not: did zero, range or unit of the load cell "
+        "change? All later forces are wrong by it",
+        Amount.rough("force", found[1] * (test.specimen.area_m2 or 1.0), 3),
+        found[0] - test.curve.t[0],
+    )
+
+
 def _lag(test: FinishedTest) -> str | None:
-    """Force and strain at one time."""
+    """Force and strain at one time; a leap of the force looks like a lag."""
     lag = test.lag
-    if not lag.known:
+    if not lag.known or _leaps(test):
         return None
     if abs(lag.value) < max(LAG_MATTERS_S, _SIGMAS * _sigma(lag)):
         return ""
@@ -241,6 +255,7 @@ _CHECKS: dict[str, Callable[[FinishedTest], str | None]] = {
     "sign of the force": _sign_of_force,
     "modulus": _modulus,
     "forces and pictures": _coverage,
+    "leaps of the force": _leaps,
     "lag": _lag,
     "alignment": _alignment,
     "out of plane": _out_of_plane,

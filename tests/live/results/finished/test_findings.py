@@ -85,6 +85,7 @@ def test_a_test_without_a_mistake_has_no_doubt() -> None:
         "sign of the force",
         "modulus",
         "forces and pictures",
+        "leaps of the force",
         "lag",
         "alignment",
         "out of plane",
@@ -100,6 +101,16 @@ def test_a_force_of_the_wrong_sign_comes_first() -> None:
     )
     text = first_doubt(test_of(-STRAINS, force=stress_of(STRAINS) * 20e-6))
     assert text.startswith("the force is positive where the specimen gets shorter")
+
+
+def test_a_zero_that_moves_in_the_test_is_named_and_is_no_lag() -> None:
+    whole = stress_of(STRAINS) * 20e-6
+    test = test_of(force=whole + np.where(np.arange(len(whole)) >= 60, 400.0, 0.0))
+    found = {one.name: one for one in findings(test)}
+    assert in_ascii(found["leaps of the force"].text).startswith(
+        "the force leaps by 399 N at 6 s and the strain does"
+    )
+    assert found["lag"].outcome == "not checked"
 
 
 def test_a_test_in_compression_is_named() -> None:
@@ -219,6 +230,7 @@ def test_every_doubt_is_translated_on_the_page() -> None:
         replace(test_of(), gauge={"start": (100.0, 20.0), "end": (160.0, 200.0)}),
         test_of(nu=0.8),
         test_of(reference_N=107.0),
+        test_of(force=whole + np.where(np.arange(len(whole)) >= 60, 400.0, 0.0)),
     )
     texts = [one.text for test in tests for one in findings(test) if one.outcome == "doubt"]
     assert len({text.split(":")[0] for text in texts}) >= len(tests)
