@@ -26,6 +26,9 @@ _LOADED = 0.05  # of the highest stress
 _AROUND, _SAME_RATE = 8, 0.5  # readings before and after a fall; how much strain rates of one motion differ
 _FALLEN, _RISEN = 0.9, 0.95  # of the stress before: a fall that the load cell makes, and its end
 _LEAP, _FLAT = 0.01, 1e-3  # of the highest stress: a leap, and what a straight part may leave
+_LEAST_STRAIN = 5e-5  # a leap
+LEAPS_NEED = 2 * _AROUND + _FEWEST
+"""Instants of a test that shows leaps."""
 _YIELDS = 0.3  # of the stress: a fall by more is no yield point
 _KINK = 1.75  # of a rate a reading: what a kink in it may look like beside a leap (1.61 at most over _AROUND)
 
@@ -193,7 +196,7 @@ def leap(curve: Curve) -> tuple[float, float] | None:
     known = np.isfinite(curve.stress) & np.isfinite(curve.strain)
     known &= np.arange(len(known)) <= (len(known) if stop is None else stop)
     t, strain, stress = curve.t[known], curve.strain[known], curve.stress[known]
-    if len(stress) < 2 * _AROUND + _FEWEST:
+    if len(stress) < LEAPS_NEED:
         return None
     (leaps, rates, left), (pulls, pulled, _) = _sides(stress), _sides(strain)
     top, sigma, unsure = float(np.abs(stress).max()), noise(stress), _SURE * noise(strain)
@@ -211,6 +214,32 @@ def leap(curve: Curve) -> tuple[float, float] | None:
     over = np.minimum(np.abs(leaps), np.abs(stress[2:] - stress[:-2])[at]) - explained - least
     k = int(np.argmax(over))
     return (float(t[k + _AROUND]), float(leaps[k])) if over[k] > 0 and stiffest > 0 else None
+
+
+def leap_alike(curve: Curve) -> tuple[float, float, float] | None:
+    """When the strains along and across the load leap most the same way, s, and by how much; None where they do not.
+
+    No force along one axis does that: the camera, its focus or the specimen moved.
+    """
+    if curve.transverse is None:
+        return None
+    stop = broken_at(curve.stress, curve.strain)
+    known = np.isfinite(curve.strain) & np.isfinite(curve.transverse)
+    known &= np.arange(len(known)) <= (len(known) if stop is None else stop)
+    if np.count_nonzero(known) < LEAPS_NEED:
+        return None
+    leaps, over = [], []
+    for values in (curve.strain[known], curve.transverse[known]):
+        found, rates, _ = _sides(values)
+        before, after = rates[: len(found)], rates[-len(found) :]
+        raw = np.abs((values[2:] - values[:-2])[_AROUND - 1 : 1 - _AROUND] - before - after)
+        least = _KINK * np.maximum(np.abs(before), np.abs(after)) + max(_SURE * noise(values), _LEAST_STRAIN)
+        over.append(np.minimum(np.abs(found), raw) - least)
+        leaps.append(found)
+    clear = np.where(leaps[0] * leaps[1] > 0, np.minimum(*over), 0.0)
+    k = int(np.argmax(clear))
+    t = float(curve.t[known][k + _AROUND])
+    return (t, float(leaps[0][k]), float(leaps[1][k])) if clear[k] > 0 else None
 
 
 def _sides(values: Floats) -> tuple[Floats, Floats, Floats]:

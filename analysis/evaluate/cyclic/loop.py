@@ -224,8 +224,12 @@ class _Fits:
             elif seen < _SEEN:
                 found.append(Message("the bursts see {share:.0%} of the range of the load", seen))
             elif hidden > _HIDDEN:
-                text = "the load stands still at its highest over {share:.0%} of the strains: a load cell at its limit"
-                found.append(Message(text, hidden))
+                found.append(
+                    Message(
+                        "the load stands at its highest over {share:.0%} of the strains: a load cell at its limit",
+                        hidden,
+                    )
+                )
             else:
                 found.append("" if clear else Message("the strain does not follow the load"))
         return found
