@@ -272,6 +272,19 @@ def test_a_lag_is_found_with_few_and_many_pictures(n: int) -> None:
     assert sum(f.low <= 0.3 <= f.high for f in found) >= 8
 
 
+def test_a_gap_of_the_force_before_a_knee_is_no_lag() -> None:
+    """A load cell that is unplugged and comes back with a fourth of its rate as the metal yields."""
+    t, rng = np.arange(0, 9.5, 0.1), np.random.default_rng(2)
+    strain = np.interp(t, [0, 0.6, 5.5, 9.3, 9.5], [0, 0, 2e-3, 8e-3, 8e-3])
+    stress = np.where(strain < 2e-3, E_PA * strain, 140e6 + 9e9 * (strain - 2e-3))
+    at = np.arange(0.01, 9.8, 1 / 80)
+    at = at[(at < 2.5) | ((at > 5.6) & (np.arange(len(at)) % 4 == 0))]
+    for _ in range(10):
+        force = Track(at, np.interp(at, t, 40e-6 * stress) + rng.normal(0, 1, len(at)))
+        found = find_lag(Track(t, strain + rng.normal(0, 2e-6, len(t))), force)
+        assert not found.known or abs(found.value) < 0.03
+
+
 def test_neither_a_bent_curve_nor_a_loop_is_a_lag() -> None:
     t = np.arange(0, 60, 1 / 20)
     bent = 0.003 * t / 60

@@ -19,7 +19,7 @@ from acquire.text.quantity import Amount
 from analysis.evaluate import CONFIDENCE, Figure
 from analysis.evaluate.curve import noise
 from analysis.evaluate.figure import quantile
-from analysis.evaluate.seen import LEAPS_NEED, leap, leap_alike
+from analysis.evaluate.seen import LEAPS_NEED, leap, leap_alike, without_stopped
 from live.results.figures import LAG_MATTERS_S, figure_text
 from live.results.finished.finished_test import FinishedTest
 
@@ -187,9 +187,9 @@ def _leaps_of_strain(test: FinishedTest) -> str | None:
 
 
 def _lag(test: FinishedTest) -> str | None:
-    """Force and strain at one time; a leap of the force looks like a lag."""
+    """Force and strain at one time; a force that leaps, stands still or falls out looks like a lag."""
     lag = test.lag
-    if not lag.known or _leaps(test):
+    if not lag.known or _leaps(test) or without_stopped(test.curve)[1]:
         return None
     if abs(lag.value) < max(LAG_MATTERS_S, _SIGMAS * _sigma(lag)):
         return ""

@@ -11,6 +11,7 @@ import pytest
 
 from acquire.load_sample import LoadSample
 from acquire.text.quantity import Amount
+from analysis.evaluate import Figure
 from analysis.evaluate.seen import leap_alike
 from live.config.sections import SpecimenConfig
 from live.pipeline.run_state import RunState
@@ -117,6 +118,14 @@ def test_a_zero_that_moves_in_the_test_is_named_and_is_no_lag() -> None:
         "the force leaps by 399 N at 6 s and the strain does"
     )
     assert found["lag"].outcome == "not checked"
+
+
+def test_a_force_that_falls_out_is_no_lag() -> None:
+    whole = stress_of(STRAINS) * 20e-6
+    test = test_of(force=np.where(np.arange(len(whole)) >= 60, 1e-3, 1.0) * whole)
+    lagging = replace(test, lag=Figure(0.2, 0.19, 0.21))
+    assert outcomes(replace(test_of(), lag=lagging.lag))["lag"] == "doubt"
+    assert "they fall to nothing" in test.figures.notes[0] and outcomes(lagging)["lag"] == "not checked"
 
 
 @pytest.mark.parametrize(("at", "size"), [(30, -3e-4), (30, 3e-4), (60, -3e-4), (60, 2e-3), (120, 2e-3)])
