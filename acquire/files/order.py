@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from acquire.addresses import expanded
 from acquire.errors import ConfigError, DataError
+from acquire.files.dates import dated
 from acquire.files.picture import FOREIGN
 from acquire.text import Message
 
@@ -167,6 +168,7 @@ def _by_name(names: Sequence[str], by: str) -> tuple[list[list[int]], bool]:
     stems = [unicodedata.normalize("NFKC", _stem(name)).replace("\u2212", "-").casefold() for name in names]
     if _is_hexadecimal(stems):
         return [sorted(range(len(names)), key=lambda k: (len(stems[k]), stems[k], names[k]))], False
+    stems, *others = dated(stems)
     found = [_pieces(stem) for stem in stems]
     doubts = _doubts([pieces for pieces, _ in found])
 
@@ -177,6 +179,7 @@ def _by_name(names: Sequence[str], by: str) -> tuple[list[list[int]], bool]:
     orders = [order(_Reading(decimal=False, signed=True))]
     if doubts.signs:
         orders.append(order(_Reading(decimal=False, signed=False)))
+    orders += [sorted(range(len(names)), key=lambda k: (other[k], names[k])) for other in others]
     orders += _turned(orders[0], [pieces for pieces, _ in found], [rest for _, rest in found])
     decimals = order(_Reading(decimal=True, signed=True)) if doubts.points else orders[0]
     if by == "name" or all(other == orders[0] for other in [*orders, decimals]):

@@ -35,6 +35,11 @@ _CURVED = 3.5  # standard deviations of a curvature that ends the elastic part
 _APART_S, _SEPARATION = 0.2, 20.0  # a lag this far away must fit worse by this many variances
 _BENT = 5.0  # times the noise: second differences of the force that are no bend
 _BACK = 0.1  # of the highest force: a fall by more ends the first rise
+_GAP_S, _GAP, _GAP_MOVED = (
+    0.5,
+    10.0,
+    0.02,
+)  # without a reading: s, median intervals; of the highest force, meanwhile
 _KNOWN = 0.95  # of the information that must come from the force itself and not from its noise
 
 
@@ -139,13 +144,16 @@ def _turns_round(strain: Track, force: Track) -> str:
 
 
 def _elastic(strain: Track, force: Track, share: float, max_lag: float) -> Track:
-    """The frames until the force reaches ``share`` of its highest or goes back, with force around them at any lag."""
+    """The frames until the force reaches ``share`` of its highest, goes back or has a gap, with force at any lag."""
     base = float(np.median(force.values[: max(len(force.t) // 50, 3)]))
     swing = np.abs(force.values - base)
     turns = reversals(swing, max(_BACK * float(swing.max()), 10 * noise(force.values)))
     first = turns[0] if turns else len(swing) - 1
     reached = min(int(np.argmax(swing >= share * swing.max())), first)
-    end = min(float(force.t[reached]), force.t[-1] - max_lag - _SMOOTH_S)
+    steps, moved = np.diff(force.t), np.abs(np.diff(force.values)) > _GAP_MOVED * swing.max()
+    gaps = np.flatnonzero((steps > max(_GAP_S, _GAP * float(np.median(steps)))) & moved)
+    known = min([float(force.t[-1]) - _SMOOTH_S, *force.t[gaps[:1]].tolist()])
+    end = min(float(force.t[reached]), known - max_lag)
     inside = (strain.t >= force.t[0] + max_lag + _SMOOTH_S) & (strain.t <= end)
     return Track(strain.t[inside], strain.values[inside])
 

@@ -24,6 +24,13 @@ _BY_CHANCE = 1e-6  # how often so many may be equal in a living load cell
 _LEVELS = 3  # values at which readings rest: as many are the resolution of a quiet load cell
 _LOADED = 0.05  # of the highest stress
 _AROUND, _SAME_RATE = 8, 0.5  # readings before and after a fall; how much strain rates of one motion differ
+_FALLEN, _RISEN = 0.9, 0.95  # of the stress before: a fall that the load cell makes, and its end
+_LEAP, _FLAT = 0.01, 1e-3  # of the highest stress: a leap, and what a straight part may leave
+_LEAST_STRAIN = 5e-5  # a leap
+LEAPS_NEED = 2 * _AROUND + _FEWEST
+"""Instants of a test that shows leaps."""
+_YIELDS = 0.3  # of the stress: a fall by more is no yield point
+_KINK = 1.75  # of a rate a reading: what a kink in it may look like beside a leap (1.61 at most over _AROUND)
 
 
 def without_stopped(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
@@ -105,7 +112,7 @@ def _goes_on(strain: Floats, stop: int) -> bool:
 
 
 def confirmed(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
-    """The curve without stresses that rise in no time and come back, and words that name those.
+    """The curve without stresses that rise, or fall while the strain rises, in no time and come back; words for those.
 
     A stress is reached through its neighbours: it rises from one reading to the next by no more than a few times what
     is usual, and by what the strain that comes with it makes of it. A break falls and does not come back; a jump that
@@ -113,21 +120,32 @@ def confirmed(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
     """
     known = np.flatnonzero(np.isfinite(curve.stress))
     stress, strain = curve.stress[known], curve.strain[known]
-    alone = _alone(stress, strain)
-    if not alone.any():
-        return curve, ()
-    rows = known[alone]
-    highest = int(rows[np.argmax(curve.stress[rows])])
-    words = Message(
-        "forces left out because no neighbour confirms them: {count}, the highest, at {t:.4g} s, {stress:.3g} "
-        "times the highest of the others",
-        len(rows),
-        curve.t[highest] - curve.t[0],
-        curve.stress[highest] / np.max(stress[~alone]),
-    )
-    return replace(curve, stress=np.where(np.isin(np.arange(len(curve.t)), rows), math.nan, curve.stress)), (
-        words,
-    )
+    dips = _dips(stress, strain)
+    alone = np.zeros(len(known), np.bool_)
+    alone[~dips] = _alone(stress[~dips], strain[~dips])
+    words, left = [], curve.stress.copy()
+    left[known[alone | dips]] = math.nan
+    if alone.any():
+        highest = int(np.argmax(np.where(alone, stress, -math.inf)))
+        words.append(
+            Message(
+                "forces left out because no neighbour confirms them: {count}, the highest, at {t:.4g} s, "
+                "{stress:.3g} times the highest of the others",
+                np.count_nonzero(alone),
+                curve.t[known[highest]] - curve.t[0],
+                stress[highest] / np.max(stress[~alone]),
+            )
+        )
+    if dips.any():
+        words.append(
+            Message(
+                "forces left out: {n} that fall and come back at once while the strain rises, the first at {t:.4g} s; "
+                "does the load cell send zeros between its readings?",
+                np.count_nonzero(dips),
+                curve.t[known[np.argmax(dips)]] - curve.t[0],
+            )
+        )
+    return (replace(curve, stress=left), tuple(words)) if words else (curve, ())
 
 
 def _alone(stress: Floats, strain: Floats) -> NDArray[np.bool_]:
@@ -151,6 +169,89 @@ def _alone(stress: Floats, strain: Floats) -> NDArray[np.bool_]:
             alone[k + 1 : k + 1 + (int(back[0]) if len(back) else 1)] = True
         k += 1 + (int(back[0]) if len(back) else 0)
     return alone if alone.sum() <= _SHARE * n else np.zeros(n, np.bool_)
+
+
+def _dips(stress: Floats, strain: Floats) -> NDArray[np.bool_]:
+    """Which stresses under load fall and are back within a few readings in which the strain rises on, (N,)."""
+    dips = np.zeros(len(stress), np.bool_)
+    if len(stress) < _FEWEST:
+        return dips
+    loaded = stress[:-1] > max(_LOADED * stress.max(), 0.0)
+    for k in np.flatnonzero((stress[1:] < _FALLEN * stress[:-1]) & loaded):
+        back = np.flatnonzero(stress[k + 2 : k + 2 + _RUN] > _RISEN * stress[k])
+        if len(back) and (np.diff(strain[k : k + 3 + back[0]]) > 0).all():
+            dips[k + 1 : k + 2 + back[0]] = True
+    return dips if dips.sum() <= _SHARE * len(stress) else np.zeros(len(stress), np.bool_)
+
+
+def leap(curve: Curve) -> tuple[float, float] | None:
+    """When the stress leaps most to another level, s, and by how much; None where the strain explains every step.
+
+    Straight lines through the readings on either side of one miss each other there. The strain explains as much as the
+    stiffest straight part makes of its own leap, or of a step that its rates do not make; a kink of a rate looks like a
+    leap of less than ``_KINK`` of that rate. A yield point falls by less than ``_YIELDS``.
+    """
+    curve = confirmed(without_stopped(curve)[0])[0]
+    stop = broken_at(curve.stress, curve.strain)
+    known = np.isfinite(curve.stress) & np.isfinite(curve.strain)
+    known &= np.arange(len(known)) <= (len(known) if stop is None else stop)
+    t, strain, stress = curve.t[known], curve.strain[known], curve.stress[known]
+    if len(stress) < LEAPS_NEED:
+        return None
+    (leaps, rates, left), (pulls, pulled, _) = _sides(stress), _sides(strain)
+    top, sigma, unsure = float(np.abs(stress).max()), noise(stress), _SURE * noise(strain)
+    straight = (left < max(3 * sigma, _FLAT * top)) & (np.abs(pulled) * _AROUND > unsure) & (pulled != 0)
+    stiffest = float(np.max(rates[straight] / pulled[straight], initial=0.0))
+    before, after, at = np.s_[: len(leaps)], np.s_[-len(leaps) :], np.s_[_AROUND - 1 : 1 - _AROUND]
+    steps = np.abs(strain[2:] - strain[:-2])[at] - 2 * np.minimum(
+        np.abs(pulled[before]), np.abs(pulled[after])
+    )
+    explained = _PULLED * stiffest * np.maximum(np.maximum(np.abs(pulls), steps), unsure / 2)
+    explained += _KINK * np.maximum(np.abs(rates[before]), np.abs(rates[after]))
+    least = np.where(
+        leaps > 0, max(_SURE * sigma, _LEAP * top), _YIELDS * np.abs(stress[_AROUND - 1 :][before])
+    )
+    over = np.minimum(np.abs(leaps), np.abs(stress[2:] - stress[:-2])[at]) - explained - least
+    k = int(np.argmax(over))
+    return (float(t[k + _AROUND]), float(leaps[k])) if over[k] > 0 and stiffest > 0 else None
+
+
+def leap_alike(curve: Curve) -> tuple[float, float, float] | None:
+    """When the strains along and across the load leap most the same way, s, and by how much; None where they do not.
+
+    No force along one axis does that: the camera, its focus or the specimen moved.
+    """
+    if curve.transverse is None:
+        return None
+    stop = broken_at(curve.stress, curve.strain)
+    known = np.isfinite(curve.strain) & np.isfinite(curve.transverse)
+    known &= np.arange(len(known)) <= (len(known) if stop is None else stop)
+    if np.count_nonzero(known) < LEAPS_NEED:
+        return None
+    leaps, over = [], []
+    for values in (curve.strain[known], curve.transverse[known]):
+        found, rates, _ = _sides(values)
+        before, after = rates[: len(found)], rates[-len(found) :]
+        raw = np.abs((values[2:] - values[:-2])[_AROUND - 1 : 1 - _AROUND] - before - after)
+        least = _KINK * np.maximum(np.abs(before), np.abs(after)) + max(_SURE * noise(values), _LEAST_STRAIN)
+        over.append(np.minimum(np.abs(found), raw) - least)
+        leaps.append(found)
+    clear = np.where(leaps[0] * leaps[1] > 0, np.minimum(*over), 0.0)
+    k = int(np.argmax(clear))
+    t = float(curve.t[known][k + _AROUND])
+    return (t, float(leaps[0][k]), float(leaps[1][k])) if clear[k] > 0 else None
+
+
+def _sides(values: Floats) -> tuple[Floats, Floats, Floats]:
+    """By how much lines through ``_AROUND`` values before and after one miss each other; slopes and rms residuals."""
+    windows, x = (
+        np.lib.stride_tricks.sliding_window_view(values, _AROUND),
+        np.arange(_AROUND) - (_AROUND - 1) / 2,
+    )
+    mean, slope = windows.mean(axis=1), windows @ x / (x @ x)
+    left = np.sqrt(((windows - mean[:, None] - slope[:, None] * x) ** 2).mean(axis=1))
+    reach = slope * (_AROUND + 1) / 2
+    return (mean - reach)[_AROUND + 1 :] - (mean + reach)[: -_AROUND - 1], slope, left
 
 
 def _stiffness(strain: Floats, level: Floats) -> float:

@@ -221,6 +221,11 @@ class ZoiGrid:
         """Centres, (R,), px."""
         return np.asarray(self.first_y + (self.size - 1) / 2, np.float64)
 
+    def is_at(self, other: ZoiGrid) -> bool:
+        """Whether the other grid has the same ZOIs, active or not."""
+        mine, its = ((grid.size, grid.shape, *grid.first_x[:2], *grid.first_y[:2]) for grid in (self, other))
+        return mine == its
+
     @property
     def n_active(self) -> int:
         """Number of ZOIs to be measured."""

@@ -141,8 +141,8 @@ class PhaseKernel:
         image, shape = as_image(new_reference, "the new reference"), self.reference.prepared.shape
         if image.shape != shape:
             raise ValueError(f"the new reference has the shape {image.shape}, the first {shape}")
-        if field.grid.shape != self.grid.shape:
-            raise ValueError(f"the field has {field.grid.shape} ZOIs, this kernel {self.grid.shape}")
+        if not self.grid.is_at(field.grid):
+            raise ValueError(f"the field is of {field.grid}, this kernel of {self.grid}")
         if not field.ok.any():
             raise ValueError("the reference cannot be renewed from a field without a single valid ZOI")
         if noise is None and np.isfinite(field.noise):
@@ -222,8 +222,8 @@ class PhaseKernel:
 
     def _before(self, start: StrainField) -> Floats:
         """Parameters of the field before, (A, modes); NaN for a ZOI without."""
-        if start.grid.shape != self.grid.shape:
-            raise ValueError(f"the start has {start.grid.shape} ZOIs, this kernel {self.grid.shape}")
+        if not self.grid.is_at(start.grid):
+            raise ValueError(f"the start is of {start.grid}, this kernel of {self.grid}")
         return taken(start.parameters, self.reference.index, self.reference.modes)
 
     def _carried_motion(self, start: StrainField) -> Motion:

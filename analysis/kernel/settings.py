@@ -60,13 +60,13 @@ class KernelSettings:
         _one_of("interpolant", self.interpolant, DEGREES)
         if self.estimator == "phase" and self.order != 1:
             raise ValueError('estimator "phase" has order 1 only')
-        if self.max_iterations < 1:
-            raise ValueError(f"max_iterations must be at least 1, got {self.max_iterations}")
+        if self.max_iterations < 1 or self.max_iterations != int(self.max_iterations):
+            raise ValueError(f"max_iterations must be a whole number from 1 on, got {self.max_iterations}")
         for name in ("tolerance_px", "tolerance_strain", "tolerance_sigma", "bending_px"):
             if not getattr(self, name) >= 0:
                 raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
 
 
 def _one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:
-    if value not in allowed:
+    if value not in allowed or isinstance(value, float | bool):
         raise ValueError(f"{name} = {value!r} is not possible; allowed: {', '.join(map(str, allowed))}")

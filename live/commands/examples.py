@@ -11,6 +11,7 @@ from typing import Any
 from acquire.errors import ConfigError
 from acquire.text import Message
 from live.commands.docs import shipped
+from live.config.new_files import new_folder
 from live.ui.terminal.screen import print_line
 
 FOLDER = "phasedic-examples"
@@ -31,11 +32,15 @@ def command(arguments: argparse.Namespace) -> int:
     if folder.exists() or folder.is_symlink():
         raise ConfigError("{path} exists; nothing is overwritten, choose another name", folder)
     ignored = shutil.ignore_patterns("__*", "*.egg-info", "build")
-    shutil.copytree(shipped("examples"), folder, ignore=ignored)
-    cells = (folder / "notebook.py").read_text(encoding="utf-8").split(f"\n{CELL}")
-    (folder / "notebook.ipynb").write_text(notebook(cells), encoding="utf-8")
-    print_line(Message("rendering the pictures ..."))
-    write_pictures(folder)
+    with new_folder(folder) as part:
+        try:
+            shutil.copytree(shipped("examples"), part, ignore=ignored, dirs_exist_ok=True)
+        except shutil.Error as error:  # it has the errors of all files
+            raise OSError(error.args[0][0][2].partition(": ")[0]) from error
+        cells = (part / "notebook.py").read_text(encoding="utf-8").split(f"\n{CELL}")
+        (part / "notebook.ipynb").write_text(notebook(cells), encoding="utf-8")
+        print_line(Message("rendering the pictures ..."))
+        write_pictures(part)
     page = folder / "README.md"
     print_line(Message("{page} has a command for each example, and what it gives. The first:", page))
     print_line(

@@ -13,6 +13,7 @@ from live.config.cameras import BACK, FRONT
 from live.config.loading import Config
 from live.pipeline.consumer import Screen
 from live.pipeline.run_state import RunState
+from live.results.finished.figures_file import FILE
 from live.results.finished.finished_test import FinishedTest
 from live.ui.terminal.screen import CamerasScreen
 from live.ui.terminal.summary import print_summary
@@ -45,7 +46,8 @@ def finish_test(
 ) -> int:
     """Print the summary of each camera with its ``lines``, and what is of all; the exit code, which was ``code``.
 
-    A report is made where that is configured: one, of all cameras.
+    A report is made where that is configured: one, of all cameras. Figures or a report that could not be written are a
+    loss.
     """
     every, several = CamerasScreen(screen), len(cameras) > 1
     report = next(iter(cameras.values())).config.output.report
@@ -54,6 +56,8 @@ def finish_test(
         print_summary(
             own, one.run_state, one.test, one.folder, lines[name], verbose=verbose, with_report=alone
         )
+        if not (one.folder / FILE).exists():
+            code = code or LOSS
     if several:
         screen.print()
     if FRONT in cameras:
@@ -65,7 +69,8 @@ def finish_test(
     if report:
         from live.commands.report import write_report
 
-        write_report(folder, screen)
+        if write_report(folder, screen):
+            code = code or LOSS
     if code in EXIT_WORDS:
         screen.print(Message("exit code {code}: {words}", code, EXIT_WORDS[code]))
     return code

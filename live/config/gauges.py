@@ -6,12 +6,16 @@ the names ``axial`` and ``transverse`` give the stress-strain curve.
 
 from __future__ import annotations
 
+import cmath
+import math
 import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from acquire.errors import ConfigError
-from analysis.evaluate import GAUGE_KINDS, Gauge, Parameter
+from analysis.evaluate import GAUGE_KINDS, Gauge, LineGauge, Parameter
 from live.config.values import CORNERS, POINT, RECTANGLE, Check, choice, integer, length, number
 
 if TYPE_CHECKING:
@@ -26,6 +30,7 @@ NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 DEFAULT_KIND = "line"
 """The kind of a gauge without ``kind``."""
 MAX_COLOUR = 999
+_OFF_DEG = 10.0  # by which a line and its ZOIs may differ: 4 % of the strain of a tensile test
 _POSITIONS = {"point": POINT, "box": RECTANGLE, "corners": CORNERS}
 
 
@@ -86,7 +91,7 @@ def gauges_for(tables: Mapping[str, GaugeTable], axis: str, grid: ZoiGrid) -> tu
 
 def _check_zois(gauge: Gauge, grid: ZoiGrid) -> None:
     if all(mask.any() for mask in gauge.zois(grid)):
-        return
+        return _check_ends(gauge, grid) if isinstance(gauge, LineGauge) else None
     raise ConfigError(
         "gauges.{name}: no ZOI is there; their centres reach from {x:g}, {y:g} to {x2:g}, {y2:g} px, "
         "less the mask; move or widen the gauge",
@@ -96,6 +101,22 @@ def _check_zois(gauge: Gauge, grid: ZoiGrid) -> None:
         grid.x[-1],
         grid.y[-1],
     )
+
+
+def _check_ends(gauge: LineGauge, grid: ZoiGrid) -> None:
+    """A line of about the step between ZOIs has nearly the same at both ends, and those that differ lie aside."""
+    x, y = np.meshgrid(grid.x, grid.y)
+    places = [complex(x[mask].mean(), y[mask].mean()) for mask in gauge.zois(grid)]
+    length, asked = places[1] - places[0], complex(*gauge.end) - complex(*gauge.start)
+    off = abs(math.degrees(cmath.phase(length / asked)))
+    if abs(length) < grid.step / 2 or off > _OFF_DEG:
+        raise ConfigError(
+            "gauges.{name}: the ZOIs at its ends are {length:.3g} px apart, {off:.0f} degrees off the line: "
+            "make it longer than a ZOI, within the region",
+            gauge.name,
+            abs(length),
+            off,
+        )
 
 
 def complete_gauges(gauges: Mapping[str, GaugeTable], axis: str = "y") -> Iterator[Gauge]:

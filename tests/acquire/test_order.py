@@ -42,6 +42,14 @@ SURE = {
     "letters with numbers": "P1a-1 P1b-1 P1e-1 P1f-1",
     "times": "IMG_20251125_101502 IMG_20251125_101503",
     "times with points": "10.15.02 10.15.03 10.16.01",
+    "days first": "28-01-2026 31-01-2026 01-02-2026",
+    "days first with points and a time": "x_31.1.2026_10.05 x_1.2.2026_09.05",
+    "months first": "01-31-2026 02-01-2026 02-13-2026",
+    "months in words": "Jan_x Feb_x Apr_x Dez_x",
+    "days and months in words": "28Nov2026-2 01Dec2026-1",
+    "twelve hours": "9.05.01am 10.05.01am 12.05.01pm 1.05.01pm",
+    "words that are no months": "may_03 spec_01 spec_02",
+    "numbers that are no dates": "1_2_1500 2_1_1000",
     "a reference": "ref def_1 def_2",
     "a reference at the end": "undeformed deformed",
     "a reference of ones own": "initial final",
@@ -78,6 +86,7 @@ def test_what_names_say(names: str) -> None:
 
 
 UNSURE = {
+    "a day or a month": "03-04-2026 04-03-2026",
     "a counter that begins again": "IMG_9998 IMG_9999 IMG_0001 IMG_0002",
     "one with five digits": "DSC09998 DSC09999 DSC00001",
     "one behind a folder": "P1009999 P1000001",

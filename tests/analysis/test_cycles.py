@@ -221,6 +221,39 @@ def test_noise_in_a_cyclic_test_makes_no_more_cycles() -> None:
     assert len(Made(n=50, noise=60e-6, noise_Pa=3e6).table()) == 50
 
 
+def test_a_load_cell_at_its_limit_cuts_peaks_and_leaves_no_modulus() -> None:
+    load, bursts = Made(noise=2e-6, noise_Pa=3e4).made()
+    cut = CycleTable.of([Track(load.t, np.minimum(load.values, 85e6))], bursts)
+    assert len(cut) == 10 and all("a load cell at its limit" in why for why in cut.why)
+    assert np.isnan(cut.column("modulus")).all()
+
+
+@pytest.mark.parametrize("step", [1e5, 2e6])
+def test_a_load_that_is_held_at_its_peak_is_not_cut(step: float) -> None:
+    """A dwell that a quiet load cell shows as equal readings."""
+    made = Made(noise=2e-6, wave=lambda theta: np.clip(1.4 * np.cos(theta), -1, 1))
+    load, bursts = made.made()
+    shown = Track(load.t, np.rint(load.values / step) * step)
+    assert not any(CycleTable.of([shown], bursts).why)
+    sine, bursts = Made(noise=2e-6).made()
+    assert not any(CycleTable.of([Track(sine.t, np.rint(sine.values / step) * step)], bursts).why)
+
+
+@pytest.mark.parametrize("wrong", [0.0, 99999e6])
+def test_a_wrong_reading_now_and_then_is_neither_a_cycle_nor_a_peak(wrong: float) -> None:
+    """Each 37th reading has the value that an indicator sends where it has none."""
+    load, bursts = Made().made()
+    load.values[36::37] = wrong
+    found, sound = CycleTable.of([load], bursts), Made().table()
+    assert len(found) == len(sound)
+    assert found.column("peak_load") == pytest.approx(sound.column("peak_load"), rel=2e-3)
+    ramp = np.linspace(0, 200e6, len(load.t))
+    ramp[36::37] = wrong
+    assert (
+        len(CycleTable.of([Track(load.t, ramp)], BurstStrains(bursts.t, bursts.t * 1e-4, bursts.width))) == 0
+    )
+
+
 def counted(load: Track, bursts: BurstStrains, each: float) -> list[Cycle]:
     """The cycles of a test that comes in pieces of ``each`` seconds."""
     counter, found = CycleCounter(loaded=True), list[Cycle]()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numba
 import numpy as np
@@ -244,6 +245,25 @@ def test_wrong_input_is_refused_with_a_sentence() -> None:
         PhaseKernel(picture(), GRID.subset(active=np.zeros(GRID.shape, bool)))
     with pytest.raises(ValueError, match="window"):
         KernelSettings(window="round")  # type: ignore[arg-type]
+
+
+def test_a_field_of_other_places_is_neither_a_start_nor_a_reference() -> None:
+    """It has as many ZOIs, and its displacements would be composed with those of others."""
+    aside = ZoiGrid.cover(replace(GRID.roi, x=GRID.roi.x + 5), GRID.size, GRID.step)
+    field = PhaseKernel(picture(), aside).measure(picture(u=0.2))
+    kernel = PhaseKernel(picture(), GRID)
+    with pytest.raises(ValueError, match="the start is of <ZoiGrid"):
+        kernel.measure(picture(u=0.2), start=field)
+    with pytest.raises(ValueError, match="the field is of <ZoiGrid"):
+        kernel.renewed(picture(u=0.2), field)
+
+
+@pytest.mark.parametrize(
+    "setting", [{"order": 1.0}, {"order": True}, {"interpolant": 5.0}, {"max_iterations": 2.5}]
+)
+def test_settings_of_another_type_are_refused(setting: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=next(iter(setting))):
+        KernelSettings(**setting)
 
 
 def test_inactive_zois_are_not_measured() -> None:

@@ -9,7 +9,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.evaluate import AT_LEAST, KINDS, TensileFigures, TensileOptions, Track, evaluate_test, find_lag
+from analysis.evaluate import (
+    AT_LEAST,
+    KINDS,
+    Curve,
+    TensileFigures,
+    TensileOptions,
+    Track,
+    evaluate_test,
+    find_lag,
+)
+from analysis.evaluate.seen import leap
 from tests.analysis.programmes import (
     E_PA,
     Array,
@@ -177,6 +187,72 @@ def test_what_rises_with_its_strain_or_stays_is_taken(kind: str) -> None:
     assert found.notes == () and found.Rm.low <= highest <= found.Rm.high
 
 
+def pull(strain: Array, change: Callable[[Array, Array], Array]) -> Curve:
+    """A pulled metal whose load cell shows a ``change`` of its stresses (Pa) and row numbers."""
+    stress = stress_of(strain, hardens)
+    return measured(strain, change(stress, np.arange(len(strain))), 1)
+
+
+@pytest.mark.parametrize("k", [60, 200, 500])
+@pytest.mark.parametrize(
+    ("change", "size"),
+    [
+        (lambda s, after: s + np.where(after, 15e6, 0), lambda s: 15e6),
+        (lambda s, after: np.where(after, 10.0, 1.0) * s, lambda s: 9 * s),
+        (lambda s, after: np.where(after, 0.5, 1.0) * s, lambda s: -s / 2),
+    ],
+)
+def test_a_stress_that_leaps_without_its_strain_is_found(
+    k: int, change: Callable[[Array, Array], Array], size: Callable[[float], float]
+) -> None:
+    strain = pulled(0.03, 600, still=30)
+    curve = pull(strain, lambda s, row: change(s, row >= k))
+    found, before = leap(curve), float(stress_of(strain, hardens)[k])
+    assert found is not None and abs(found[0] - curve.t[k]) < 0.25
+    assert found[1] == pytest.approx(size(before), abs=0.1 * abs(size(before)) + 2e6)
+
+
+def steps(n: int, each: int) -> Course:
+    """Weights that are put on one after the other."""
+    return of_metal(hardens, np.repeat(np.linspace(0, 0.01, n), each))
+
+
+@pytest.mark.parametrize(
+    ("strain", "stress"),
+    [
+        of_metal(hardens, pulled(0.03, 600, still=30)),
+        of_metal(hardens, pulled(0.3, 200)),
+        of_metal(yields(310e6, 270e6), pulled(0.03, 2000)),
+        of_metal(hardens, unloaded(pulled(0.03, 400), (0.01, 0.02), 0.8, 1, hardens)),
+        of_metal(hardens, unloaded(pulled(0.03, 400), (0.01, 0.02), 0.8, 12, hardens)),
+        steps(12, 20),
+        steps(40, 3),
+        of_metal(hardens, np.r_[np.zeros(30), np.linspace(0, 1e-3, 40), np.linspace(1e-3, 0.02, 30)]),
+        (np.r_[np.linspace(0, 0.004, 100), np.full(30, 1e-4)], np.r_[E_PA * np.linspace(0, 0.004, 100), np.zeros(30)]),
+        (np.r_[np.linspace(0, 0.004, 100), np.linspace(2e-3, 4e-3, 90)],
+         E_PA * np.r_[np.linspace(0, 0.004, 100), np.linspace(2e-3, 4e-3, 90)]),
+        cycled(1e-3, -1, 20, 9),
+        cycled(1e-3, 0.1, 20, 4),
+        relaxed(2e-3, 0.3, 300),
+        crept(100e6, 0.5, 300),
+    ],
+)  # fmt: skip
+def test_what_the_strain_explains_is_no_leap(strain: Array, stress: Array) -> None:
+    assert [leap(measured(strain, stress, seed)) for seed in range(SEEDS)] == [None] * SEEDS
+
+
+def test_zeros_between_the_readings_are_left_out_and_named() -> None:
+    strain = pulled(0.03, 600, still=30)
+    found = evaluate_test(pull(strain, lambda s, row: np.where(row % 37 == 36, 0.0, s)))
+    sound = evaluate_test(pull(strain, lambda s, row: s))
+    assert "that fall and come back at once while the strain rises" in found.notes[0] and sound.notes == ()
+    for name in ("E", "Rp02", "Rm"):
+        one, other = getattr(found, name), getattr(sound, name)
+        assert one.value == pytest.approx(other.value, rel=3e-3), name
+    shaken = of_metal(hardens, unloaded(strain, (0.01, 0.02), 0.8, 1, hardens))
+    assert evaluate_test(measured(*shaken, 1)).notes == (), "an unloading is none"
+
+
 def late(n: int, lag: float, seed: int) -> tuple[Track, Track]:
     """A metal that is pulled to 1 % in 17 s after 3 s of rest; frames, and 20 forces a second, which come late."""
     rng, t = np.random.default_rng(seed), np.arange(0, 24, 0.01)
@@ -194,6 +270,19 @@ def test_a_lag_is_found_with_few_and_many_pictures(n: int) -> None:
     found = [find_lag(*late(n, 0.3, seed)) for seed in range(10)]
     assert all(f.known for f in found) and max(abs(f.value - 0.3) for f in found) < 0.05
     assert sum(f.low <= 0.3 <= f.high for f in found) >= 8
+
+
+def test_a_gap_of_the_force_before_a_knee_is_no_lag() -> None:
+    """A load cell that is unplugged and comes back with a fourth of its rate as the metal yields."""
+    t, rng = np.arange(0, 9.5, 0.1), np.random.default_rng(2)
+    strain = np.interp(t, [0, 0.6, 5.5, 9.3, 9.5], [0, 0, 2e-3, 8e-3, 8e-3])
+    stress = np.where(strain < 2e-3, E_PA * strain, 140e6 + 9e9 * (strain - 2e-3))
+    at = np.arange(0.01, 9.8, 1 / 80)
+    at = at[(at < 2.5) | ((at > 5.6) & (np.arange(len(at)) % 4 == 0))]
+    for _ in range(10):
+        force = Track(at, np.interp(at, t, 40e-6 * stress) + rng.normal(0, 1, len(at)))
+        found = find_lag(Track(t, strain + rng.normal(0, 2e-6, len(t))), force)
+        assert not found.known or abs(found.value) < 0.03
 
 
 def test_neither_a_bent_curve_nor_a_loop_is_a_lag() -> None:

@@ -116,6 +116,8 @@ def test_the_status_line_shows_gauges() -> None:
         ({"start": [3, 4], "end": [3, 4]}, "are one point"),
         ({"kind": "area"}, "needs 'box'"),
         ({"kind": "zoi", "at": [900, 3]}, "no ZOI is there; their centres reach from 15.5, 15.5 to"),
+        ({"start": [42, 42], "end": [42, 43]}, "the ZOIs at its ends are 0 px apart"),
+        ({"start": [51, 50], "end": [51, 58]}, "degrees off the line: make it longer than a ZOI"),
     ],
 )
 def test_gauges_that_cannot_be_are_refused(gauge: dict, message: str) -> None:

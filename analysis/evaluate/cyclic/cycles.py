@@ -117,7 +117,9 @@ class CycleCounter:
             *(np.concatenate(pair) for pair in zip(self._bursts, *bursts, strict=True))
         )
         t = np.concatenate([self._load.t, *(one.t for one in loads)])
-        self._load = Track(t, np.concatenate([self._load.values, *(one.values for one in loads)]))
+        y = np.concatenate([self._load.values, *(one.values for one in loads)])
+        kept = ~_lone(y, _LEAST / 2 * float(np.ptp(y))) if len(y) else np.ones(0, np.bool_)
+        self._load = Track(t[kept], y[kept])
         self._low = min(self._low, self._load.values.min(initial=math.inf))
         self._high = max(self._high, self._load.values.max(initial=-math.inf))
 
@@ -177,6 +179,16 @@ class CycleCounter:
         load, bursts = _kept(self._load.t, self._middle), _kept(self._bursts.t, self._middle)
         self._load = Track(self._load.t[load], self._load.values[load])
         self._bursts = self._bursts.part(bursts)
+
+
+def _lone(y: Floats, least: float) -> NDArray[np.bool_]:
+    """Which readings are off their four neighbours by ``least`` and four times what those differ by: no peaks, (N,)."""
+    lone = np.zeros(len(y), np.bool_)
+    if len(y) >= 5:
+        around = np.delete(np.lib.stride_tricks.sliding_window_view(y, 5), 2, axis=1)
+        off = np.abs(y[2:-2] - np.median(around, axis=1))
+        lone[2:-2] = (off > least) & (off > 4 * np.ptp(around, axis=1))
+    return lone
 
 
 def _kept(t: Floats, since: float) -> slice:

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.text import Message
+from analysis.evaluate.curve import noise
 from analysis.evaluate.lag import Track
 
 Floats = NDArray[np.float64]
@@ -42,6 +43,7 @@ _U = np.arange(_GRID) / _GRID - 0.5
 _COSINE, _SINE = (2 / _GRID * wave(2 * np.pi * _U) for wave in (np.cos, np.sin))
 _LONGEST = 0.25  # of a cycle: a burst
 _SEEN = 0.7  # of the range of the load: what the bursts see of it
+_HELD = _HIDDEN = 0.05  # of a cycle: equal highest readings; of its strains: those in that time
 _CLEAR = 3.0  # standard uncertainties of a strain that follows the load
 _ONE_SIGMA = 0.8413447460685429  # of a normal distribution lies below 1
 
@@ -80,6 +82,8 @@ class Waves:
         NaN where the readings are too few.
     n : (K,) int
         Readings.
+    held : (K,) float64
+        Share of them that are equal to the highest: of a load cell at its limit, or of a load that is held.
     """
 
     def __init__(self, track: Track, middle: Floats, duration: Floats, sigma: float) -> None:
@@ -98,6 +102,8 @@ class Waves:
             )
         )
         self.size = highest - lowest
+        parts = zip(since, until, highest, strict=True)
+        self.held = np.array([np.mean(y[a:b] == top) if b > a else 0.0 for a, b, top in parts])
         self._origin, self._end = t[0], t[-1]
         self._sum = CubicSpline(t - t[0], y).antiderivative()
         self.values = self.mean(np.arange(len(middle))[:, None], _U, 1 / _GRID)
@@ -197,6 +203,11 @@ class _Fits:
         rest = bursts.strain - np.einsum("ni,ni->n", design, self._found[each])
         free = n - np.count_nonzero(told, axis=1)
         self._scatter = np.sqrt(np.add.reduceat(rest**2, start) / free) * stdtrit(free, _ONE_SIGMA)
+        held = (waves.held[of] > _HELD)[each] & (np.abs(u) < waves.held[of][each] / 2)
+        self._hidden, sigma = np.zeros(len(of)), noise(bursts.strain, 4)
+        for k in np.unique(each[held]):
+            part, whole = bursts.strain[held & (each == k)], bursts.strain[each == k]
+            self._hidden[k] = np.ptp(part) / np.ptp(whole) if np.ptp(part) > 2 * _CLEAR * sigma else 0.0
         self._tips = np.zeros((len(of), 6))
         self._tips[:, 2], self._tips[:, 5] = 1, self._curved
 
@@ -205,13 +216,20 @@ class _Fits:
         """Why there are no figures, for each; empty where there are."""
         strain, sigma = self._value(self._tips)
         found: list[str] = []
-        for longest, seen, clear in zip(
-            self._longest, self._seen, abs(strain) >= _CLEAR * sigma, strict=True
+        for longest, seen, hidden, clear in zip(
+            self._longest, self._seen, self._hidden, abs(strain) >= _CLEAR * sigma, strict=True
         ):
             if longest > _LONGEST:
                 found.append(Message("a burst lasts {share:.0%} of the cycle", longest))
             elif seen < _SEEN:
                 found.append(Message("the bursts see {share:.0%} of the range of the load", seen))
+            elif hidden > _HIDDEN:
+                found.append(
+                    Message(
+                        "the load stands at its highest over {share:.0%} of the strains: a load cell at its limit",
+                        hidden,
+                    )
+                )
             else:
                 found.append("" if clear else Message("the strain does not follow the load"))
         return found

@@ -19,6 +19,7 @@ from acquire.text.quantity import Amount
 from analysis.evaluate import CONFIDENCE, Figure
 from analysis.evaluate.curve import noise
 from analysis.evaluate.figure import quantile
+from analysis.evaluate.seen import LEAPS_NEED, leap, leap_alike, without_stopped
 from live.results.figures import LAG_MATTERS_S, figure_text
 from live.results.finished.finished_test import FinishedTest
 
@@ -158,10 +159,37 @@ def _coverage(test: FinishedTest) -> str | None:
     return ""
 
 
+def _leaps(test: FinishedTest) -> str | None:
+    """No leap of the force to another level that the strain does not follow."""
+    found = leap(test.curve)
+    if found is None:
+        return "" if len(test.curve.t) >= LEAPS_NEED else None
+    return Message(
+        "the force leaps by {force} at {t:.4g} s and the strain does not: did zero, range or unit of the load cell "
+        "change? All later forces are wrong by it",
+        Amount.rough("force", found[1] * (test.specimen.area_m2 or 1.0), 3),
+        found[0] - test.curve.t[0],
+    )
+
+
+def _leaps_of_strain(test: FinishedTest) -> str | None:
+    """No leap of the strains along and across the load the same way."""
+    found = leap_alike(test.curve)
+    if found is None:
+        return "" if test.curve.transverse is not None and len(test.curve.t) >= LEAPS_NEED else None
+    return Message(
+        "the strain leaps by {along} along and {across} across the load at {t:.4g} s: camera, focus or specimen moved "
+        "along the line of sight; later strains are wrong by it",
+        Amount("strain", found[1]),
+        Amount("strain", found[2]),
+        found[0] - test.curve.t[0],
+    )
+
+
 def _lag(test: FinishedTest) -> str | None:
-    """Force and strain at one time."""
+    """Force and strain at one time; a force that leaps, stands still or falls out looks like a lag."""
     lag = test.lag
-    if not lag.known:
+    if not lag.known or _leaps(test) or without_stopped(test.curve)[1]:
         return None
     if abs(lag.value) < max(LAG_MATTERS_S, _SIGMAS * _sigma(lag)):
         return ""
@@ -241,12 +269,14 @@ _CHECKS: dict[str, Callable[[FinishedTest], str | None]] = {
     "sign of the force": _sign_of_force,
     "modulus": _modulus,
     "forces and pictures": _coverage,
+    "leaps of the force": _leaps,
+    "leaps of the strain": _leaps_of_strain,
     "lag": _lag,
     "alignment": _alignment,
     "out of plane": _out_of_plane,
     "reference under load": _reference_load,
 }
-_WITHOUT_FORCE = ("alignment",)
+_WITHOUT_FORCE = ("alignment", "leaps of the strain")
 
 
 def _both_known(test: FinishedTest) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

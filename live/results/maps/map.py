@@ -6,6 +6,7 @@ the title names them. A rejected ZOI is transparent; the field "status" shows wh
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -178,6 +179,8 @@ def save(image: Image, path: Path) -> None:
     except FileExistsError:
         raise ConfigError("{path} exists and is not overwritten; choose another name", path) from None
     except OSError as error:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
         raise DataError(
             "{path}: cannot be written: {strerror}; look at the folder and the disk", path, error
         ) from None

@@ -108,7 +108,7 @@ def _at_end(history: History, axis: str) -> list[str]:
     if n - 1 in known[-1:]:
         return [Message("strain along {axis} at the end: {text}", axis, texts[0])]
     last = history.time_steps[-1]
-    why = last.apart or Message("{n_valid} of {n_zoi} valid", last.n_valid, last.n_zoi)
+    why = last.apart or Message("{n_valid} of {n_zoi} valid ({why})", last.n_valid, last.n_zoi, last.refused)
     none = Message("strain along {axis} at the end: no value, {why}", axis, why)
     newest = (
         Message("the last burst with a value is {k} of {n}: {text}", known[-1] + 1, n, texts[0])

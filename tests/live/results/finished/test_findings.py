@@ -11,6 +11,8 @@ import pytest
 
 from acquire.load_sample import LoadSample
 from acquire.text.quantity import Amount
+from analysis.evaluate import Figure
+from analysis.evaluate.seen import leap_alike
 from live.config.sections import SpecimenConfig
 from live.pipeline.run_state import RunState
 from live.results.finished.findings import SHOWN, doubts, findings
@@ -38,11 +40,15 @@ def test_of(
     specimen: SpecimenConfig = FLAT,
     nu: float = NU,
     turned: float = 0.0,
+    moved: np.ndarray | float = 0.0,
     times: Sequence[float] | None = None,
     reference_N: float = 0.0,
 ) -> FinishedTest:
-    """A test with these strains along a load that is turned by rad from y, and these forces, N, at ``times``, s."""
-    rng = np.random.default_rng(4)
+    """A test with these strains along a load that is turned by rad from y, and these forces, N, at ``times``, s.
+
+    ``moved`` is the false strain of a motion along the line of sight.
+    """
+    rng, moved = np.random.default_rng(4), np.broadcast_to(moved, strains.shape)
     state = RunState.new(0.5, specimen=specimen)
     if force is None:
         force = stress_of(strains) * 20e-6
@@ -50,8 +56,8 @@ def test_of(
     for k, strain in enumerate(strains):
         m, across = make_measurement(k), -nu * strain
         one = {
-            "exx": strain * s * s + across * c * c,
-            "eyy": strain * c * c + across * s * s,
+            "exx": strain * s * s + across * c * c + moved[k],
+            "eyy": strain * c * c + across * s * s + moved[k],
             "exy": (strain - across) * s * c,
         }
         noisy = {name: value + rng.normal(0, 2e-6) for name, value in one.items()}
@@ -85,6 +91,8 @@ def test_a_test_without_a_mistake_has_no_doubt() -> None:
         "sign of the force",
         "modulus",
         "forces and pictures",
+        "leaps of the force",
+        "leaps of the strain",
         "lag",
         "alignment",
         "out of plane",
@@ -100,6 +108,39 @@ def test_a_force_of_the_wrong_sign_comes_first() -> None:
     )
     text = first_doubt(test_of(-STRAINS, force=stress_of(STRAINS) * 20e-6))
     assert text.startswith("the force is positive where the specimen gets shorter")
+
+
+def test_a_zero_that_moves_in_the_test_is_named_and_is_no_lag() -> None:
+    whole = stress_of(STRAINS) * 20e-6
+    test = test_of(force=whole + np.where(np.arange(len(whole)) >= 60, 400.0, 0.0))
+    found = {one.name: one for one in findings(test)}
+    assert in_ascii(found["leaps of the force"].text).startswith(
+        "the force leaps by 399 N at 6 s and the strain does"
+    )
+    assert found["lag"].outcome == "not checked"
+
+
+def test_a_force_that_falls_out_is_no_lag() -> None:
+    whole = stress_of(STRAINS) * 20e-6
+    test = test_of(force=np.where(np.arange(len(whole)) >= 60, 1e-3, 1.0) * whole)
+    lagging = replace(test, lag=Figure(0.2, 0.19, 0.21))
+    assert outcomes(replace(test_of(), lag=lagging.lag))["lag"] == "doubt"
+    assert "they fall to nothing" in test.figures.notes[0] and outcomes(lagging)["lag"] == "not checked"
+
+
+@pytest.mark.parametrize(("at", "size"), [(30, -3e-4), (30, 3e-4), (60, -3e-4), (60, 2e-3), (120, 2e-3)])
+def test_a_camera_that_is_knocked_or_focused_in_the_test_is_named(at: int, size: float) -> None:
+    moved = np.where(np.arange(len(STRAINS)) >= at, size, 0.0)
+    test = test_of(moved=moved)
+    found, leaps = {one.name: one for one in findings(test)}["leaps of the strain"], leap_alike(test.curve)
+    assert "moved along the line of sight" in found.text and leaps is not None
+    assert leaps[0] == pytest.approx(at / FPS, abs=0.11)
+    assert leaps[1:] == pytest.approx((size, size), rel=0.2)
+
+
+def test_a_motion_that_is_slow_is_no_leap() -> None:
+    found = outcomes(test_of(moved=np.linspace(0, 5e-4, len(STRAINS))))
+    assert found["leaps of the strain"] == "good"
 
 
 def test_a_test_in_compression_is_named() -> None:
@@ -200,8 +241,8 @@ def test_at_most_three_are_shown_in_their_order() -> None:
 def test_without_a_force_only_what_needs_none_is_checked() -> None:
     found = findings(test_of(force=np.full(len(STRAINS), math.nan)))
     checked = [one.name for one in found if one.outcome != "not checked"]
-    assert checked == ["alignment"]
-    assert {one.text for one in found if one.name != "alignment"} == {"no force is known"}
+    assert checked == ["leaps of the strain", "alignment"]
+    assert {one.text for one in found if one.name not in checked} == {"no force is known"}
 
 
 def test_every_doubt_is_translated_on_the_page() -> None:
@@ -219,6 +260,8 @@ def test_every_doubt_is_translated_on_the_page() -> None:
         replace(test_of(), gauge={"start": (100.0, 20.0), "end": (160.0, 200.0)}),
         test_of(nu=0.8),
         test_of(reference_N=107.0),
+        test_of(moved=np.where(np.arange(len(STRAINS)) >= 60, 4e-4, 0.0)),
+        test_of(force=whole + np.where(np.arange(len(whole)) >= 60, 400.0, 0.0)),
     )
     texts = [one.text for test in tests for one in findings(test) if one.outcome == "doubt"]
     assert len({text.split(":")[0] for text in texts}) >= len(tests)

@@ -125,7 +125,7 @@ def test_the_end_is_that_of_the_last_burst() -> None:
     n_zoi = torn.history.time_steps[-1].n_zoi
     lines = brief_lines(torn, finished(torn))
     assert lines[0] == f"measured 4 bursts, 0 of {n_zoi} ZOIs valid in the last (9 LOST)"
-    assert lines[1] == f"strain along y at the end: no value, 0 of {n_zoi} valid"
+    assert lines[1] == f"strain along y at the end: no value, 0 of {n_zoi} valid (9 LOST)"
     assert in_ascii(lines[2]).startswith("the last burst with a value is 2 of 4: 1000.0 +- ")
     assert any(
         f"last strain of the region: no value, 0 of {n_zoi} ZOIs valid" in x
