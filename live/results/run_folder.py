@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,6 @@ from live.results.stored_fields import (
     stored_pattern,
 )
 
-Item = TypeVar("Item")
 SESSION, STRAIN = "session.h5", "strain.h5"
 _AS_FILES = ("files:", "video:")
 
@@ -94,8 +94,10 @@ class RunFolder(Closing):
         path = self.session_path
         if path is None:
             return None
-        session = self._recorded(lambda: Session.open(path), None)
-        self._sessions += [] if session is None else [session]
+        session: Session | None = None
+        with self._recorded():
+            session = Session.open(path)
+            self._sessions.append(session)
         return session
 
     @property
@@ -103,29 +105,32 @@ class RunFolder(Closing):
         """What could not be read of the recording so far, a sentence each."""
         return tuple(self._notes)
 
-    def _recorded(self, read: Callable[[], Item], otherwise: Item) -> Item:
-        """A part of the recording; ``otherwise`` and a note where it cannot be read."""
+    @contextmanager
+    def _recorded(self) -> Iterator[None]:
+        """Around the reading of a part of the recording: a note where it cannot be read."""
         try:
-            return read()
+            yield
         except DataError as error:
             self._notes[Message("the recording cannot be read, the results can: {why}", error)] = None
-            return otherwise
 
     @cached_property
     def load_samples(self) -> list[LoadSample]:
         """The samples of the load cell; empty without a recording."""
-        session = self.session
-        return [] if session is None else self._recorded(session.load_samples, [])
+        if self.session is not None:
+            with self._recorded():
+                return self.session.load_samples()
+        return []
 
     @cached_property
     def readings(self) -> Readings:
         """Times in s since the start and forces in N of all load samples; none without a recording."""
-        session, none = self.session, Readings(lambda: iter(()))
-        if session is None:
-            return none
-        start, curves = session.start_monotonic, session.load_curves
-        found = Readings(lambda: (Track(times - start, forces) for times, forces in curves()))
-        return found if self._recorded(lambda: found.count, 0) else none
+        if self.session is not None:
+            start, curves = self.session.start_monotonic, self.session.load_curves
+            found = Readings(lambda: (Track(times - start, forces) for times, forces in curves()))
+            with self._recorded():
+                if found.count:
+                    return found
+        return Readings(lambda: iter(()))
 
     @property
     def load_curve(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -137,8 +142,10 @@ class RunFolder(Closing):
     @cached_property
     def frame_counts(self) -> dict[str, Any] | None:
         """The frame counts of the recording; None where there are none."""
-        session = self.session
-        return None if session is None else self._recorded(lambda: session.frame_counts, None)
+        if self.session is not None:
+            with self._recorded():
+                return self.session.frame_counts
+        return None
 
     @property
     def session_path(self) -> Path | None:
@@ -161,10 +168,11 @@ class RunFolder(Closing):
     @cached_property
     def pictures(self) -> Pictures | None:
         """Pictures of the measured instants; None where they cannot be found or read any more."""
-        session = self.session
-        if session is not None:
-            found = self._recorded(lambda: of_session(session, self.strain), None)
-            return None if found is None else replace(found, each=lambda rows: self._readable(found, rows))
+        if self.session is not None:
+            found: Pictures | None = None
+            with self._recorded():
+                found = of_session(self.session, self.strain)
+            return found and replace(found, each=lambda rows: self._readable(found, rows))
         try:
             address = with_scheme(self.camera_address) if self.camera_address else ""
             return of_images(address, self.strain, self._crop) if address.startswith(_AS_FILES) else None
@@ -174,7 +182,10 @@ class RunFolder(Closing):
     def _readable(self, found: Pictures, rows: Sequence[int]) -> Iterator[Image | None]:
         """The picture of each row; None for one that is damaged."""
         for row in rows:
-            yield self._recorded(lambda row=row: next(iter(found.each([row])), None), None)  # type: ignore[misc]
+            picture = None
+            with self._recorded():
+                picture = next(iter(found.each([row])), None)
+            yield picture
 
     @property
     def _crop(self) -> Crop | None:
@@ -326,9 +337,10 @@ class RunFolder(Closing):
     @cached_property
     def events(self) -> list[Event]:
         """The recorded events without MEASURED, which comes with every burst; empty without a recording."""
-        session = self.session
-        found: list[Event] = [] if session is None else self._recorded(session.events, [])
-        return [event for event in found if event.kind is not EventKind.MEASURED]
+        if self.session is not None:
+            with self._recorded():
+                return [one for one in self.session.events() if one.kind is not EventKind.MEASURED]
+        return []
 
     @property
     def start_monotonic(self) -> float:

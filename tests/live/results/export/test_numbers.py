@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import json
@@ -231,7 +232,7 @@ def test_a_table_of_loads_counts_from_the_start_of_the_test() -> None:
             load_curves=lambda: iter([(np.array([100.5, 101.25]), np.array([12.5, math.nan]))]),
             start_monotonic=100.0,
         ),
-        _recorded=lambda read, none: read(),
+        _recorded=contextlib.nullcontext,
     )
     run: Any = SimpleNamespace(readings=RunFolder.readings.func(recorded))
     file = io.StringIO()
