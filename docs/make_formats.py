@@ -1,4 +1,4 @@
-"""Fills the tables of formats and of the settings of cameras: ``python -m docs.make_formats``.
+"""Fills the tables of formats and of the settings of devices: ``python -m docs.make_formats``.
 
 They list what files and settings are declared to be. A page holds each table between ``<!-- table NAME ... -->`` and
 ``<!-- end -->``. The tests compare the pages with these tables.
@@ -26,7 +26,7 @@ from live.results.finished.cycles import COLUMNS as CYCLES
 from live.results.quantities import quantity_of
 from live.results.response import stored
 from live.results.strain_csv import COLUMNS
-from live.setup.devices import camera_settings
+from live.setup.devices import camera_settings, load_settings
 
 DOCS = Path(__file__).parent
 HEIGHT, WIDTH, ZOIS = 64, 80, (3, 5)
@@ -100,30 +100,20 @@ def flags() -> str:
 
 
 SIM = [
-    "programme",
-    "seconds",
-    "hold",
-    "E_GPa",
-    "nu",
-    "yield_MPa",
-    "section_mm2",
-    "bits",
-    "noise",
-    "fps",
-    "faults",
-]
+    "programme", "seconds", "hold", "E_GPa", "nu", "yield_MPa", "section_mm2", "bits", "noise", "fps", "faults",
+]  # fmt: skip
 """Settings of ``sim:`` that are in the page; ``phasedic devices --settings`` has all."""
 
 
-def settings_table(scheme: str) -> str:
-    """The settings of an address of a kind of camera."""
+def settings_table(scheme: str, kind: type) -> str:
+    """The settings of an address of a kind of device."""
     rows = (
         (
             f"`{one.key}`" if one.key else "others",
             one.unit,
             "; ".join(filter(None, (one.words, one.allowed * ("one of" in one.allowed), one.stands))),
         )
-        for one in settings_of(camera_settings()[scheme])
+        for one in settings_of(kind)
         if scheme != "sim" or one.key in SIM
     )
     return table(("setting", "unit", "meaning"), rows)
@@ -139,13 +129,14 @@ def _described(path: str, one: Declared) -> Row:
 
 
 TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
-    **{name or "v4l2": partial(settings_table, name) for name in camera_settings()},
+    **{name or "v4l2": partial(settings_table, name, kind) for name, kind in camera_settings().items()},
+    "load": partial(settings_table, "load", load_settings()[""]),
     "session": session_layout, "flags": flags, "means": means, "status": statuses,
     "response": response, "cycles": cycles, "channels": channels,
 })  # fmt: skip
 PAGES = tuple(
     DOCS / f"{name}.md"
-    for name in ("session-format", "strain-format", "control", "cameras", "machine-vision")
+    for name in ("session-format", "strain-format", "control", "cameras", "machine-vision", "load-cells")
 )
 _TABLE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)
 

@@ -12,9 +12,8 @@ from __future__ import annotations
 import math
 import re
 
-from acquire.addresses import Options
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.base import Parser, ParserSettings, Protocol, Reading
 from acquire.protocols.buffers import HeldBytes, number
 from acquire.text import Message
 
@@ -51,15 +50,18 @@ class SauterParser(Parser):
         self._held.clear(lost)
 
 
-def make_parser(options: Options) -> Parser:
-    """No settings of its own."""
-    return SauterParser()
+class SauterSettings(ParserSettings):
+    """None."""
+
+    def parser(self, address: str) -> Parser:
+        """The one there is."""
+        return SauterParser()
 
 
 PROTOCOL = Protocol(
     name="sauter",
     summary="Sauter FH/FL and clones (asked for each reading)",
-    make_parser=make_parser,
+    settings=SauterSettings,
     mode="poll",
     unit_on_line=False,
     flags_overload=False,

@@ -31,7 +31,7 @@ from live.commands.options import add_measure, add_options, configured
 from live.commands.run import finish, run_attended
 from live.config.loading import Config
 from live.config.values import AUTO
-from live.pipeline.consumer import Consumer
+from live.pipeline.consumer import Consumer, Screen
 from live.pipeline.measurement import AXIAL, Measurement
 from live.results.figures import tensile_table
 from live.results.folder import check_folder
@@ -79,17 +79,17 @@ def command(arguments: argparse.Namespace) -> int:
     config = configured(arguments, _defaults(arguments))
     check_folder(config.output.dir)
     # All that the next commands need too: 8-bit pictures, and a batch.
-    compile_ahead(PICTURE_KINDS, phase=True, show=screen.status)
+    compile_ahead(PICTURE_KINDS, phase=True, screen=screen)
     config = fitting(config)
     collector, operator = MeansCollector(), Operator(config.output.seconds)
     # The whole picture is specimen: it is only looked at where gauges are to be placed.
-    with located(config, screen.print) if config.measure.gauges == AUTO else nullcontext(config) as config:
+    with located(config, screen) if config.measure.gauges == AUTO else nullcontext(config) as config:
         test = run_attended({"": config}, screen, {"": [collector, operator]}, operator.attend)
     finish(test, screen, verbose=arguments.verbose)
     outcome = test.cameras[""]
     if outcome.rig.specimen is None or not collector.measurements:
         return outcome.exit_code
-    code = compare(outcome, collector, config, screen.print)
+    code = compare(outcome, collector, config, screen)
     return code if code == 1 else outcome.exit_code or code
 
 
@@ -294,9 +294,7 @@ def middle_of(specimen: VirtualSpecimen, times: Array) -> float:
     return float(np.interp(strain.mean(), strain, times))
 
 
-def compare(
-    outcome: Outcome, collector: MeansCollector, config: Config, print_line: Callable[[str], None]
-) -> int:
+def compare(outcome: Outcome, collector: MeansCollector, config: Config, screen: Screen) -> int:
     """Print what was measured against the truth; 1 where the elastic part differs, 5 where E was not measured."""
     specimen = outcome.rig.specimen
     assert specimen is not None
@@ -312,20 +310,20 @@ def compare(
             ratios.append([np.abs(error) / (RELATIVE * np.abs(true) + k * sigma) for k in (3, 5)])
             errors.append(error)
             last = (elapsed, m)
-    print_line("")
-    print_line(Message("against the simulated truth (elastic part; exx, eyy, exy):"))
+    screen.print("")
+    screen.print(Message("against the simulated truth (elastic part; exx, eyy, exy):"))
     # Without a measured instant nothing is wrong: the machine was too slow, and E is not known.
-    agreed = _print_strain(np.array(ratios), np.array(errors), print_line) or not ratios
-    _print_force(outcome, specimen, print_line)
+    agreed = _print_strain(np.array(ratios), np.array(errors), screen) or not ratios
+    _print_force(outcome, specimen, screen)
     figures = outcome.test.figures
     there = specimen.E, specimen.nu
     # In an uneven field (the hole) the strain of the region is not that of a specimen without it.
     if figures.E.known and last is not None and AXIAL not in config.gauges:
         exx, eyy, _ = truth.region(last[0], last[1].valid, last[1].pattern)
         there = float(specimen.stress(last[0])) / eyy, -exx / eyy
-    agreed &= _print_modulus(figures, specimen, there, print_line)
+    agreed &= _print_modulus(figures, specimen, there, screen)
     if agreed and not figures.E.known and not outcome.exit_code:
-        print_line(
+        screen.print(
             Message(
                 "exit code {code}: E was not measured ({why}); end other programs, or give a smaller --burst",
                 *(LOSS, figures.E.why),
@@ -339,7 +337,7 @@ def _print_modulus(
     figures: TensileFigures,
     specimen: VirtualSpecimen,
     there: tuple[float, float],
-    show: Callable[[str], None],
+    screen: Screen,
 ) -> bool:
     """E and nu against the truth ``there``; False where E is far off."""
     rows, off = tensile_table(figures, stresses=True), 0.0
@@ -354,25 +352,25 @@ def _print_modulus(
             *(figures.elastic_strain, held, here, true),
         )
         true_nu = Message("true {here} there ({true})", here_nu, true_nu)
-    show(Message("  E  {E}, {true}", rows["E"].text, true))
-    show(Message("  nu {nu}, {true}", rows["nu"].text, true_nu))
+    screen.print(Message("  E  {E}, {true}", rows["E"].text, true))
+    screen.print(Message("  nu {nu}, {true}", rows["nu"].text, true_nu))
     return off <= FAR
 
 
-def _print_strain(ratios: Array, errors: Array, print_line: Callable[[str], None]) -> bool:
+def _print_strain(ratios: Array, errors: Array, screen: Screen) -> bool:
     """``ratios`` (N, 2, 3): the error of each of the three in units of 0.05 % + 3 sigma, and of 0.05 % + 5 sigma."""
     if not ratios.size:
-        print_line(Message("  no instant of the elastic part was measured"))
+        screen.print(Message("  no instant of the elastic part was measured"))
         return False
     within, rms = ratios[:, 0] <= 1, np.sqrt(np.mean(errors**2, axis=0)) * 1e6
     beyond = int(np.sum(~(ratios[:, 1] <= 1)))
-    print_line(
+    screen.print(
         Message(
             "  strain of the region: error {x:.2f}, {y:.2f}, {xy:.2f} µm/m rms in {n} instants",
             *(*rms, len(ratios)),
         )
     )
-    print_line(
+    screen.print(
         Message(
             "  {share:.1%} of these {n} values within {relative:.2%} of the strain + 3 sigma, {beyond} beyond 5 sigma",
             *(within.mean(), within.size, RELATIVE, beyond),
@@ -381,12 +379,12 @@ def _print_strain(ratios: Array, errors: Array, print_line: Callable[[str], None
     return float(within.mean()) >= MIN_WITHIN and beyond == 0
 
 
-def _print_force(outcome: Outcome, specimen: VirtualSpecimen, print_line: Callable[[str], None]) -> None:
+def _print_force(outcome: Outcome, specimen: VirtualSpecimen, screen: Screen) -> None:
     t, force = outcome.run_state.loads.arrays()
     true = specimen.force(np.array([specimen.elapsed(time) for time in t]))
     error = (force - true)[np.isfinite(force)]
     if error.size:
         mean, scatter = (Amount.rough("force", float(one)) for one in (error.mean(), error.std()))
-        print_line(
+        screen.print(
             Message("  force: mean error {mean}, scatter {scatter} in {n} samples", mean, scatter, error.size)
         )

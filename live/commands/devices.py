@@ -152,7 +152,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic devices``."""
     words = "watch each device and write what it does, to be sent: no pictures, no names (default FILE: %(const)s)"
     parser.add_argument("--report", nargs="?", const="phasedic-devices.txt", metavar="FILE", help=words)
-    words = "the settings that an address of each kind of camera takes"
+    words = "the settings that an address of each kind of camera and load cell takes"
     parser.add_argument("--settings", action="store_true", help=words)
     words = "with --report: only this camera; may be repeated"
     parser.add_argument("--camera", action="append", default=[], metavar="ADDRESS", help=words)
@@ -186,13 +186,15 @@ def command(arguments: argparse.Namespace) -> int:
 
 def _settings() -> int:
     from acquire.settings import settings_of
-    from live.setup.devices import camera_settings
+    from live.setup.devices import camera_settings, load_settings
 
-    for scheme, kind in camera_settings().items():
-        print_line(f"{scheme}:" if scheme else "/dev/...:")
-        for one in settings_of(kind):
-            more = "; ".join(filter(None, (one.allowed, one.unit, one.stands)))
-            print_line(f"  {one.key or '...'}: {one.words}" + f" ({more})" * bool(more))
+    for head, kinds in ((Message("cameras:"), camera_settings()), (Message("load cells:"), load_settings())):
+        print_line(head)
+        for scheme, kind in kinds.items():
+            print_line(f"  {scheme}:" if scheme else "  /dev/...:")
+            for one in settings_of(kind):
+                more = "; ".join(filter(None, (one.allowed, one.unit, one.stands)))
+                print_line(f"    {one.key or '...'}: {one.words}" + f" ({more})" * bool(more))
     return 0
 
 

@@ -73,7 +73,7 @@ def command(arguments: argparse.Namespace) -> int:
     given = overrides(arguments)
     found = find_devices(given, screen)
     config = load_config(None, {**given, "camera.address": found.camera, "load.address": found.load})
-    first = first_look(config, screen.print)
+    first = first_look(config, screen)
     descriptions = found.camera_words or printable(first.camera.name), found.load_words
     proposal = propose(first, config, given, descriptions, found.others)
     if proposal.contrast < NO_PATTERN:

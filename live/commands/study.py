@@ -94,7 +94,7 @@ def command(arguments: argparse.Namespace) -> int:
                 " 'phasedic replay' leaves beside its results"
             )
         compile_ahead(
-            picture_kinds(material.camera), phase=config.measure.estimator == "phase", show=screen.status
+            picture_kinds(material.camera), phase=config.measure.estimator == "phase", screen=screen
         )
         windows = take_windows(material, arguments.static, arguments.loaded)
         screen.print(

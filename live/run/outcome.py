@@ -101,7 +101,6 @@ class StopSignal:
         if self._requested.is_set():
             callback()
 
-    @property
-    def requested(self) -> bool:
+    def is_set(self) -> bool:
         """Whether the stop is requested."""
         return self._requested.is_set()

@@ -24,7 +24,7 @@ ACQUIRE = {
 }
 ANALYSIS = {
     "analysis.field": "acquire.text",
-    "analysis.compiled": "",
+    "analysis.compiled": "acquire.compiled_loops",
     "analysis.picture": "analysis.field analysis.compiled",
     "analysis.follow": "analysis.field analysis.compiled",
     "analysis.evaluate": "analysis.field analysis.compiled acquire.text",

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.evaluate.response import WINDOW, Departures, ResponseSums
-from analysis.field import StrainField, Sums
+from analysis.field import Sums
 from live.pipeline.measurement import Measurement
 
 Floats = NDArray[np.float64]
@@ -95,7 +95,7 @@ class ResponseWatch:
         else:
             gauge = m.time_step.gauges[self.channel]
             value, sigma = gauge.value, gauge.sigma
-        return value, sigma * _own_share(m.field, along)
+        return value, sigma * math.sqrt(m.field.own_share(along))
 
     def maps(self) -> Mapping[str, Floats]:
         """``shown_names`` and ``sigma_`` of the first, (R, C), in SI units; nothing before there are two bursts."""
@@ -105,9 +105,3 @@ class ResponseWatch:
         lines, name = sums.lines(), slope_name(self.channel)
         leaves = {leaves_name(self.channel): one.at for one in self._over[:1]}
         return {name: lines.slope, f"sigma_{name}": lines.sigma, "chi2": lines.chi2, **leaves}
-
-
-def _own_share(field: StrainField, name: str) -> float:
-    """Share of the sigma of a typical ZOI that is not of the reference."""
-    shares = field.sigma(name, "current")[field.ok] / field.sigma(name)[field.ok]
-    return float(np.nanmedian(shares)) if shares.size else 1.0

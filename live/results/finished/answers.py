@@ -46,8 +46,8 @@ def belief(rows: Sequence[TensileRow], troubles: Sequence[str], limits: str = ""
     """The sentence on the figures ``rows``.
 
     What the data say against a test (``troubles``) stands against all of its figures. ``limits`` are those of error
-    that the interval of E holds beside the scatter, in words (``beyond_scatter``). A bound says what it is itself: it
-    is in doubt only where nothing else is known.
+    that the interval of E holds beside the scatter, in words (``beyond_scatter``). A bound says by itself what it is:
+    it is in doubt only where nothing else is known.
     """
     known = [row for row in rows if row.figure.known]
     sure = ", ".join(row.name for row in known if not row.remark)

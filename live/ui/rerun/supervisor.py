@@ -15,6 +15,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -169,7 +170,8 @@ class Supervisor:
 
     def start(self) -> None:
         """Start the process, which inherits the nice value of the caller, then the thread, which has its own."""
-        self._guarded(self._start_process)
+        with self._guarded():
+            self._start_process()
         self._thread.start()
 
     def close(self, seconds: float) -> None:
@@ -182,7 +184,8 @@ class Supervisor:
     def _run(self) -> None:
         lower_priority(OUTPUT)
         while not self._closing.is_set() and not self.failed:
-            self._guarded(self._step)
+            with self._guarded():
+                self._step()
         if self._renderer is not None or not self.starts:
             self._outbox.end()
             self._finish(time.monotonic() + self._close_s)
@@ -245,9 +248,10 @@ class Supervisor:
             target = replace(target, rrd=str(path.with_stem(f"{path.stem}-{self.starts}")))
         return target
 
-    def _guarded(self, step: Callable[[], object]) -> None:
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
         try:
-            step()
+            yield
         except (OSError, EOFError, WireError) as error:
             self._handle_loss(error)
 

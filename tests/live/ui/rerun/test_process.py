@@ -6,6 +6,7 @@ import socket
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -245,7 +246,7 @@ def test_a_sink_takes_each_kind_at_its_rate() -> None:
 
 def test_curves_are_sent_again_each_time_so_much_was_drawn() -> None:
     drawn: list[int] = []
-    sink, found = RerunSink(None, Rates(1.0, 1.0, repeat_bytes=100), drawn.append), []
+    sink, found = RerunSink(None, Rates(1.0, 1.0, repeat_bytes=100), SimpleNamespace(drawn=drawn.append)), []
     for _ in range(7):
         sink.count(b"x" * 40)
         found.append(sink.needs_curves_again())
