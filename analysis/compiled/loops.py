@@ -7,6 +7,7 @@ rest of the package does that only when a kernel is made. Its files are checked 
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import logging
 import os
@@ -18,6 +19,8 @@ from threading import Lock
 from typing import Any, TypeVar
 
 import numba
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.np.ufunc import parallel as numba_threads
 from numpy.typing import NDArray
 
@@ -52,8 +55,49 @@ def inlined(function: Callable[..., Any]) -> Any:
     return numba.njit(function, error_model="numpy", fastmath=FAST, inline="always")
 
 
+_refuse = ctypes.PYFUNCTYPE(*[ctypes.c_void_p] * 4)(lambda *_: None)
+"""What Python calls in place of a part: a SystemError, not the end of the process."""
+
+
+class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """The code of a part as it was generated: LLVM optimises and translates it with each loop that it is linked into.
+
+    numba would do both for the part too, and again for each function on the way to the loop: a quarter of all.
+    """
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int | None:
+        return ctypes.cast(_refuse, ctypes.c_void_p).value
+
+    @property
+    def codegen(self) -> Any:
+        return self  # asked for ``set_env`` alone
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """What Python would call it with."""
+
+
+class _PartCompiler(Compiler):  # type: ignore[misc]
+    def define_pipelines(self) -> Any:
+        self.state.library = _PartLibrary(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        return super().define_pipelines()
+
+
+def part(function: Callable[..., Any]) -> Any:
+    """A function called from compiled loops alone, and part of their code; Python must not call it."""
+    return numba.njit(
+        function, error_model="numpy", fastmath=FAST, no_cpython_wrapper=True, no_cfunc_wrapper=True,
+        pipeline_class=_PartCompiler,
+    )  # fmt: skip
+
+
 def helper(function: Callable[..., Any]) -> Any:
-    """A function called from compiled loops; small or inlined by the compiler as it sees fit."""
+    """A function called from compiled loops and from Python; small or inlined by the compiler as it sees fit."""
     return stamped(numba.njit(function, error_model="numpy", fastmath=FAST, cache=True, nogil=True))
 
 

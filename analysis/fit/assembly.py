@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, inlined, read_only, shared
+from analysis.compiled.loops import helper, inlined, part, read_only, shared
 from analysis.compiled.shares import in_shares, part_of
 
 RUN = 1024
@@ -125,7 +125,7 @@ def scale(unit: Any, colour: Any, from_reference: Any, whole: Any, out_reference
     in_shares(_scale_share, (unit, colour, from_reference, whole, out_reference, out))
 
 
-@helper
+@part
 def _scale_share(
     unit: Any, colour: Any, from_reference: Any, whole: Any, out_reference: Any, out: Any, share: int
 ) -> None:
@@ -139,7 +139,7 @@ def _scale_share(
             _products(unit[k, a:b], colour[k], whole[a:b], out[k, a:b])
 
 
-@helper
+@part
 def _products(a: Any, factor: Any, b: Any, out: Any) -> None:
     for n in range(out.size):
         i = np.uintp(n)
@@ -171,7 +171,7 @@ def clipped_shares(marked: Any, first: Any, weight: Any, out: Any) -> None:
     in_shares(_clipped_share, (marked, first, weight, out))
 
 
-@helper
+@part
 def _clipped_share(marked: Any, first: Any, weight: Any, out: Any, share: int) -> None:
     size = weight.size
     begin, end = part_of(len(first), share)

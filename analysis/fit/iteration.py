@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from analysis.compiled.loops import helper, inlined, parallel, shared
+from analysis.compiled.loops import helper, inlined, parallel, part, shared
 from analysis.compiled.shares import in_shares, part_of
 from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
 from analysis.compiled.vectors import LANES, fetch_later, fetch_soon
@@ -60,7 +60,7 @@ AHEAD, BEYOND = 16, 3
 """ZOIs ahead of the present one whose pixels are prefetched; taps beyond the pixel that they make."""
 
 
-@helper
+@part
 def _within(picture: Any, p: Any, order: int, cx: Any, cy: Any, reach: Any) -> bool:
     """Whether the corners of the warped ZOI stay where they may lie."""
     for corner in range(4):
@@ -243,7 +243,7 @@ def track(picture: PictureArgs, table: Any, fit: FitArgs, stop: StopArgs, out: O
         _track_share(picture, table, fit, stop, out, todo, counters, np.int64(share))
 
 
-@helper
+@part
 def _track_share(
     picture: Any, table: Any, fit: Any, stop: Any, out: Any, todo: Any, counters: Any, share: int
 ) -> None:
@@ -257,7 +257,7 @@ def _track_share(
         piece = next_piece(counters, share, pieces)
 
 
-@helper
+@part
 def _track_some(
     picture: Any, table: Any, fit: Any, stop: Any, out: Any, todo: Any, start: int, end: int
 ) -> None:
@@ -304,7 +304,7 @@ def _track_some(
                 break
 
 
-@helper
+@part
 def _know_nothing(out: Any, i: int) -> None:
     out.left[i] = out.bending[i] = np.nan
     for k in range(2):
@@ -370,7 +370,7 @@ def warp_zois(picture: PictureArgs, table: Any, origins: Any, size: int, p: Any,
     in_shares(_warp_share, (picture, table, origins, size, p, out))
 
 
-@helper
+@part
 def _warp_share(picture: Any, table: Any, origins: Any, size: int, p: Any, out: Any, share: int) -> None:
     line = (size + LANES - 1) // LANES * LANES
     rows, ramp = np.empty(line + LANES, np.float32), np.arange(line).astype(np.float32)

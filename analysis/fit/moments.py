@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.compiled.loops import helper, inlined
+from analysis.compiled.loops import helper, inlined, part
 from analysis.compiled.vectors import LANES, load, spread, store, total
 
 DEGREES = 4
@@ -225,7 +225,7 @@ def _columns_of(
             k += line
 
 
-@helper
+@part
 def _product_columns(
     a: Any, i: Any, down_a: Any, b: Any, j: Any, down_b: Any, size: int, wide: int,
     under_w: Any, under_q: Any, out: Any, degrees: int,

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper
+from analysis.compiled.loops import helper, part
 from analysis.fit.assembly import MIN_NOISE_GAIN, area
 from analysis.fit.kernel_args import CONVERGED, OutArgs, PooledError, ReferenceArgs
 from analysis.fit.validity import AGREES, COLOURED, LOST_SHARE
@@ -153,7 +153,7 @@ def row_medians(rows: Any) -> Any:
     return out
 
 
-@helper
+@part
 def _middle(values: Any) -> Any:
     """Some of many values, and infinite ones, that have the same median: those that a sample shows to be near it."""
     n = len(values)

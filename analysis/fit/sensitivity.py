@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, shared
+from analysis.compiled.loops import part, shared
 from analysis.compiled.shares import in_shares
 from analysis.compiled.threads import SHARES, next_piece
 from analysis.fit.kernel_args import BLURS, NUISANCES, NormalArgs, ReferenceImages, WindowRows
@@ -59,7 +59,7 @@ def ridged(normal: NDArray[np.float64]) -> NDArray[np.float64]:
     return normal + np.diag(ridge * np.diag(normal))
 
 
-@helper
+@part
 def _moments_of(table: Any) -> Any:
     """Where the products of the columns of J are among the moments of a ZOI, (P, P), flat."""
     out = np.empty((len(table), len(table)), np.intp)
@@ -70,7 +70,7 @@ def _moments_of(table: Any) -> Any:
     return out
 
 
-@helper
+@part
 def _assemble(moments: Any, places: Any, out: Any) -> None:
     flat = moments.reshape(moments.size)
     for i in range(len(places)):
@@ -79,7 +79,7 @@ def _assemble(moments: Any, places: Any, out: Any) -> None:
             out[j, i] = out[i, j]
 
 
-@helper
+@part
 def _invert(matrix: Any, low: Any, back: Any, inverse: Any) -> bool:
     """Inverse of a symmetric positive matrix by Cholesky after scaling to a unit diagonal, ridged; blur stands last.
 
@@ -121,7 +121,7 @@ def _invert(matrix: Any, low: Any, back: Any, inverse: Any) -> bool:
     return True
 
 
-@helper
+@part
 def _sandwich(inverse: Any, middle: Any, affine: Any, units: Any, out: Any) -> None:
     """The 21 affine entries of inverse @ middle @ inverse, in px units."""
     n = len(inverse)
@@ -166,7 +166,7 @@ def prepare(
     in_shares(_prepare_share, (images, origins, size, rows, table, units, out, np.zeros(SHARES, np.int64)))
 
 
-@helper
+@part
 def _prepare_share(
     images: Any,
     origins: Any,
@@ -186,7 +186,7 @@ def _prepare_share(
         piece = next_piece(counters, share, pieces)
 
 
-@helper
+@part
 def _prepare_some(
     images: Any, origins: Any, first: int, size: int, rows: Any, table: Any, units: Any, out: Any
 ) -> None:
@@ -247,7 +247,7 @@ def _prepare_some(
             _sandwich(inv, middle, affine, units, out.covariance_level[z])
 
 
-@helper
+@part
 def _end_of_run(origins: Any, z: int, end: int, size: int) -> int:
     """The first ZOI behind ``z`` that does not begin in its row, close behind the one before."""
     n = z + 1
@@ -258,14 +258,14 @@ def _end_of_run(origins: Any, z: int, end: int, size: int) -> int:
     return n
 
 
-@helper
+@part
 def _copy(matrix: Any, to: Any) -> None:
     for i in range(matrix.shape[0]):
         for j in range(matrix.shape[1]):
             to[i, j] = matrix[i, j]
 
 
-@helper
+@part
 def _of_sum(inverse: Any, middle: Any, i: int, j: int) -> Any:
     """Variance of the sum of the parameters i and j: of inverse @ middle @ inverse."""
     out = 0.0
@@ -275,7 +275,7 @@ def _of_sum(inverse: Any, middle: Any, i: int, j: int) -> Any:
     return out
 
 
-@helper
+@part
 def _taken(inverse: Any, middle: Any, out: Any) -> Any:
     """The diagonal of inverse @ middle, both symmetric, written to ``out``; returns its sum."""
     whole = 0.0

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, inlined
+from analysis.compiled.loops import inlined, part
 from analysis.fit.moments import DEGREES, PRODUCT, PRODUCT_ROWS, weighted_rows
 
 N_HELD = 7
@@ -79,7 +79,7 @@ def _orthonormal(x: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray
     )
 
 
-@helper
+@part
 def cross_moments(m: Any, table: Any, mix: Any, out: Any) -> None:
     """Sums of w times the shapes of u, then of v, times the columns of J, written to ``out`` (P, 14).
 
@@ -91,7 +91,7 @@ def cross_moments(m: Any, table: Any, mix: Any, out: Any) -> None:
         _combine(m[PRODUCT[1, channel]], px, py, mix, out[column, N_HELD:])
 
 
-@helper
+@part
 def _combine(m: Any, px: int, py: int, mix: Any, out: Any) -> None:
     """From monomials, m[l, k], to the seven shapes times xi^px eta^py."""
     along = down = third = tilted = leaning = last = 0.0

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from analysis.compiled.loops import helper, inlined, parallel
+from analysis.compiled.loops import inlined, parallel, part
 from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
 from analysis.compiled.vectors import LANES
 from analysis.fit.iteration import GAIN_RANGE, fetch_all, is_short, moments_of, solve, take
@@ -68,7 +68,7 @@ def share_warps(
         _some_tiles(picture, table, fit, stop, out, tiles, place, counters, np.int64(share))
 
 
-@helper
+@part
 def _some_tiles(
     picture: Any, table: Any, fit: Any, stop: Any, out: Any, tiles: Any, place: Any, counters: Any, share: int
 ) -> None:
@@ -99,7 +99,7 @@ def _some_tiles(
         tile = next_piece(counters, share, count)
 
 
-@helper
+@part
 def _laid(fit: Any, members: Any, at: Any) -> Any:
     """The rectangle of some ZOIs (top, left, height, width) and half of its longer side; their centres go to ``at``."""
     top = left = np.int64(1 << 40)
@@ -116,7 +116,7 @@ def _laid(fit: Any, members: Any, at: Any) -> Any:
     return (top, left, height, width), unit
 
 
-@helper
+@part
 def _shares(
     picture: Any, fit: Any, stop: Any, out: Any, members: Any, at: Any, joined: Any, box: Any, unit: Any,
     normal: Any, t: Any,
@@ -142,7 +142,7 @@ def _shares(
     return done >= MIN_DONE * count and stays(picture, t, unit, box)
 
 
-@helper
+@part
 def _leave_out(away: Any, joined: Any) -> Any:
     """The largest departure of those that have joined, px; ``joined`` is anew those that depart little beside it."""
     worst = 0.0
@@ -154,7 +154,7 @@ def _leave_out(away: Any, joined: Any) -> Any:
     return worst
 
 
-@helper
+@part
 def _steps(
     fit: Any, stop: Any, out: Any, members: Any, at: Any, joined: Any, box: Any, unit: Any, t: Any, g: Any, line: int,
     columns: Any,

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper
+from analysis.compiled.loops import helper, part
 from analysis.picture.warp import moved, slopes
 
 NODES = 8, 16
@@ -59,7 +59,7 @@ class Tiles(NamedTuple):
         return cls(order, ends, int(np.diff(ends).max(initial=0)), int(high), int(wide))
 
 
-@helper
+@part
 def fit_motion(p: Any, members: Any, at: Any, joined: Any, lever: Any, unit: Any, normal: Any, t: Any) -> int:
     """The motion (2, 10) through values and gradients of some ZOIs, by least squares, written to ``t``; their number.
 
@@ -102,7 +102,7 @@ def fit_motion(p: Any, members: Any, at: Any, joined: Any, lever: Any, unit: Any
     return count
 
 
-@helper
+@part
 def _solve_both(normal: Any, t: Any) -> None:
     """Cholesky's solution, in place; the lower half of ``normal`` is read."""
     n = len(normal)
@@ -125,7 +125,7 @@ def _solve_both(normal: Any, t: Any) -> None:
             t[c, i] = total / normal[i, i]
 
 
-@helper
+@part
 def departures(p: Any, members: Any, at: Any, t: Any, lever: Any, unit: Any, out: Any) -> None:
     """How far ZOIs are from the motion, (n, 2), px: u or v, and the gradients over the ``lever``."""
     e = 1 / unit

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, shared
+from analysis.compiled.loops import helper, part, shared
 from analysis.compiled.shares import in_shares, part_of
 
 ALLOWED_PX, ALLOWED_SIGMAS, ALLOWED_SPREADS = 0.05, 10.0, 6.0
@@ -57,14 +57,14 @@ def stand_out(p: Any, variance: Any, step: float, ok: Any, out: Any) -> None:
     in_shares(_stand_out_share, (p, variance, step, ok, out))
 
 
-@helper
+@part
 def _stand_out_share(p: Any, variance: Any, step: float, ok: Any, out: Any, share: int) -> None:
     first, end = part_of(ok.shape[0], share)
     for r in range(first, end):
         _stand_out_in_row(p, variance, step, ok, r, out[r])
 
 
-@helper
+@part
 def _stand_out_in_row(p: Any, variance: Any, step: float, ok: Any, r: int, out: Any) -> None:
     rows, columns = ok.shape
     smooth = np.zeros(columns, np.bool_)
@@ -82,7 +82,7 @@ def _stand_out_in_row(p: Any, variance: Any, step: float, ok: Any, r: int, out: 
             out[c] = ROUGH
 
 
-@helper
+@part
 def _smooth_in_row(p: Any, variance: Any, r: int, out: Any) -> None:
     """Which ZOIs of a row, with all their neighbours, lie where plain least squares expect them, but the ends."""
     count = len(out) - 4
@@ -98,7 +98,7 @@ def _smooth_in_row(p: Any, variance: Any, r: int, out: Any) -> None:
         out[c + 2] = max(abs(u[c]), abs(v[c])) <= ALLOWED_PX + ALLOWED_SIGMAS * sigma
 
 
-@helper
+@part
 def _is_supported(p: Any, variance: Any, step: float, ok: Any, r: int, c: int) -> bool:
     """Whether enough of the eight around a ZOI move as it does."""
     number, alike = 0, 0
@@ -110,7 +110,7 @@ def _is_supported(p: Any, variance: Any, step: float, ok: Any, r: int, c: int) -
     return alike >= min(number, SUPPORT)
 
 
-@helper
+@part
 def _is_linked(p: Any, variance: Any, step: float, r: int, c: int, y: int, x: int) -> bool:
     """Whether the displacements of two ZOIs differ by what their gradients say."""
     for k in (0, 3):
@@ -125,7 +125,7 @@ def _is_linked(p: Any, variance: Any, step: float, r: int, c: int, y: int, x: in
     return True
 
 
-@helper
+@part
 def _lies_off(u: Any, variance: float, ok: Any, r: int, c: int) -> Any:
     """Whether a displacement of a ZOI lies off the robust fit to those around it."""
     basis, value, n = np.zeros((24, 6)), np.zeros(24), 0

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, inlined, read_only, shared
+from analysis.compiled.loops import inlined, part, read_only, shared
 from analysis.compiled.shares import in_shares, part_of
 
 f4 = np.float32
@@ -31,7 +31,7 @@ def _dot(a: Any, b: Any, offset: Any) -> Any:
     return p, q, r
 
 
-@helper
+@part
 def correlation(
     reference: Any, deformed: Any, offset: Any, top: int, left: int, dy: int, dx: int, size: int
 ) -> Any:
@@ -90,7 +90,7 @@ def climb(
     in_shares(_climb_share, (reference, deformed, offset, origins, size, candidates, moves, out, score))
 
 
-@helper
+@part
 def _climb_share(
     reference: Any, deformed: Any, offset: Any, origins: Any, size: int, candidates: Any, moves: int, out: Any,
     score: Any, share: int,

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, shared
+from analysis.compiled.loops import part, shared
 from analysis.compiled.shares import in_shares, part_of
 from analysis.field import Roi
 from analysis.follow.hill_climb import MAX_MOVES, climbed
@@ -52,7 +52,7 @@ def match(
     in_shares(_match_share, (reference, padded, margin, firsts, size, guesses, reach, out))
 
 
-@helper
+@part
 def _match_share(
     reference: Any, padded: Any, margin: int, firsts: Any, size: int, guesses: Any, reach: int, out: Any, share: int
 ) -> None:  # fmt: skip
@@ -61,7 +61,7 @@ def _match_share(
         _match_block(reference, padded, margin, firsts[n], size, guesses[n], reach, out[n])
 
 
-@helper
+@part
 def _match_block(
     reference: Any, padded: Any, margin: int, first: Any, size: int, guesses: Any, reach: int, out: Any
 ) -> None:
@@ -82,7 +82,7 @@ def _match_block(
                     out[0], out[1] = left + x - column, top + y - row
 
 
-@helper
+@part
 def _is_repeated(guesses: Any, k: int) -> bool:
     for i in range(k):  # noqa: SIM110 - compiled
         if guesses[i, 0] == guesses[k, 0] and guesses[i, 1] == guesses[k, 1]:
@@ -90,7 +90,7 @@ def _is_repeated(guesses: Any, k: int) -> bool:
     return False
 
 
-@helper
+@part
 def _without_mean(image: Any, first: Any, size: int) -> Any:
     """A block less its mean, and the sum of its squares."""
     block = np.empty((size, size), np.float32)
@@ -107,7 +107,7 @@ def _without_mean(image: Any, first: Any, size: int) -> Any:
     return block, square
 
 
-@helper
+@part
 def _correlation(block: Any, square: Any, image: Any, top: int, left: int, size: int) -> Any:
     """Of a block without its mean and the sum of its squares with a place of an image; 0 without contrast there."""
     product, total, squares = f4(0), f4(0), f4(0)

@@ -83,18 +83,20 @@ def beside_strain(solution: Solution, ok: NDArray[np.bool_]) -> float | None:
     size = solution.reference.grid.size
     which = some(ok, max(FEWEST, SAMPLE * 32**2 // size**2))
     left = _in_parts(left_by_fit(solution, which))
-    ready = solution.reference.prepared
-    dx, dy = (_in_parts(zois_of(ready.images[k], ready.origins[which], size)) for k in (0, 1))
-    rest = left - _shifts(left, dx, dy)
     noise = float(np.median(solution.expected(which, solution.found.nuisance[which]).felt))
-    free = 2 * left[..., 0].size
-    explained = np.sum(left**2) - np.sum(rest**2) - free * noise
     excess = np.sum(left**2) - left.size * noise
     by_chance = 3 * noise * (2 * left.size) ** 0.5
     agrees = solution.is_given and AGREES[0] < 1 + excess / (left.size * noise) < AGREES[1]
     if (agrees or abs(excess) < by_chance) and _is_white(_joined(left)):
         return 1.0
-    if excess < by_chance or explained < EXPLAINED * excess or not _is_white(_joined(rest)):
+    if excess < by_chance:
+        return None
+    ready = solution.reference.prepared
+    dx, dy = (_in_parts(zois_of(ready.images[k], ready.origins[which], size)) for k in (0, 1))
+    rest = left - _shifts(left, dx, dy)
+    free = 2 * left[..., 0].size
+    explained = np.sum(left**2) - np.sum(rest**2) - free * noise
+    if explained < EXPLAINED * excess or not _is_white(_joined(rest)):
         return None
     return float(np.sum(rest**2) / (left.size - free) / noise)
 

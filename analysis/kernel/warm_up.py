@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("analysis")
 
-COMPILE_SECONDS = 80
+COMPILE_SECONDS = 65
 """About how long one process takes for everything; for the announcement."""
-FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 96, 4, 7
-"""That are compiled in all, more for each kind of pictures, and for the estimator by phases."""
+FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 39, 1, 3
+"""That are kept in all, more for each kind of pictures, and for the estimator by phases."""
 ITERATION, REST, PHASE, ALL = "iteration", "rest", "phase", "all"
 COMPILE_PARTS = (ITERATION, REST)
 PICTURE_KINDS = ("uint8", "uint16", "float32")
@@ -152,18 +152,15 @@ def _small() -> tuple[NDArray[np.float32], ZoiGrid]:
 
 
 def _iteration() -> None:
-    """The iteration alone: called for no ZOI at all, it is compiled all the same."""
-    from analysis.fit.iteration import track
+    """The iteration, and the warp, which has most of it: called for no ZOI at all, they are compiled all the same."""
+    from analysis.fit.iteration import track, warp_zois
     from analysis.fit.kernel_args import FitArgs, OutArgs, StopArgs
     from analysis.fit.shared import share_warps
     from analysis.fit.tiles import Tiles
 
     none, no_images = np.empty(0), np.empty((0, 6, 6), np.float32)
-    no_bias, no_origins, no_zois = (
-        np.empty((0, 6), np.float32),
-        np.empty((0, 2), np.int64),
-        np.empty(0, np.int64),
-    )
+    no_bias, no_warped = np.empty((0, 6), np.float32), np.empty((0, 32, 32), np.float32)
+    no_origins, no_zois = np.empty((0, 2), np.int64), np.empty(0, np.int64)
     fit = FitArgs(
         np.empty(0, np.float32), 0, 0, no_zois, no_origins, 32, 16, 1,
         np.empty((4, 32), np.float32), np.empty((4, 4)), no_images, no_images, np.empty((0, 2)), np.empty(6),
@@ -173,6 +170,7 @@ def _iteration() -> None:
     out = OutArgs.starting(np.empty((0, 6)))
     share_warps(picture, table, fit, stop, out, Tiles.of(no_origins, 32, 16))
     track(picture, table, fit, stop, out, no_zois)
+    warp_zois(picture, table, no_origins, 32, out.p, no_warped)
 
 
 def _no_picture() -> PictureArgs:
@@ -205,7 +203,6 @@ def _prefilter(kinds: Sequence[str]) -> None:
 def _rest() -> None:
     """All but the iteration, the prefilter and what only the estimator by phases needs."""
     from analysis.fit.assembly import ExpectedNoise, clipped_share, expect, scale, weigh, weigh_blur
-    from analysis.fit.iteration import warp_zois
     from analysis.fit.kernel_args import OutArgs, PooledError, ReferenceArgs, VerdictArgs
     from analysis.fit.pooling import explained, interpolate, median
     from analysis.fit.verdict import judge
@@ -237,9 +234,8 @@ def _rest() -> None:
     weigh_blur(single, single, single)
     expected = ExpectedNoise(np.empty(2), np.empty(2))
     expect(np.ones(2), (0.5, 0.5), np.ones(2), np.ones(2), 0.0, expected)
-    origins, p, gain = np.empty((0, 2), np.int64), np.empty((0, 6)), np.empty((2, 2))[:, 0]
+    p, gain = np.empty((0, 6)), np.empty((2, 2))[:, 0]
     weigh(np.empty(0, np.bool_), none, none, gain, none, none, none, p, single, single, single)
-    warp_zois(_no_picture(), np.empty(18, np.float32), origins, 32, p, np.empty((0, 32, 32), np.float32))
     unit = np.empty((21, 0), np.float32)
     scale(unit, np.ones(21, np.float32), single, single, unit, unit)
     index, values = np.empty(0, np.intp), np.empty((0, 6))

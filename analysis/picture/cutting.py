@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.compiled.loops import helper, inlined
+from analysis.compiled.loops import helper, inlined, part
 from analysis.compiled.vectors import LANES
 
 ROWS = 32
@@ -39,7 +39,7 @@ def inside(x: Any, y: Any, left: Any, right: Any, top: Any, bottom: Any) -> Any:
     return left <= x <= right and top <= y <= bottom
 
 
-@helper
+@part
 def new_plan(size: int) -> Any:
     """Arrays for ``plan_rows`` (starts, taus) and for ``warp_cut_rows`` (where, how)."""
     return (
@@ -148,7 +148,7 @@ def inverse_slope(slope: Any) -> Any:
     return 1 / slope if abs(slope) > 1e-12 else 1e12
 
 
-@helper
+@part
 def _bent_length(
     count: int, x: Any, x1: Any, x2: Any, ix: Any, y: Any, y1: Any, y2: Any, iy: Any
 ) -> int:  # fmt: skip

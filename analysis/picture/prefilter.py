@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.compiled.convolution import GROUP, REACH, ROWS, STRIP, filter_across, filter_along
-from analysis.compiled.loops import helper, shared
+from analysis.compiled.loops import part, shared
 from analysis.compiled.shares import in_shares
 from analysis.compiled.threads import SHARES, next_piece
 from analysis.compiled.vectors import LANES
@@ -24,7 +24,7 @@ PART, RING = 64, BAND + 2 * REACH
 _reach = np.uintp(REACH)
 
 
-@helper
+@part
 def _mirror(i: int, n: int) -> int:
     """Index i reflected about the first and last of n samples, which are not repeated."""
     if n == 1:
@@ -66,7 +66,7 @@ def coefficients(
     return math.isfinite(totals.sum())
 
 
-@helper
+@part
 def _filter_share(
     image: Any, offset: Any, taps: Any, box: Any, counters: Any, totals: Any, out: Any, share: int
 ) -> None:
@@ -93,7 +93,7 @@ def _filter_share(
     totals[share] = total
 
 
-@helper
+@part
 def _filter_part(
     image: Any, offset: Any, taps: Any, box: Any, top: int, bottom: int, ahead: int, buffers: Any, out: Any
 ) -> Any:
@@ -124,7 +124,7 @@ def _filter_part(
     return ahead, total
 
 
-@helper
+@part
 def _put_row(row: Any, left: int, right: int, width: int, out: Any) -> None:
     """A row of the coefficients, and what it has mirrored beyond the image."""
     here, there = row[left : min(right, width)], out[PAD + left : PAD + min(right, width)]
@@ -136,13 +136,13 @@ def _put_row(row: Any, left: int, right: int, width: int, out: Any) -> None:
         out[PAD + width + x] = row[_mirror(width + x, width)]
 
 
-@helper
+@part
 def _copy_row(out: Any, source: int, stride: int, to: int) -> None:
     for x in range(stride):
         out[to * stride + x] = out[source * stride + x]
 
 
-@helper
+@part
 def _mirrored_line(row: Any, offset: Any, left: int, right: int, line: Any) -> Any:
     """Columns ``left`` .. ``right`` of a row less ``offset``, REACH more beside, mirrored beyond it; their sum."""
     width = row.size

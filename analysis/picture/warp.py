@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.compiled.loops import helper, inlined
+from analysis.compiled.loops import inlined, part
 from analysis.compiled.vectors import (
     LANES,
     above,
@@ -130,7 +130,7 @@ def _leaning_pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: 
     return value
 
 
-@helper
+@part
 def _warp_pieces(c: Any, stride: Any, n: int, where: Any, how: Any, ramp: Any, table: Any, out: Any) -> None:
     """Warp ``n`` pieces: tau_x = how[0] + how[1] k, tau_y = how[2] + how[3] k."""
     t = table
@@ -147,7 +147,7 @@ def _warp_pieces(c: Any, stride: Any, n: int, where: Any, how: Any, ramp: Any, t
             store(out, at + k, pixels(c, stride, first + k, x0 + r * x1, y0 + r * y1, t))
 
 
-@helper
+@part
 def _warp_leaning_pieces(
     c: Any, stride: Any, n: int, where: Any, how: Any, ramp: Any, table: Any, out: Any, steep: bool
 ) -> None:
@@ -165,7 +165,7 @@ def _warp_leaning_pieces(
         store(out, np.uintp(where[piece, 1]), value)
 
 
-@helper
+@part
 def _warp_bent_pieces(
     c: Any, stride: Any, n: int, where: Any, how: Any, x2: Any, y2: Any, ramp: Any, table: Any, out: Any
 ) -> None:
@@ -203,7 +203,7 @@ def warp_rows(
         at += line
 
 
-@helper
+@part
 def warp_cut_rows(
     c: Any, stride: int, p: Any, order: int, x: Any, y: Any, first: int, count: int, size: int,
     where: Any, how: Any, ramp: Any, table: Any, out: Any, line: int,
@@ -273,7 +273,7 @@ def slopes(t: Any, c: int, x: Any, y: Any) -> Any:
     return along, down
 
 
-@helper
+@part
 def stays(picture: Any, t: Any, unit: Any, box: Any) -> bool:
     """Whether the border of a tile stays where corners of ZOIs may lie; ``box`` is its top, left, height and width."""
     top, left, height, width = box
@@ -302,7 +302,7 @@ def _from(a: Any, x: Any, e: Any) -> Any:
     return value, (a[1] + x * (2 * a[2] + 3 * x * a[3])) * e, (a[2] + 3 * x * a[3]) * e * e, a[3] * e * e * e
 
 
-@helper
+@part
 def _cut(t: Any, unit: Any, box: Any, row: int, at: int, stride: int, n: int, where: Any, how: Any) -> int:
     """Append the pieces of a row to the list of ``n``, a vector each at most, and return their new number."""
     top, left, height, width = box
@@ -339,7 +339,7 @@ def _cubic(how: Any, piece: int, first: int, r: Any) -> Any:
     return a + r * (b + r * (spread(how[piece, first + 2]) + r * spread(how[piece, first + 3])))
 
 
-@helper
+@part
 def new_pieces(width: int) -> Any:
     """Arrays for ``warp_smooth`` of tiles of that width at most."""
     return np.empty((ROWS * width, 2), np.int64), np.empty((ROWS * width, 8), np.float32)
@@ -361,7 +361,7 @@ def _fetch(c: Any, stride: int, t: Any, box: Any, row: int, also: Any) -> None:
             fetch_later(images, np.uintp(here + x + k * samples))
 
 
-@helper
+@part
 def warp_smooth(
     c: Any, stride: int, t: Any, unit: Any, box: Any, pieces: Any, ramp: Any, table: Any, out: Any, line: int, also: Any
 ) -> None:  # fmt: skip

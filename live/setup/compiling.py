@@ -7,6 +7,7 @@ or a replay does not measure with loops that it has compiled itself, unless numb
 from __future__ import annotations
 
 import contextlib
+import gc
 import logging
 import math
 import signal
@@ -136,6 +137,7 @@ def main(part: str, kinds: str, phase: str) -> int:
     """One of the compiling processes; returns the exit code."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # end without a message
     unblock_signals(signal.SIGINT)
+    gc.disable()  # a tenth of the time, and the process ends soon
     from acquire import burst, hdf5
     from analysis import COMPILE_PARTS, warm_up
 

@@ -18,7 +18,7 @@ import pytest
 import analysis
 from analysis.compiled import threads as cores
 from analysis.compiled.layer import threading_layer
-from analysis.compiled.loops import helper, stamp
+from analysis.compiled.loops import helper, part, stamp
 from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
 from analysis.compiled.vectors import LANES, load, spread, store, total, whole
 from analysis.field.grid import profile
@@ -46,9 +46,9 @@ PARTS = 64
 def where(threads: Any, found: Any) -> Any:
     """Thread and core of each part of a loop, and of its caller."""
     calling = caller()
-    for part in numba.prange(PARTS):
+    for i in numba.prange(PARTS):
         keep_apart(calling)
-        threads[part], found[part] = cores._thread(), cores._core()
+        threads[i], found[i] = cores._thread(), cores._core()
     return calling
 
 
@@ -211,6 +211,22 @@ def of_the_difference(images, samples, at, pitch, g, line, size, rows, columns, 
             line, first, count, rows, columns,
         )  # fmt: skip
     return difference_moments(columns, np.uintp(0), rows, line, out)
+
+
+@part
+def halved(x: float) -> float:
+    return x / 2
+
+
+@helper
+def quartered(x: float) -> float:
+    return halved(halved(x))
+
+
+def test_a_part_has_code_in_loops_alone() -> None:
+    assert quartered(10.0) == 2.5
+    with pytest.raises(SystemError):
+        halved(10.0)
 
 
 def test_operations_on_vectors() -> None:

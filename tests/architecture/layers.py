@@ -80,7 +80,7 @@ EXCEPTIONS = {
 
 # Library -> the packages that alone import it.
 LIBRARIES = {
-    "ctypes": "acquire acquire.genicam acquire.v4l2",
+    "ctypes": "acquire acquire.genicam acquire.v4l2 analysis.compiled",
     "distributed": "live.replay",
     "cv2": "acquire analysis.follow",
     "fcntl": "acquire.v4l2",
