@@ -57,6 +57,17 @@ def one_of(word: str, allowed: Sequence[str]) -> str:
     return word
 
 
+def other_than_zero(word: str) -> float:
+    """The number that ``word`` is, and not zero; raises ``NotAllowed``."""
+    try:
+        number = number_of(word)
+    except NotAllowed:
+        number = 0.0
+    if number == 0:
+        raise NotAllowed("a number other than zero")
+    return number
+
+
 def yes_or_no(word: str) -> bool:
     """Whether ``word`` says yes; raises ``NotAllowed``."""
     if word.lower() not in TRUE_WORDS + FALSE_WORDS:

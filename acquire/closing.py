@@ -12,7 +12,7 @@ class Closing(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Release what is held; may be called again without effect."""
+        """Release what is held; idempotent."""
 
     def __enter__(self) -> Self:
         return self

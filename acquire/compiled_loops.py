@@ -1,7 +1,7 @@
 """The decorator of compiled loops that numba keeps for the next process, each file with a checksum behind it.
 
 A power cut leaves files that are empty, cut, or of zeros. Numba would raise an error on them, or run what they hold;
-here they are compiled anew. ``analysis.compiled.loops`` does the same: neither package imports the other.
+here they are compiled anew. It reads the files of this module too, since it ignores what follows.
 """
 
 from __future__ import annotations
@@ -64,5 +64,6 @@ def _is_whole(path: str) -> bool:
 
 @cache
 def _matches(path: str, time: int, size: int) -> bool:
+    """Read once a process and version of the file."""
     data = Path(path).read_bytes()
     return hashlib.sha256(data[:-_DIGEST]).digest() == data[-_DIGEST:]

@@ -85,12 +85,12 @@ class Interrupted(PhasedicError):
 
 
 def exit_code_of(error: BaseException) -> int:
-    """That of an error: its own, else a defect."""
+    """Exit code of an error: its own, else that of a defect."""
     return error.exit_code if isinstance(error, PhasedicError) else DEFECT
 
 
 def exit_code_of_all(codes: Iterable[int]) -> int:
-    """That of a test, from those of its cameras: finished with loss where one failed and another did not."""
+    """Exit code of a test from those of its cameras: finished with loss where one failed and another did not."""
     found = {*codes}
     if len(found) == 1:
         return found.pop()

@@ -1,4 +1,4 @@
-"""Fills the tables of formats and of the settings of cameras: ``python -m docs.make_formats``.
+"""Fills the tables of formats and of the settings of devices: ``python -m docs.make_formats``.
 
 They list what files and settings are declared to be. A page holds each table between ``<!-- table NAME ... -->`` and
 ``<!-- end -->``. The tests compare the pages with these tables.
@@ -26,7 +26,7 @@ from live.results.finished.cycles import COLUMNS as CYCLES
 from live.results.quantities import quantity_of
 from live.results.response import stored
 from live.results.strain_csv import COLUMNS
-from live.setup.devices import camera_settings
+from live.setup.devices import camera_settings, load_settings
 
 DOCS = Path(__file__).parent
 HEIGHT, WIDTH, ZOIS = 64, 80, (3, 5)
@@ -63,22 +63,28 @@ def means() -> str:
     """The columns of strain.csv."""
     names = (*COLUMNS, *columns(["section", "lag"]), "gauge_NAME", "sigma_gauge_NAME", "share_gauge_NAME")
     quantities = ((name, quantity_of(name)) for name in names)
-    return table(("column", "unit", "meaning"), ((f"`{n}`", q.unit, q.words) for n, q in quantities))
+    return table(
+        ("column", "unit", "meaning"),
+        ((f"`{n}`", q.unit, q.words) for n, q in quantities if "sigma_" not in n),
+    )
 
 
 def channels() -> str:
     """The channels of alarms and strain output."""
     rows = (
-        (f"`{one.name}`", one.unit, one.words or quantity_of(one.name).words)
+        (f"`{one.name}`", one.unit, one.words)
         for one in FIGURES
-        if one.channel
+        if one.channel and one.words  # others are columns of strain.csv
     )
     return table(("channel", "unit", "meaning"), rows)
 
 
 def cycles() -> str:
     """The columns of cycles.csv."""
-    return table(("column", "unit", "meaning"), ((f"`{name}`", *about) for name, about in CYCLES.items()))
+    return table(
+        ("column", "unit", "meaning"),
+        ((f"`{n}`", *about) for n, about in CYCLES.items() if "sigma_" not in n),
+    )
 
 
 def statuses() -> str:
@@ -93,18 +99,24 @@ def flags() -> str:
     return f"Bits of `load/flags`: {bits}.\n\nKinds of events: {', '.join(EventKind)}."
 
 
-def settings_table(scheme: str) -> str:
-    """The settings of an address of a kind of camera."""
+SIM = [
+    "programme", "seconds", "hold", "E_GPa", "nu", "yield_MPa", "section_mm2", "bits", "noise", "fps", "faults",
+]  # fmt: skip
+"""Settings of ``sim:`` that are in the page; ``phasedic devices --settings`` has all."""
+
+
+def settings_table(scheme: str, kind: type) -> str:
+    """The settings of an address of a kind of device."""
     rows = (
         (
             f"`{one.key}`" if one.key else "others",
             one.unit,
-            one.allowed,
-            one.words + f"; {one.stands}" * bool(one.stands),
+            "; ".join(filter(None, (one.words, one.allowed * ("one of" in one.allowed), one.stands))),
         )
-        for one in settings_of(camera_settings()[scheme])
+        for one in settings_of(kind)
+        if scheme != "sim" or one.key in SIM
     )
-    return table(("setting", "unit", "allowed", "meaning"), rows)
+    return table(("setting", "unit", "meaning"), rows)
 
 
 def _described(path: str, one: Declared) -> Row:
@@ -117,13 +129,14 @@ def _described(path: str, one: Declared) -> Row:
 
 
 TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
-    **{name or "v4l2": partial(settings_table, name) for name in camera_settings()},
+    **{name or "v4l2": partial(settings_table, name, kind) for name, kind in camera_settings().items()},
+    "load": partial(settings_table, "load", load_settings()[""]),
     "session": session_layout, "flags": flags, "means": means, "status": statuses,
     "response": response, "cycles": cycles, "channels": channels,
 })  # fmt: skip
 PAGES = tuple(
     DOCS / f"{name}.md"
-    for name in ("session-format", "strain-format", "control", "cameras", "machine-vision")
+    for name in ("session-format", "strain-format", "control", "cameras", "machine-vision", "load-cells")
 )
 _TABLE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)
 

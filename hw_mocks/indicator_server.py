@@ -82,7 +82,7 @@ class PtyPort:
             return b""
 
     def close(self) -> None:
-        """Unplug for good; may be called again."""
+        """Unplug for good; idempotent."""
         self.unplug()
         if self._folder.exists():
             self._folder.rmdir()
@@ -137,7 +137,7 @@ class IndicatorServer(Closing):
         return self._port.lost_bytes
 
     def close(self) -> None:
-        """End the thread and remove the port; may be called again."""
+        """End the thread and remove the port; idempotent."""
         self._stopped.set()
         self._thread.join()
         self._port.close()

@@ -10,9 +10,9 @@ from __future__ import annotations
 import dataclasses
 import logging
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Self, cast
+from typing import Self
 
 import numpy as np
 
@@ -22,8 +22,9 @@ from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink, device_event
 from acquire.load_cell import LoadCell, open_load_cell
 from acquire.load_sample import LoadCellInfo, LoadSample
+from acquire.settings import TEXT, choice, number, setting, take_settings, whole
 from acquire.text import Message
-from hw_mocks.faults import SERIAL_FAULTS, FaultPlan, parse_faults
+from hw_mocks.faults import SERIAL_FAULTS, parse_faults
 from hw_mocks.indicator import AsciiIndicator, Indicator, Sensing, Style
 from hw_mocks.indicator_server import IndicatorServer
 from hw_mocks.sim_indicators import INDICATORS, HbmAedIndicator
@@ -40,35 +41,28 @@ TIMED = {"millis": "1", "column": "2"}
 WARNING = Message("simulated: no load cell and no specimen")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+# fmt: off
+@dataclass(frozen=True, slots=True)
 class SimLoadSettings:
-    """How the simulated cell measures.
+    """Of ``sim:``: how the simulated cell measures.
 
     Attributes
     ----------
-    protocol : str
-    style : str
-        Of the lines of ``ascii``.
-    rate : float, 1/s
-    noise_N, resolution_N, capacity_N : float, N
-    weight_N : float, N
-        A weight on the cell, besides the force on the specimen.
-    seed : int
-    faults : FaultPlan
     passed_on : mapping of str to str
         Settings for the serial reader.
     """
 
-    protocol: str = "ascii"
-    style: Style = "millis"
-    rate: float = 80.0
-    noise_N: float = 1.0
-    resolution_N: float = 0.1
-    capacity_N: float = 10_000.0
-    weight_N: float = 0.0
-    seed: int = 0
-    faults: FaultPlan = field(default_factory=FaultPlan)
-    passed_on: dict[str, str] = field(default_factory=dict)
+    protocol: str = setting(choice(*INDICATORS), "ascii", "that the simulated indicator speaks")
+    line: Style = setting(choice(*STYLES), "millis", "what stands in a line of ascii")
+    rate: float = setting(number(0.1, 1000), 80.0, "samples", "1/s")
+    noise_N: float = setting(number(0), 1.0, "standard deviation of a sample", "N")
+    resolution_N: float = setting(number(1e-6), 0.1, "step of the samples", "N")
+    range_N: float = setting(number(1e-3), 10_000.0, "beyond which the indicator is in overload", "N")
+    weight_N: float = setting(number(), 0.0, "on the cell, besides the force on the specimen", "N")
+    seed: int = setting(whole(0), 0, "of the noise")
+    faults: str = setting(TEXT, "", "faults and their times, such as garbage@5,silence@8*1.5")
+    passed_on: Mapping[str, str] = field(default_factory=dict)
+# fmt: on
 
 
 class SimLoadCell(Closing):
@@ -97,10 +91,11 @@ class SimLoadCell(Closing):
             specimen.elapsed,
             settings.rate,
             settings.noise_N,
-            settings.capacity_N,
+            settings.range_N,
         )
         indicator, port_settings = _indicator(settings)
-        self._server = IndicatorServer(indicator, sensing, seed=settings.seed, faults=settings.faults)
+        faults = parse_faults(settings.faults, SERIAL_FAULTS, address)
+        self._server = IndicatorServer(indicator, sensing, seed=settings.seed, faults=faults)
         query = "&".join(f"{key}={value}" for key, value in {**port_settings, **settings.passed_on}.items())
         try:
             self._cell = open_load_cell(f"{self._server.path}?{query}", _renamed(on_event, address))
@@ -197,18 +192,18 @@ def _indicator(settings: SimLoadSettings) -> tuple[Indicator, dict[str, str]]:
     """The indicator, and the settings that the serial reader needs."""
     name, step = settings.protocol, settings.resolution_N
     if name == "ascii":
-        indicator: Indicator = AsciiIndicator(step, style=settings.style)
+        indicator: Indicator = AsciiIndicator(step, style=settings.line)
     elif name == "hbm-aed":
-        indicator = HbmAedIndicator(step, nominal_N=settings.capacity_N)
+        indicator = HbmAedIndicator(step, nominal_N=settings.range_N)
     else:
         indicator = INDICATORS[name](step)
     baud, bytesize, parity = indicator.line
     port = {"protocol": name, "baud": f"{baud}", "bytesize": f"{bytesize}", "parity": parity}
     if name == "ascii":
-        return indicator, port | (TIMED if settings.style in ("millis", "openscale") else {})
+        return indicator, port | (TIMED if settings.line in ("millis", "openscale") else {})
     more = {
         "sauter": {"unit": "N"},
-        "hbm-aed": {"unit": "N", "nominal": f"{settings.capacity_N:g}"},
+        "hbm-aed": {"unit": "N", "nominal": f"{settings.range_N:g}"},
         "modbus": {"unit": "N", "profile": "laumas-tlb", "scale": f"{step:g}"},
     }
     return indicator, port | more.get(name, {})
@@ -220,7 +215,7 @@ def _described(info: LoadCellInfo, address: str, settings: SimLoadSettings, nois
         "rate": settings.rate,
         "noise_N": noise_N,
         "resolution_N": settings.resolution_N,
-        "simulated_capacity_N": settings.capacity_N,
+        "simulated_capacity_N": settings.range_N,
         "seed": settings.seed,
     }
     name = Message("simulated load cell ({name})", info.name)
@@ -235,8 +230,7 @@ def _renamed(on_event: EventSink, address: str) -> Callable[[Event], None]:
 def open_sim_load(address: Address, on_event: EventSink, specimen: VirtualSpecimen) -> LoadCell:
     """Open ``sim:?key=value...`` on the specimen of the test.
 
-    Keys: rate, noise_N, resolution_N, range_N, weight_N, protocol (all of ``INDICATORS``), line (of ascii: millis,
-    plain, label, openscale), seed, faults, lockstep, and of the serial reader ``PASSED_ON``. Those of the
+    Its settings are those of ``SimLoadSettings``, lockstep, and of the serial reader ``PASSED_ON``. Those of the
     specimen belong to the camera's address where the camera is simulated too.
 
     Raises
@@ -249,28 +243,17 @@ def open_sim_load(address: Address, on_event: EventSink, specimen: VirtualSpecim
     take_specimen(options)
     settings = _take_load(options)
     options.done()
+    parse_faults(settings.faults, SERIAL_FAULTS, address.text)  # refused in lock step too, where none happens
     kind = NominalLoadCell if specimen.nominal else SimLoadCell
     return kind(specimen, settings, address.text, on_event)
 
 
 def _take_load(options: Options) -> SimLoadSettings:
+    settings = take_settings(SimLoadSettings, options)
     passed_on = {key: value for key in PASSED_ON if (value := options.text(key)) is not None}
-    protocol = options.choice("protocol", tuple(INDICATORS), "ascii")
-    rate = options.number("rate", minimum=0.1, maximum=1000)
-    if rate is not None and protocol != "ascii":
-        passed_on["rate"] = f"{rate:g}"  # the reader asks or commands at this rate
-    return SimLoadSettings(
-        protocol=protocol,
-        style=cast("Style", options.choice("line", STYLES, "millis")),
-        rate=80.0 if rate is None else rate,
-        noise_N=options.number("noise_N", 1.0, minimum=0),
-        resolution_N=options.number("resolution_N", 0.1, minimum=1e-6),
-        capacity_N=options.number("range_N", 10_000.0, minimum=1e-3),
-        weight_N=options.number("weight_N", 0.0),
-        seed=options.integer("seed", 0, minimum=0),
-        faults=parse_faults(options.text("faults", ""), SERIAL_FAULTS, options.address.text),
-        passed_on=passed_on,
-    )
+    if settings.protocol != "ascii" and "rate" in dict(options.address.settings):
+        passed_on["rate"] = f"{settings.rate:g}"  # the reader asks or commands at this rate
+    return dataclasses.replace(settings, passed_on=passed_on)
 
 
 def _refuse_another_specimen(address: Address, specimen: VirtualSpecimen) -> None:

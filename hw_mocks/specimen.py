@@ -1,7 +1,7 @@
 """One virtual specimen behind both devices: what the camera takes and what the load cell measures.
 
 Every quantity is a pure function of the time since the start of the test (the programme holds,
-pulls to yield, pulls on, holds; or ``hw_mocks.cyclic``). It is the truth that measurements are compared with:
+pulls to yield, pulls on, holds; or ``Cyclic``). It is the truth that measurements are compared with:
 ``specimen.at(t)`` has the displacement and its gradient, ``force(t)`` the load. The strain is the
 displacement gradient (engineering strain along the load), about the middle of the image.
 """
@@ -17,13 +17,65 @@ from numpy.typing import ArrayLike, NDArray
 from acquire.addresses import Address, Options
 from acquire.errors import ConfigError
 from acquire.settings import take_settings
-from hw_mocks.cyclic import take_cyclic
 from hw_mocks.deformation import NECK_AT, Axis, Gradient, Kind, SpecimenDeformation, StrainModes
 from hw_mocks.machine import FlowCurve, Machine, PowerLaw, Programme, Pull, TestClock
 from hw_mocks.sim_settings import CyclicSettings, SpecimenSettings
 
 Array = NDArray[np.float64]
 KINDS: tuple[Kind, ...] = ("uniform", "hole", "woven", "halves")
+
+
+@dataclass(frozen=True, slots=True)
+class Cyclic(Programme):
+    """Cycles between two forces: ``sim:?programme=cyclic&hz=2&r=0.1&n=50&fall=0.1``.
+
+    At rest, to the lowest force, n cycles of 1 - cos between the lowest and the highest, at rest at the lowest. The
+    forces stay the same; from cycle to cycle the stiffness falls, in equal steps, from all of it in the first to
+    1 - ``fall`` in the last. The strain follows at once: the loop has no area. ``ramp_s`` is the time of all cycles,
+    ``max_strain`` the highest strain of the first.
+
+    Attributes
+    ----------
+    n : int
+        Cycles.
+    ratio : float
+        Lowest over highest force.
+    fall : float
+        Share of the stiffness that is lost from the first to the last cycle.
+    """
+
+    n: int = 10
+    ratio: float = 0.1
+    fall: float = 0.0
+
+    def strain(self, t: ArrayLike) -> Array:
+        """Axial strain at ``t`` seconds since the start."""
+        cycles = self.cycles(t)
+        wave = self.ratio + (1 - self.ratio) * (1 - np.cos(2 * np.pi * np.clip(cycles, 0, self.n))) / 2
+        approach = np.clip(1 + cycles / min(0.5, self.hold_s * self.n / self.ramp_s / 2), 0, 1)
+        return np.asarray(self.max_strain * wave * approach / self.stiffness(t))
+
+    def cycles(self, t: ArrayLike) -> Array:
+        """How many are done at ``t``; negative before the first."""
+        return np.asarray((np.asarray(t, float) - self.hold_s) * self.n / self.ramp_s)
+
+    def stiffness(self, t: ArrayLike) -> Array:
+        """Share of the first stiffness that is left."""
+        done = np.clip(np.floor(self.cycles(t)), 0, self.n - 1)
+        return np.asarray(1 - self.fall * done / max(self.n - 1, 1))
+
+
+def take_cyclic(address: Address, given: CyclicSettings, material: FlowCurve) -> Cyclic:
+    """The programme of an address; raises ConfigError for a highest strain beyond yield."""
+    hz, n, top, fall = given.hz, int(given.n), given.max_strain, given.fall
+    if top / (1 - fall) > material.yield_strain:
+        raise ConfigError(
+            "{text}: a cyclic test is elastic here; give max_strain below {strain:.3g}, or yield_MPa",
+            address.text,
+            material.yield_strain * (1 - fall),
+        )
+    end = max(1 / hz if given.end is None else given.end, given.seconds - given.hold - n / hz)
+    return Cyclic(given.hold, n / hz, end, top / 2, top, n=n, ratio=given.r, fall=fall)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,13 +13,12 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from acquire.errors import DEFECT, EXIT_INTERRUPTED, ConfigError, DataError, PhasedicError
-from acquire.text import Message
-from acquire.text.message import about
+from acquire.text.message import Message, about, word
 from acquire.text.printable import brief, printable
 from live.commands.arguments import Command, parse
 from live.commands.environment import check_environment, limit_resources, nonblocking_streams
 from live.commands.signals import ended_by_sigterm
-from live.words.language import told
+from live.words.language import said_here, told
 
 _WRONG_PATH = {errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}
 
@@ -89,9 +88,9 @@ class _PrintableFormatter(logging.Formatter):
     """Says messages in the language of the terminal, and printable: they may contain text of a file or a device."""
 
     def format(self, record: logging.LogRecord) -> str:
-        if isinstance(record.args, tuple):
-            record = copy.copy(record)
-            record.args = tuple(told(one) if isinstance(one, Message) else one for one in record.args or ())
+        record = copy.copy(record)
+        record.levelname = told(word(record.levelname.lower())).upper()
+        record.msg = told(record.msg)
         return printable(super().format(record))
 
 
@@ -130,7 +129,7 @@ def _refused(error: PhasedicError) -> int:
 
 
 def _interrupted() -> int:
-    print("phasedic: interrupted", file=sys.stderr)
+    print(f"phasedic: {said_here('interrupted')}", file=sys.stderr)
     return EXIT_INTERRUPTED
 
 

@@ -90,7 +90,7 @@ def compile_loops(kinds: tuple[str, ...] = ("uint8", "uint16")) -> None:
     if not (
         fold.stats.cache_path and any(Path(fold.stats.cache_path).glob("accumulate_loops.tile_sums-*.nbi"))
     ):
-        log.info("compiling the burst loops, once on this machine; this takes some seconds")
+        log.info(Message("compiling the burst loops, once on this machine; this takes some seconds"))
     mean, clipped = np.empty(9, np.float32), np.empty(9, np.bool_)
     for kind, of_sum in product(kinds, (np.uint16, np.uint32)):
         image, total = frozen(np.zeros((3, 3), kind)), np.empty(9, of_sum)
@@ -307,7 +307,7 @@ class FrameSums:
         self._previous, self._waiting = images[-1], []
 
     def noise(self, n: int) -> float:
-        """Of one frame, GL: from successive differences, so that slow motion hardly counts."""
+        """Noise of one frame, GL, from successive differences, so that slow motion hardly counts."""
         return math.sqrt(self._squares / (2 * (n - 1) * self._like.image.size)) if n > 1 else math.nan
 
     def motion(self, last: Frame, n: int, noise: float) -> float:

@@ -24,7 +24,7 @@ class Camera(Protocol):
       raises ``ConfigError``, ``DeviceError`` or ``DataError`` where that fails. ``info`` is
       complete from then on.
     - ``with`` starts the stream and closes everything at its end; a camera never entered is
-      closed with ``close()``. Both may be called again without effect.
+      closed with ``close()``. Both are idempotent.
     - Iterating gives ``Frame`` objects with strictly increasing ``index`` and non-decreasing
       ``t``, each with its own read-only memory. It ends when the source is exhausted or after
       ``stop()``. A fault that the device can recover from is an event and a wait, never an
@@ -73,7 +73,7 @@ class CameraBase(Closing):
         self.stopped.set()
 
     def close(self) -> None:
-        """Release the device; may be called again without effect."""
+        """Release the device; idempotent."""
         self.stopped.set()
         if not self._closed:
             self._closed = True

@@ -103,7 +103,7 @@ class Driver(Protocol):
         """The next picture, or None where none came in that time; raises DeviceFault. One thread calls it."""
 
     def close(self) -> None:
-        """Give it back; may be called again without effect, and by any thread while nobody fetches."""
+        """Give it back; idempotent, and by any thread while nobody fetches."""
 
 
 Opener = Callable[[Driver | None], Driver]

@@ -132,7 +132,13 @@ def in_order(
     ConfigError
         The names can be read in two ways, two are called reference, or two have the same time.
     """
-    order = _by_time(names, times()) if by == "time" else _by_name(names, times, by, first)
+    if by == "time":
+        order = _by_time(names, times())
+    else:
+        orders, timed = _by_name(names, by)
+        order = orders[0]
+        if len(orders) > 1:
+            order = _decided(names, orders, times() if timed and first is None else (), first)
     called = [k for k in order if _words(names[k]) & _REFERENCE]
     if not called or len(called) == len(order):
         return order
@@ -157,12 +163,11 @@ def _by_time(names: Sequence[str], times: Sequence[float]) -> list[int]:
     return order
 
 
-def _by_name(
-    names: Sequence[str], times: Callable[[], Sequence[float]], by: str, first: str | None
-) -> list[int]:
+def _by_name(names: Sequence[str], by: str) -> tuple[list[list[int]], bool]:
+    """The orders that the names may mean, one where they leave no choice; and whether times may decide."""
     stems = [unicodedata.normalize("NFKC", _stem(name)).replace("\u2212", "-").casefold() for name in names]
     if _is_hexadecimal(stems):
-        return sorted(range(len(names)), key=lambda k: (len(stems[k]), stems[k], names[k]))
+        return [sorted(range(len(names)), key=lambda k: (len(stems[k]), stems[k], names[k]))], False
     stems, *others = dated(stems)
     found = [_pieces(stem) for stem in stems]
     doubts = _doubts([pieces for pieces, _ in found])
@@ -178,20 +183,17 @@ def _by_name(
     orders += _turned(orders[0], [pieces for pieces, _ in found], [rest for _, rest in found])
     decimals = order(_Reading(decimal=True, signed=True)) if doubts.points else orders[0]
     if by == "name" or all(other == orders[0] for other in [*orders, decimals]):
-        return orders[0]
-    return _decided(names, [*orders, decimals], times if decimals == orders[0] else None, first)
+        return orders[:1], False
+    return [*orders, decimals], decimals == orders[0]
 
 
 def _decided(
-    names: Sequence[str],
-    orders: list[list[int]],
-    times: Callable[[], Sequence[float]] | None,
-    first: str | None,
+    names: Sequence[str], orders: list[list[int]], taken: Sequence[float], first: str | None
 ) -> list[int]:
-    """The order that begins with ``first``, or that the ``times`` follow, where they may decide."""
+    """The order that begins with ``first``, or that the times ``taken`` follow, where there are some."""
     if first is not None:
         return next((order for order in orders if names[order[0]] == first), orders[0])
-    taken, text = times() if times else [], sorted(range(len(names)), key=lambda k: names[k])
+    text = sorted(range(len(names)), key=lambda k: names[k])
     for order in orders if taken else []:
         if order != text and all(taken[a] < taken[b] for a, b in itertools.pairwise(order)):
             return order

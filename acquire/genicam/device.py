@@ -250,7 +250,7 @@ class GenicamDevice:
         )
 
     def close(self) -> None:
-        """Stop and give everything back; may be called again without effect."""
+        """Stop and give everything back; idempotent."""
         with self._requests, self._pictures:
             stream, self._stream = self._stream, None
             handle, self._handle = self._handle, None

@@ -14,7 +14,7 @@ NO_TRIGGER, SOFTWARE = "no", "Software"
 # fmt: off
 @dataclass(frozen=True, slots=True)
 class GenicamSettings:
-    """Of ``genicam:...``."""
+    """Settings of ``genicam:...``."""
 
     format: str | None = setting(str, None,
         "Mono8, Mono10, Mono12, Mono14, Mono16, `p` and `Packed`; default the best of 12 bits")

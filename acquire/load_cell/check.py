@@ -163,9 +163,9 @@ class LoadReport:
     def mean_text(self) -> str:
         """The mean in N, to a hundredth of the noise of one reading."""
         if not self.noise_N > 0:
-            return f"{self.mean_N:.6g}"
+            return Message("{mean:.6g}", self.mean_N)
         digits = min(max(2 - math.floor(math.log10(self.noise_N)), 0), 6)
-        return f"{self.mean_N:z.{digits}f}"
+        return Message(f"{{mean:.{digits}f}}", round(self.mean_N, digits) + 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,8 +300,8 @@ def _remarks(found: LoadReport, samples: Sequence[LoadSample], digit_N: float) -
     if found.moved_N > max(10 * found.noise_N, 5 * digit_N):
         yield Message(
             "the force ran between {lowest} and {highest} N: leave the load still, or look for a drift",
-            f"{found.lowest_N:.6g}",
-            f"{found.highest_N:.6g}",
+            Message("{force:.6g}", found.lowest_N),
+            Message("{force:.6g}", found.highest_N),
         )
     if found.unique == 1 and found.good >= STUCK:
         yield Message("every value is the same: a frozen display, or far too coarse for this load")

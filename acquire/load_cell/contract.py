@@ -1,20 +1,22 @@
-"""The contract of a load cell, the opening of an address, and ``none:`` for a test without one.
+"""The contract of a load cell, the opening of an address, ``none:`` for a test without one, and forces from a zero.
 
 A load cell is a context manager and an iterable of load samples; ``tests/contracts`` holds all of them to this text.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import dataclasses
+from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
 from acquire.addresses import Address, Options, Registry
 from acquire.closing import Closing
 from acquire.errors import ConfigError
-from acquire.events import EventSink, ignore_event
+from acquire.events import Event, EventKind, EventSink, ignore_event
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.text import Message
+from acquire.text.message import word
 
 
 @runtime_checkable
@@ -24,7 +26,7 @@ class LoadCell(Protocol):
     - Opening (``open_load_cell``) claims the port and raises ``ConfigError`` or
       ``DeviceError`` where that fails; ``info`` is complete from then on.
     - ``with`` starts the stream and closes everything at its end; one never entered is closed
-      with ``close()``. Both may be called again without effect.
+      with ``close()``. Both are idempotent.
     - Iterating gives ``LoadSample`` objects with non-decreasing ``t`` until ``stop()``, or until
       a finite source is exhausted. A lost or silent port is an event and a reconnection, never
       an exception: a test goes on without its load.
@@ -65,6 +67,8 @@ LOAD_CELLS: Registry[LoadCell] = Registry(
         "session": "acquire.session.devices:open_session_load",
     },
     fallback="acquire.serial_line.cell:open_serial",
+    settings_group="phasedic.load_cell_settings",
+    settings={"": "acquire.serial_line.settings:SerialOptions"},
 )
 
 
@@ -90,7 +94,7 @@ def open_load_cell(address: str, on_event: EventSink = ignore_event) -> LoadCell
 class NoLoadCell(Closing):
     """Gives no samples and ends at once."""
 
-    info = LoadCellInfo(address="none:", name="no load cell", protocol="none", clock="nominal")
+    info = LoadCellInfo(address="none:", name=word("no load cell"), protocol="none", clock="nominal")
 
     def __iter__(self) -> Iterator[LoadSample]:
         return iter(())
@@ -120,3 +124,73 @@ def open_none(address: Address, on_event: EventSink) -> NoLoadCell:
     if address.target:
         raise ConfigError("{text}: nothing may follow none:, since it opens no device", address.text)
     return NoLoadCell()
+
+
+class ZeroedLoadCell:
+    """A load cell whose forces count from another force: the zero that was taken before the test.
+
+    A tare makes the present load zero whatever was subtracted before.
+
+    Parameters
+    ----------
+    opener : callable
+        Takes an event sink and opens the load cell.
+    zero_N : float, N
+        Subtracted from every force.
+    on_event : callable taking an Event
+    """
+
+    def __init__(self, opener: Callable[[EventSink], LoadCell], zero_N: float, on_event: EventSink) -> None:
+        self._zero_N, self._before, self._on_event = zero_N, list[float](), on_event
+        self._undoing = False
+        self._cell = opener(self._event)
+        settings = {**self._cell.info.settings, "zero_N": zero_N}
+        self.info: LoadCellInfo = dataclasses.replace(self._cell.info, settings=settings)
+
+    def __enter__(self) -> Self:
+        self._cell.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._cell.__exit__(kind, error, trace)
+
+    def __iter__(self) -> Iterator[LoadSample]:
+        for sample in self._cell:
+            yield dataclasses.replace(sample, force=sample.force - self._zero_N)
+
+    def tare(self, *, force: bool = False) -> None:
+        """Make the present load zero."""
+        self._undoing = False
+        self._cell.tare(force=force)
+
+    def undo_tare(self) -> None:
+        """Restore the zero before the last tare."""
+        self._undoing = True
+        self._cell.undo_tare()
+
+    def stop(self) -> None:
+        """End the iteration; from any thread."""
+        self._cell.stop()
+
+    def close(self) -> None:
+        """Release the device."""
+        self._cell.close()
+
+    def _event(self, event: Event) -> None:
+        """Pass an event on; that of a tare with the step of the forces as they are given here."""
+        if event.kind is EventKind.TARE and "step_N" in event.data:
+            event = self._tared(event)
+        self._on_event(event)
+
+    def _tared(self, event: Event) -> Event:
+        old = self._zero_N
+        if event.data.get("undo", self._undoing):
+            self._zero_N = self._before.pop() if self._before else old
+        else:
+            self._before.append(old)
+            self._zero_N = 0.0
+        step = event.data["step_N"]
+        shown = None if step is None else step + self._zero_N - old
+        return dataclasses.replace(event, data={**event.data, "step_N": shown})

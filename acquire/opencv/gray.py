@@ -60,7 +60,8 @@ def _one_plane(picture: NDArray[Any], gray: str | None, source: str) -> NDArray[
         return first.copy()
     if gray is None:
         raise ConfigError(
-            "{source}: a colour picture; say what is grey: gray=luma, gray=r, gray=g or gray=b", source
+            "{source}: a colour picture; add ?gray=luma (or r, g, b) to the address, as in 'shots?gray=luma'",
+            source,
         )
     if gray in _PLANE:
         return picture[:, :, _PLANE[gray]].copy()

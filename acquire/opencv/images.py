@@ -93,7 +93,7 @@ def read_image(path: str | Path, gray: str | None = None, page: int = 0) -> NDAr
 # fmt: off
 @dataclass(frozen=True, slots=True)
 class FileSettings:
-    """Of ``files:shots/*.tif``."""
+    """Settings of ``files:shots/*.tif``."""
 
     fps: float = setting(number(1e-6, 1e6), 1.0, "pictures a second", "1/s")
     gray: str | None = setting(choice(*GRAYS), None, "what is grey in a colour picture")
@@ -147,30 +147,27 @@ class ImageFiles(CameraBase):
 
     def __iter__(self) -> Iterator[Frame]:
         self._left_out = 0
-        for index, (path, read) in enumerate(self._pages()):
+        for index, (path, source, page) in enumerate(self._pages()):
             if self.stopped.is_set():
                 return
-            yield self._frame(index, path, read)
+            yield self._frame(index, path, source, page)
         if self._left_out > MAX_REPORTED:
             self._report(
                 Message("{left_out} pictures were left out in all", self._left_out), self._time(index)
             )
 
-    def _pages(self) -> Iterator[tuple[Path, Callable[[], NDArray[Any]]]]:
+    def _pages(self) -> Iterator[tuple[Path, Callable[[], Source], int]]:
         for path in self._paths:
             source = cache(partial(picture_source, path))
             for page in _pages_of(path):
-                yield path, partial(self._read, path, source, page)
+                yield path, source, page
 
-    def _read(self, path: Path, source: Callable[[], Source], page: int) -> NDArray[Any]:
-        if path.name in self._masks:
-            raise DataError("{path} is a mask by its name (--mask {path} uses it)", path)
-        return read_picture_page(path, source(), page)
-
-    def _frame(self, index: int, path: Path, read: Callable[[], NDArray[Any]]) -> Frame:
+    def _frame(self, index: int, path: Path, source: Callable[[], Source], page: int) -> Frame:
         t = self._time(index)
         try:
-            image = self._checked(read(), path)
+            if path.name in self._masks:
+                raise DataError("{path} is a mask by its name (--mask {path} uses it)", path)
+            image = self._checked(read_picture_page(path, source(), page), path)
         except PhasedicError as error:
             self._leave_out(path, t, error.text)
             black = frozen(np.zeros(self._shape, self._dtype))

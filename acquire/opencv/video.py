@@ -41,7 +41,7 @@ _MOST_COUNTED = 50_000_000  # bytes that are read through to count frames
 
 @dataclass(frozen=True, slots=True)
 class VideoSettings:
-    """Of ``video:test.mp4``."""
+    """Settings of ``video:test.mp4``."""
 
     gray: str = setting(choice(*GRAYS), "luma", "what is grey in a colour picture")
 

@@ -43,7 +43,7 @@ class Capture(Protocol):
 # fmt: off
 @dataclass(frozen=True, slots=True)
 class OpenCVSettings:
-    """Of ``opencv:0``; None: whatever the camera has."""
+    """Settings of ``opencv:0``; None: whatever the camera has."""
 
     width: float | None = setting(number(1), None, "of the picture", "px")
     height: float | None = setting(number(1), None, "of the picture", "px")

@@ -5,7 +5,7 @@ unstable, OL overload, UL underload, TL tilt, QT counting; GS gross, NT net, TR 
 an RS-485 number such as ``01`` may stand before. A data field of spaces with only its point is an
 overflow. Pieces, percent and the stored tare are no load and give no value.
 
-What cannot be detected: no check digit, so a changed digit reads as another value; a lost one is only
+What cannot be detected: transmission errors. A changed digit reads as another value; a lost one is only
 where ``digits=`` tells the width of the data field.
 """
 
@@ -13,12 +13,13 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 
-from acquire.addresses import Options
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.base import Parser, ParserSettings, Protocol, Reading
 from acquire.protocols.buffers import Line, LineParser, bad, number
 from acquire.protocols.units import is_unit
+from acquire.settings import choice, setting, whole
 from acquire.text import Message
 
 _LINE = re.compile(
@@ -64,16 +65,22 @@ class AedStandardParser(LineParser):
         return Reading(value, unit or None, line.data, line.start, stable, flags)
 
 
-def make_parser(options: Options) -> Parser:
-    """Takes ``decimal`` and ``digits`` out of the address."""
-    comma = options.choice("decimal", ("point", "comma"), "point") == "comma"
-    return AedStandardParser(decimal_comma=comma, digits=options.integer("digits", minimum=1, maximum=16))
+@dataclass(frozen=True, slots=True)
+class AedStandardSettings(ParserSettings):
+    """How the data field is written."""
+
+    decimal: str = setting(choice("point", "comma"), "point", "the decimal mark")
+    digits: int | None = setting(whole(1, 16), None, "characters of a value after its sign, point included")
+
+    def parser(self, address: str) -> Parser:
+        """Their parser."""
+        return AedStandardParser(decimal_comma=self.decimal == "comma", digits=self.digits)
 
 
 PROTOCOL = Protocol(
     name="aed-standard",
     summary="A&D, Dini Argeo, Selleton, Autoda, KERN KFB and many indicators",
-    make_parser=make_parser,
+    settings=AedStandardSettings,
     baud=2400,
     bytesize=7,
     parity="E",

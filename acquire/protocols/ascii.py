@@ -8,7 +8,7 @@ value, nor does one that leaves a choice: ``12,5 kg``, ``1.234,5 N`` or ``1,234.
 until ``decimal=comma`` says one or ``decimal=point`` says two. With ``decimal=comma`` points stand between
 thousands, if they stand there.
 
-What cannot be detected: there is no check digit, so a digit lost or changed within a line, or two
+What cannot be detected: transmission errors. A digit lost or changed within a line, or two
 lines run together into one number, reads as another value; ``capacity=`` and ``max_step=`` flag the
 gross ones.
 """
@@ -19,12 +19,12 @@ import math
 import re
 from dataclasses import dataclass
 
-from acquire.addresses import Options
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.base import Parser, ParserSettings, Protocol, Reading
 from acquire.protocols.buffers import Line, LineParser, bad, number
 from acquire.protocols.units import is_unit
+from acquire.settings import choice, setting, whole
 from acquire.text import Message
 
 SATURATED = {8388607.0: LoadFlag.OVERLOAD, -8388608.0: LoadFlag.UNDERLOAD}  # of a 24-bit converter
@@ -39,22 +39,30 @@ _COMMA_SPLIT = re.compile(r"( *[;\t] *| +)")
 
 
 @dataclass(frozen=True, slots=True)
-class AsciiSettings:
-    """How the address describes the lines; columns count from 1.
+class AsciiSettings(ParserSettings):
+    """How the address describes the lines.
 
     Attributes
     ----------
-    column : int or None
-        Field of the value.
-    millis : int or None
-        Field of the device's own milliseconds.
     decimal_comma : bool or None
         None: not given; then two numbers with a comma between them may be one.
     """
 
-    column: int | None = None
-    millis: int | None = None
-    decimal_comma: bool | None = None
+    column: int | None = setting(whole(1, 64), None, "place of the value in a line, from 1")
+    millis: int | None = setting(whole(1, 64), None, "place of the device's own time, from 1")
+    decimal: str | None = setting(
+        choice("point", "comma"), None, "the decimal mark, where the line is ambiguous"
+    )
+
+    @property
+    def decimal_comma(self) -> bool | None:
+        return None if self.decimal is None else self.decimal == "comma"
+
+    def parser(self, address: str) -> Parser:
+        """Their parser; raises ConfigError where two columns are the same."""
+        if self.column is not None and self.column == self.millis:
+            raise ConfigError("{text}: column and millis must differ", address)
+        return AsciiParser(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,24 +195,10 @@ def _saturation(fields: list[_Field]) -> LoadFlag:
     return next((SATURATED[f.value] for f in fields if f.value in SATURATED), LoadFlag.NONE)
 
 
-def make_parser(options: Options) -> Parser:
-    """Takes ``column``, ``millis`` and ``decimal`` out of the address."""
-    settings = AsciiSettings(
-        column=options.integer("column", minimum=1, maximum=64),
-        millis=options.integer("millis", minimum=1, maximum=64),
-        decimal_comma={"comma": True, "point": False}.get(
-            options.choice("decimal", ("", "point", "comma"), "")
-        ),
-    )
-    if settings.column is not None and settings.column == settings.millis:
-        raise ConfigError("{text}: column and millis must differ", options.address.text)
-    return AsciiParser(settings)
-
-
 PROTOCOL = Protocol(
     name="ascii",
     summary="free text lines: [milliseconds,] value [unit] ... (HX711, Arduino, ESP, OpenScale)",
-    make_parser=make_parser,
+    settings=AsciiSettings,
     baud=9600,
     flags_overload=False,
     undetected=Message(

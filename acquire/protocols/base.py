@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import tomllib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +14,7 @@ from typing import Any, Literal
 from acquire.addresses import Options
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
+from acquire.settings import take_settings
 
 Mode = Literal["listen", "stream", "poll"]
 Parity = Literal["N", "E", "O"]
@@ -79,14 +80,22 @@ class Parser(ABC):
 
 
 @dataclass(frozen=True, slots=True)
+class ParserSettings(ABC):
+    """The settings of a protocol in an address, declared by ``acquire.settings``, and the parser that they make."""
+
+    @abstractmethod
+    def parser(self, address: str) -> Parser:
+        """Their parser; raises ConfigError, which names ``address``, where they do not fit each other."""
+
+
+@dataclass(frozen=True, slots=True)
 class Protocol:
     """A protocol's description.
 
     Attributes
     ----------
     name, summary : str
-    make_parser : callable taking Options
-        Takes its own settings out of the address; may raise ConfigError.
+    settings : type of ParserSettings
     baud, bytesize, parity : line settings where the address has none
     mode : "listen" | "stream" | "poll"
         Listen: the device sends by itself. Stream: it does after the command ``start``.
@@ -111,7 +120,7 @@ class Protocol:
 
     name: str
     summary: str
-    make_parser: Callable[[Options], Parser]
+    settings: type[ParserSettings]
     baud: int = 9600
     bytesize: int = 8
     parity: Parity = "N"
@@ -124,6 +133,10 @@ class Protocol:
     max_rate: float = 10.0
     rates: Mapping[float, bytes] = field(default_factory=dict)
     silence_s: float = 0.1
+
+    def make_parser(self, options: Options) -> Parser:
+        """The parser of an address, from which it takes the settings of the protocol; raises ConfigError."""
+        return take_settings(self.settings, options).parser(options.address.text)
 
 
 # Imported when used; each module has a PROTOCOL.

@@ -5,18 +5,20 @@ Eight characters of counts, optionally with address and status: ``xxxxxxxx,aa,ss
 ``nominal=`` (what the factory scale of 1 000 000 counts stands for, in ``unit``), or by
 ``decimals=`` where the device's NOV scale gives units times a power of ten.
 
-What cannot be detected: no check digit; without status (``COF3``) no overflow (say ``capacity=``).
+What cannot be detected: transmission errors, and without status (``COF3``) an overflow (say ``capacity=``).
 """
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
-from acquire.addresses import Options
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.base import Parser, ParserSettings, Protocol, Reading
 from acquire.protocols.buffers import Line, LineParser, bad, number
+from acquire.settings import number as number_setting
+from acquire.settings import setting, whole
 from acquire.text import Message
 
 NOMINAL_COUNTS = 1_000_000
@@ -59,21 +61,28 @@ class HbmAedParser(LineParser):
         return Reading(counts * self._per_count, None, line.data, line.start, stable, flags)
 
 
-def make_parser(options: Options) -> Parser:
-    """Takes ``nominal`` and ``decimals`` out of the address."""
-    nominal = options.number("nominal", minimum=1e-12)
-    decimals = options.integer("decimals", minimum=0, maximum=8)
-    if nominal is not None and decimals is not None:
-        raise ConfigError("{text}: give nominal or decimals, not both", options.address.text)
-    if nominal is not None:
-        return HbmAedParser(nominal / NOMINAL_COUNTS)
-    return HbmAedParser(10.0 ** -(decimals or 0))
+@dataclass(frozen=True, slots=True)
+class HbmAedSettings(ParserSettings):
+    """What a count is worth."""
+
+    nominal: float | None = setting(
+        number_setting(1e-12), None, "load of 1 000 000 counts, in the unit of unit"
+    )
+    decimals: int | None = setting(whole(0, 8), None, "behind the point, where the device is scaled (NOV)")
+
+    def parser(self, address: str) -> Parser:
+        """Their parser; raises ConfigError where both are given."""
+        if self.nominal is not None and self.decimals is not None:
+            raise ConfigError("{text}: give nominal or decimals, not both", address)
+        if self.nominal is not None:
+            return HbmAedParser(self.nominal / NOMINAL_COUNTS)
+        return HbmAedParser(10.0 ** -(self.decimals or 0))
 
 
 PROTOCOL = Protocol(
     name="hbm-aed",
     summary="HBM AD103/104, AED, WE2107",
-    make_parser=make_parser,
+    settings=HbmAedSettings,
     bytesize=8,
     parity="E",
     mode="stream",

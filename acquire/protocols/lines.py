@@ -15,15 +15,16 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from acquire.addresses import Options
+from acquire.bounds import other_than_zero
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Parser, Protocol, Reading, table_of
+from acquire.protocols.base import Parser, ParserSettings, Protocol, Reading, table_of
 from acquire.protocols.buffers import Line, LineBuffer, LineParser, bad, number
+from acquire.settings import TEXT, choice, setting
 from acquire.text import Message
 
 STATES = {"overload": LoadFlag.OVERLOAD, "underload": LoadFlag.UNDERLOAD, "error": LoadFlag.ERROR}
@@ -104,20 +105,35 @@ class RuledParser(LineParser):
         )
 
 
-def make_parser(options: Options) -> Parser:
-    """Takes ``preset`` and the keys of a preset out of the address."""
-    preset = options.text("preset")
-    rules: dict[str, Any] = load_preset(preset) if preset else {}
-    for key in KEYS:
-        if key == "unit":  # also a setting of every serial address, taken there
-            continue
-        given = options.text(key)
-        if given is not None:
-            rules[key] = given
-    try:
-        return parser_from(rules)
-    except ConfigError as error:
-        raise ConfigError("{text}: {error}", options.address.text, error) from error
+@dataclass(frozen=True, slots=True)
+class LinesSettings(ParserSettings):
+    """Those of a preset, which may also stand in the address.
+
+    ``unit``, ``tare`` and ``zero`` of a preset mean another thing in an address, whatever its protocol.
+    """
+
+    preset: str | None = setting(TEXT, None, "the keys of a kind of device: its name, or a TOML file")
+    pattern: str | None = setting(TEXT, None, "regular expression of a line, with (?P<value>...)")
+    overload: str | None = setting(TEXT, None, "words in place of a value, with | between two")
+    underload: str | None = setting(TEXT, None, "words in place of a value")
+    error: str | None = setting(TEXT, None, "words in place of a value")
+    unstable: str | None = setting(TEXT, None, "words beside a value that is not yet still")
+    net: str | None = setting(TEXT, None, "words beside a value from which a tare is taken")
+    ends: str | None = setting(choice(*ENDS), None, "end of a line; where not given line: CR or LF")
+    scale: float | None = setting(other_than_zero, None, "factor of the number on the line")
+    decimal: str | None = setting(choice("point", "comma"), None, "the decimal mark; where not given point")
+    poll: str | None = setting(TEXT, None, "what asks for a reading")
+    start: str | None = setting(TEXT, None, "what starts a stream")
+    stop: str | None = setting(TEXT, None, "what ends a stream")
+
+    def parser(self, address: str) -> Parser:
+        """Their parser; raises ConfigError where no pattern is given, or an impossible one."""
+        rules = load_preset(self.preset) if self.preset else {}
+        given = {key: value for key, value in asdict(self).items() if value is not None and key != "preset"}
+        try:
+            return parser_from(rules | given)
+        except ConfigError as error:
+            raise ConfigError("{text}: {error}", address, error) from error
 
 
 def load_preset(name: str) -> dict[str, Any]:
@@ -191,6 +207,6 @@ def _bytes(text: Any) -> bytes:
 PROTOCOL = Protocol(
     name="lines",
     summary="any other lines, by a regular expression or a preset",
-    make_parser=make_parser,
+    settings=LinesSettings,
     undetected=Message("whatever the pattern lets pass"),
 )

@@ -3,13 +3,12 @@
 ``-18.78 lbF``, ``4.285 N``, or the number alone (``NUM`` setting). ``*10`` illegal, ``*11`` not applicable,
 ``*12`` invalid, ``*22`` too large. These gauges show tension as negative, so the sign is -1 by default.
 
-What cannot be detected: an overload has no mark on the line (say ``capacity=``); no check digit.
+What cannot be detected: transmission errors, and an overload (say ``capacity=``).
 """
 
 from __future__ import annotations
 
-from acquire.addresses import Options
-from acquire.protocols.base import Parser, Protocol
+from acquire.protocols.base import Parser, ParserSettings, Protocol
 from acquire.protocols.lines import parser_from
 from acquire.text import Message
 
@@ -17,15 +16,18 @@ PATTERN = r"(?i) *(?P<value>[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?: *(?P<unit>lbF|
 RATES = (2, 5, 10, 25, 50, 125, 250)
 
 
-def make_parser(options: Options) -> Parser:
-    """Lines of one pattern; no settings of its own."""
-    return parser_from({"pattern": PATTERN})
+class Mark10Settings(ParserSettings):
+    """None."""
+
+    def parser(self, address: str) -> Parser:
+        """Lines of one pattern."""
+        return parser_from({"pattern": PATTERN})
 
 
 PROTOCOL = Protocol(
     name="mark10",
     summary="Mark-10 series 4/5/7, BG",
-    make_parser=make_parser,
+    settings=Mark10Settings,
     baud=9600,
     mode="stream",
     sign=-1,

@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from acquire.addresses import Options
-from acquire.bounds import NotAllowed, as_integer
+from acquire.bounds import NotAllowed, as_integer, other_than_zero
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Parser, Protocol, Reading, table_of
+from acquire.protocols.base import Parser, ParserSettings, Protocol, Reading, table_of
 from acquire.protocols.buffers import HeldBytes
+from acquire.settings import TEXT, setting
 from acquire.text import Message
 
 PROFILES = Path(__file__).with_name("modbus_profiles.toml")
@@ -286,25 +286,24 @@ class ModbusParser(Parser):
         self._held.clear(lost)
 
 
-def make_parser(options: Options) -> Parser:
-    """Takes ``profile`` and ``scale`` out of the address."""
-    name = options.text("profile")
-    scale = options.number("scale", 1.0)
-    if name is None:
-        raise ConfigError(
-            "{text}: protocol=modbus needs profile=, for example laumas-tlb", options.address.text
-        )
-    if scale == 0:
-        raise ConfigError(
-            "{text}: scale=0 is not possible; allowed: a number other than zero", options.address.text
-        )
-    return ModbusParser(load_profile(name), scale)
+@dataclass(frozen=True, slots=True)
+class ModbusSettings(ParserSettings):
+    """The register map, and what a count is worth."""
+
+    profile: str | None = setting(TEXT, None, "the register map: its name, or a TOML file")
+    scale: float = setting(other_than_zero, 1.0, "value of one count, in the unit of unit")
+
+    def parser(self, address: str) -> Parser:
+        """Their parser; raises ConfigError without a profile."""
+        if self.profile is None:
+            raise ConfigError("{text}: protocol=modbus needs profile=, for example laumas-tlb", address)
+        return ModbusParser(load_profile(self.profile), self.scale)
 
 
 PROTOCOL = Protocol(
     name="modbus",
     summary="weight transmitters over Modbus RTU, by profile",
-    make_parser=make_parser,
+    settings=ModbusSettings,
     mode="poll",
     unit_on_line=False,
     flags_overload=False,

@@ -4,16 +4,15 @@
 (A&D: ``SI+``, ``SI-``) over- and underload; ``ES``, ``ET``, ``EL`` are errors. Other replies (tare, zero,
 serial number) are no readings.
 
-What cannot be detected: no check digit, so a changed digit reads as another value.
+What cannot be detected: transmission errors. A changed digit reads as another value.
 """
 
 from __future__ import annotations
 
 import re
 
-from acquire.addresses import Options
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.base import Parser, ParserSettings, Protocol, Reading
 from acquire.protocols.buffers import Line, LineParser, bad, number
 from acquire.protocols.units import is_unit
 from acquire.text import Message
@@ -45,15 +44,18 @@ class MtSicsParser(LineParser):
         return None if _OTHER.fullmatch(line.data) else bad(line)
 
 
-def make_parser(options: Options) -> Parser:
-    """No settings of its own."""
-    return MtSicsParser()
+class MtSicsSettings(ParserSettings):
+    """None."""
+
+    def parser(self, address: str) -> Parser:
+        """The one there is."""
+        return MtSicsParser()
 
 
 PROTOCOL = Protocol(
     name="mt-sics",
     summary="Mettler-Toledo; A&D in MT mode",
-    make_parser=make_parser,
+    settings=MtSicsSettings,
     mode="stream",
     commands={
         "poll": b"SI\r\n",

@@ -4,7 +4,7 @@ To a ``9`` the gauge answers one sign digit (1 tension, 0 compression) and six c
 ``1021.15`` is +21.15, ``0011.70`` is -11.70. No unit and no terminator: an answer is the seven bytes
 between two silences, so that a lost byte can never shift one answer into the next.
 
-What cannot be detected: no check digit, no overload mark (say ``capacity=``).
+What cannot be detected: transmission errors, and an overload (say ``capacity=``).
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from __future__ import annotations
 import math
 import re
 
-from acquire.addresses import Options
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.base import Parser, ParserSettings, Protocol, Reading
 from acquire.protocols.buffers import HeldBytes, number
 from acquire.text import Message
 
@@ -51,15 +50,18 @@ class SauterParser(Parser):
         self._held.clear(lost)
 
 
-def make_parser(options: Options) -> Parser:
-    """No settings of its own."""
-    return SauterParser()
+class SauterSettings(ParserSettings):
+    """None."""
+
+    def parser(self, address: str) -> Parser:
+        """The one there is."""
+        return SauterParser()
 
 
 PROTOCOL = Protocol(
     name="sauter",
     summary="Sauter FH/FL and clones (asked for each reading)",
-    make_parser=make_parser,
+    settings=SauterSettings,
     mode="poll",
     unit_on_line=False,
     flags_overload=False,

@@ -51,7 +51,7 @@ def _pylon() -> tuple[Any, Any]:
 # fmt: off
 @dataclass(frozen=True, slots=True)
 class PylonSettings:
-    """Of ``pylon:...``; None: whatever the camera has."""
+    """Settings of ``pylon:...``; None: whatever the camera has."""
 
     format: str | None = setting(str, None, "as of `genicam:`")
     width: str | None = setting(str, None, "region of the sensor", "px")

@@ -78,7 +78,7 @@ class SerialCell(Closing):
         self._last_t = -math.inf  # of the last sample
         self._last_read = math.nan
         self._watch, self._flood = (
-            LoadWatch(settings.timeout_s, self._report, clock()),
+            LoadWatch(settings.given.timeout, self._report, clock()),
             FloodWatch(self._report, clock()),
         )
         self._next_poll, self._polled = clock(), math.nan  # when the poll was sent whose answer is awaited
@@ -98,7 +98,7 @@ class SerialCell(Closing):
 
     def _wait_for_first(self) -> None:
         """Wait for a first good reading, since its unit decides whether this is a force at all."""
-        until = self._clock() + self._settings.wait_s
+        until = self._clock() + self._settings.given.wait
         seen = 0
         while self._clock() < until and not self._stop.is_set():
             if not self._link.connected and not self._reconnect():
@@ -108,13 +108,13 @@ class SerialCell(Closing):
                 if not math.isnan(reading.value):
                     self._check(reading)
                     return
-        if self._settings.wait_s > 0:
+        if self._settings.given.wait > 0:
             what = Message(
                 "{seen} lines came, none of them a reading of {name}", seen, self._settings.protocol.name
             )
             text = Message(
                 "no reading within {wait_s:g} s: {what}",
-                self._settings.wait_s,
+                self._settings.given.wait,
                 what if seen else Message("nothing came"),
             )
             self._report(
@@ -124,7 +124,7 @@ class SerialCell(Closing):
 
     def _check(self, reading: Reading) -> None:
         try:
-            self._scaling.check_unit(reading.unit or self._settings.unit or "")
+            self._scaling.check_unit(reading.unit or self._settings.given.unit or "")
         except ConfigError as error:
             shown = reading.raw.decode("ascii", "backslashreplace")
             raise ConfigError(
@@ -292,7 +292,7 @@ class SerialCell(Closing):
     def _hole(self) -> LoadSample:
         """A gap: forces are never interpolated across it."""
         self._last_t = max(self._clock(), self._last_t)
-        return LoadSample(self._last_t, math.nan, self._settings.unit or "", flags=LoadFlag.STALE)
+        return LoadSample(self._last_t, math.nan, self._settings.given.unit or "", flags=LoadFlag.STALE)
 
     # -- commands --------------------------------------------------------------------------
 
@@ -328,7 +328,7 @@ class SerialCell(Closing):
             self._refuse(Message("not tared: {why_not}; hold the load still, or force the tare", why_not))
             return False
         load, data = zero.load(), {"forced": bool(why_not), "undo": False}
-        wanted = self._settings.tare
+        wanted = self._settings.given.tare
         can = wanted == "device" or (wanted == "auto" and "tare" in self._settings.commands)
         if can and self._command("tare"):
             self._taring_until = self._clock() + TARE_S
@@ -373,7 +373,7 @@ class SerialCell(Closing):
         self._link.wake()
 
     def close(self) -> None:
-        """Stop and close the port; may be called again without effect."""
+        """Stop and close the port; idempotent."""
         self.stop()
         with self._busy:
             self._command("stop")

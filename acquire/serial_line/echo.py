@@ -89,6 +89,6 @@ class Echo:
             self._report(level, text)
 
     def _values(self, data: bytes) -> list[bool]:
-        """Of each reading in the bytes, whether it is a value."""
+        """Whether each reading in the bytes is a value."""
         parser = copy.deepcopy(self._parser)
         return [not math.isnan(reading.value) for reading in (*parser.feed(data), *parser.silence())]

@@ -27,7 +27,7 @@ from acquire.protocols.base import Parser, Protocol, Reading, find_protocol
 from acquire.protocols.units import is_mass, is_unit
 from acquire.serial_line.byte_ports import Port
 from acquire.serial_line.ports import PORT_ERRORS, LineSettings, open_port
-from acquire.text import Message
+from acquire.text.message import Message, joined
 
 FEWEST_LINES, ALIKE = 5, 0.8
 _NUMBER = re.compile(r"(?<![\w.])[-+]? *\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
@@ -267,7 +267,7 @@ def _try(line: LineSettings, name: str, settings: str, received: bytes, seconds:
         protocol=name,
         score=sum(_understood(reading) for reading in readings) / len(readings),
         lines=tuple(reading.raw for reading in readings[-3:]),
-        remark="; ".join(filter(None, [_reads(good), _remark(readings, text=name == "ascii")])),
+        remark=joined("; ", (_reads(good), _remark(readings, text=name == "ascii"))),
     )
 
 

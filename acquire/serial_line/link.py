@@ -296,7 +296,7 @@ class LoadWatch:
         self._report("warning", Message("{text}; check protocol, baud, column and decimal", text))
 
     def last_words(self, now: float) -> str:
-        """Of the last good sample: its force and age."""
+        """Force and age of the last good sample."""
         good = self._last_good
         if good is None:
             return Message("there was no good sample before")

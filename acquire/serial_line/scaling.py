@@ -145,7 +145,7 @@ class Scaling:
 
     def sample(self, reading: Reading, t: float, flags: LoadFlag = LoadFlag.NONE) -> LoadSample:
         """The sample of a reading that began at ``t``."""
-        unit = reading.unit or self._settings.unit or ""
+        unit = reading.unit or self._settings.given.unit or ""
         flags |= reading.flags
         force = reading.value
         if not math.isnan(force):
@@ -161,7 +161,7 @@ class Scaling:
             return math.nan, flags | LoadFlag.ERROR
         self._learn_step(value, factor)
         gross = self._settings.sign * (value - self._settings.zero) * factor
-        capacity = self._settings.capacity_N
+        capacity = self._settings.given.capacity
         if capacity is not None and abs(gross) > capacity:
             flags |= LoadFlag.OUT_OF_RANGE
             if not self._settings.protocol.flags_overload:
@@ -176,7 +176,7 @@ class Scaling:
     def _stepped(self, force: float, flags: LoadFlag) -> tuple[float, LoadFlag]:
         if math.isnan(force):
             return force, flags
-        limit = self._settings.max_step_N
+        limit = self._settings.given.max_step
         if limit is not None and abs(force - self._last_force) > limit:
             flags |= LoadFlag.STEP
         self._last_force = force
@@ -227,7 +227,7 @@ class Scaling:
             return self._settings.gain
         if not unit:
             raise ConfigError("the line names no unit; say it in the address, for example unit=N")
-        return newtons_per(unit, self._settings.mass_reads_force)
+        return newtons_per(unit, self._settings.given.mass_reads_force)
 
     def _watch(self, flags: LoadFlag, force: float) -> None:
         alarm = bool(flags & (BEYOND | LoadFlag.OUT_OF_RANGE))

@@ -7,13 +7,52 @@ from dataclasses import asdict, dataclass
 from typing import cast
 
 from acquire.addresses import Address, Options
+from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError
 from acquire.load_cell import Calibration, load_calibration
 from acquire.load_sample import LoadCellInfo
 from acquire.protocols.base import PROTOCOLS, Mode, Parser, Protocol, find_protocol
 from acquire.protocols.units import newtons_per
 from acquire.serial_line.ports import LineSettings
+from acquire.settings import FLAG, TEXT, choice, number, setting, take_settings, whole
 from acquire.text import Message
+
+USUAL = "of the line; where not given as usual with the protocol"
+UNITS = "of lines without one: N (newton), kN, mN, daN, kgf, gf, lbf, ozf; masses kg, g, mg, t, lb, oz"
+MODES = "listen: it sends by itself; stream: after a command; poll: each reading is asked for; else as usual"
+
+
+def _sign(word: str) -> int:
+    if word not in ("1", "+1", "-1"):
+        raise NotAllowed("1 or -1")
+    return int(word)
+
+
+# fmt: off
+@dataclass(frozen=True, slots=True)
+class SerialOptions:
+    """Of a serial load cell, whatever its protocol."""
+
+    protocol: str = setting(choice(*PROTOCOLS), "ascii", "what the device speaks")
+    baud: int | None = setting(whole(50, 12_000_000), None, USUAL, "1/s")
+    bytesize: int | None = setting(whole(5, 8), None, USUAL, "bit")
+    parity: str | None = setting(choice("N", "E", "O"), None, USUAL)
+    stopbits: str = setting(choice("1", "1.5", "2"), "1", "of the line")
+    unit: str | None = setting(TEXT, None, UNITS)
+    mass_reads_force: bool = setting(FLAG, False, "kg stand for a force, 1 kg for 9.80665 N; otherwise refused")
+    sign: int | None = setting(_sign, None, "-1 where compression reads positive: tension is positive in every result")
+    capacity: float | None = setting(number(1e-9), None, "samples beyond it are flagged", "N")
+    max_step: float | None = setting(number(1e-9), None, "a larger step between samples is flagged STEP", "N")
+    gain: float | None = setting(number(), None, "force = (value - zero) * gain, instead of a unit", "N")
+    zero: float | None = setting(number(), None, "value at no load; where not given that of calibration, or 0")
+    calibration: str | None = setting(TEXT, None, "a file of phasedic load-calibrate, with gain, zero and sign")
+    mode: str | None = setting(choice("listen", "stream", "poll"), None, MODES)
+    rate: float | None = setting(number(0.01, 1000), None, "of polling, or of an adjustable stream", "1/s")
+    tare: str = setting(choice("auto", "device", "software"), "auto", "where it is made; auto: in the device if it can")
+    timeout: float = setting(number(0.05, 3600), 2.0, "silence that is reported", "s")
+    wait: float = setting(number(0, 3600), 5.0, "for a first reading at the start", "s")
+    wire: bool = setting(FLAG, True, "transmission times are subtracted; no: a USB device whose speed has no meaning")
+# fmt: on
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,12 +62,11 @@ class SerialSettings:
     Attributes
     ----------
     address : str
+    given : SerialOptions
     line : LineSettings
     protocol : Protocol
     parser : Parser
     mode : "listen" | "stream" | "poll"
-    unit : str or None
-        Where the line names none.
     sign : int
         1 or -1.
     gain : float or None, N per unit of the line
@@ -37,37 +75,24 @@ class SerialSettings:
         Subtracted from the line's value before anything else.
     calibration : Calibration or None
         Where gain and zero come from, unless the address has them.
-    capacity_N, max_step_N : float or None, N
-    mass_reads_force : bool
-    timeout_s : float, s
-        Silence that is reported.
-    wait_s : float, s
-        How long opening waits for a first reading.
     rate : float, 1/s
         Of polling, or of the stream where the device lets choose.
     commands : mapping of str to bytes
-    tare : "auto" | "device" | "software"
     byte_time_s : float, s
     """
 
     address: str
+    given: SerialOptions
     line: LineSettings
     protocol: Protocol
     parser: Parser
     mode: Mode
-    unit: str | None
     sign: int
     gain: float | None
     zero: float
     calibration: Calibration | None
-    capacity_N: float | None
-    max_step_N: float | None
-    mass_reads_force: bool
-    timeout_s: float
-    wait_s: float
     rate: float
     commands: Mapping[str, bytes]
-    tare: str
     byte_time_s: float
 
 
@@ -80,61 +105,44 @@ def read_settings(address: Address) -> SerialSettings:
         Names the key and what is allowed; a mass as unit without leave.
     """
     options = Options(address)
-    protocol = find_protocol(options.choice("protocol", tuple(PROTOCOLS), "ascii"))
-    settings = _take(options, protocol)
-    if settings.gain is not None:
-        return settings
-    if settings.unit is not None:
-        newtons_per(settings.unit, settings.mass_reads_force)
-    elif not protocol.unit_on_line:
+    given = take_settings(SerialOptions, options)
+    protocol = find_protocol(given.protocol)
+    parser = protocol.make_parser(options)
+    calibration = load_calibration(given.calibration) if given.calibration else None
+    if calibration is not None and given.sign is not None:
+        raise ConfigError("{text}: leave out sign=, the calibration carries it", address.text)
+    gain, zero = given.gain, given.zero
+    if calibration is not None:
+        gain = calibration.gain if gain is None else gain
+        zero = calibration.zero if zero is None else zero
+    if gain is None and given.unit is not None:
+        newtons_per(given.unit, given.mass_reads_force)
+    elif gain is None and not protocol.unit_on_line:
         raise ConfigError(
             "{text}: {name} sends no unit; say the one on the display, unit=N", address.text, protocol.name
         )
-    return settings
-
-
-def _take(options: Options, protocol: Protocol) -> SerialSettings:
-    parser = protocol.make_parser(options)
-    mode = options.choice("mode", ("listen", "stream", "poll"), protocol.mode)
-    unit = options.text("unit")
-    calibration = _calibration(options)
-    gain = options.number("gain", calibration.gain if calibration else None)
-    sign = _sign(options, protocol.sign if gain is None else 1, calibration)
-    wire = options.flag("wire", True)
-    tare = options.choice("tare", ("auto", "device", "software"), "auto")
-    rate = options.number("rate", protocol.max_rate, minimum=0.01, maximum=1000)
-    limits = {key: options.number(key, minimum=1e-9) for key in ("capacity", "max_step")}
-    zero = options.number("zero", calibration.zero if calibration else 0.0)
-    timeout_s = options.number("timeout", 2.0, minimum=0.05, maximum=3600)
-    wait_s = options.number("wait", 5.0, minimum=0, maximum=3600)
-    commands = _commands(options, protocol, parser, mode, rate)
-    mass = options.flag("mass_reads_force")
-    line = _line(options, protocol)
+    mode = protocol.mode if given.mode is None else given.mode
+    rate = protocol.max_rate if given.rate is None else given.rate
+    line = _line(options, given, protocol)
     return SerialSettings(
-        address=options.address.text,
+        address=address.text,
+        given=given,
         line=line,
         protocol=protocol,
         parser=parser,
         mode=cast("Mode", mode),
-        unit=unit,
-        sign=sign,
+        sign=given.sign or (protocol.sign if gain is None else 1),
         gain=gain,
-        mass_reads_force=mass,
-        commands=commands,
-        tare=tare,
-        byte_time_s=line.byte_time_s if wire else 0.0,
-        zero=zero,
+        zero=0.0 if zero is None else zero,
         calibration=calibration,
-        capacity_N=limits["capacity"],
-        max_step_N=limits["max_step"],
-        timeout_s=timeout_s,
-        wait_s=wait_s,
         rate=rate,
+        commands=_commands(address, protocol, parser, mode, rate),
+        byte_time_s=line.byte_time_s if given.wire else 0.0,
     )
 
 
 def _commands(
-    options: Options, protocol: Protocol, parser: Parser, mode: str, rate: float
+    address: Address, protocol: Protocol, parser: Parser, mode: str, rate: float
 ) -> Mapping[str, bytes]:
     commands = {**protocol.commands, **parser.commands}
     if mode == "stream" and protocol.rates:
@@ -142,31 +150,13 @@ def _commands(
         commands["start"] = protocol.rates[min(at_least) if at_least else max(protocol.rates)]
     if mode == "poll" and "poll" not in commands:
         raise ConfigError(
-            "{text}: {name} has no command to poll with; use mode=listen", options.address.text, protocol.name
+            "{text}: {name} has no command to poll with; use mode=listen", address.text, protocol.name
         )
     return commands
 
 
-def _calibration(options: Options) -> Calibration | None:
-    path = options.text("calibration")
-    return load_calibration(path) if path else None
-
-
-def _sign(options: Options, default: int, calibration: Calibration | None) -> int:
-    sign = options.text("sign")
-    if sign is not None and calibration is not None:
-        raise ConfigError("{text}: leave out sign=, the calibration carries it", options.address.text)
-    if sign not in (None, "1", "+1", "-1"):
-        raise ConfigError("{text}: sign={sign} is not possible; allowed: 1 or -1", options.address.text, sign)
-    return int(sign) if sign else default
-
-
-def _line(options: Options, protocol: Protocol) -> LineSettings:
+def _line(options: Options, given: SerialOptions, protocol: Protocol) -> LineSettings:
     address = options.address
-    baud = options.integer("baud", protocol.baud, minimum=50, maximum=12_000_000)
-    bytesize = options.integer("bytesize", protocol.bytesize, minimum=5, maximum=8)
-    parity = options.choice("parity", ("N", "E", "O"), protocol.parity)
-    stopbits = float(options.choice("stopbits", ("1", "1.5", "2"), "1"))
     url = f"{address.scheme}:{address.target}" if address.scheme else address.target
     if not address.scheme:
         options.done()
@@ -180,7 +170,14 @@ def _line(options: Options, protocol: Protocol) -> LineSettings:
     rest = options.rest()
     if rest:
         url += "?" + "&".join(f"{key}={value}" for key, value in rest.items())
-    return LineSettings(url, baud, bytesize, parity, stopbits, protocol.silence_s)
+    return LineSettings(
+        url,
+        given.baud or protocol.baud,
+        given.bytesize or protocol.bytesize,
+        given.parity or protocol.parity,
+        float(given.stopbits),
+        protocol.silence_s,
+    )
 
 
 def describe(settings: SerialSettings, usb: str) -> LoadCellInfo:
@@ -199,19 +196,19 @@ def describe(settings: SerialSettings, usb: str) -> LoadCellInfo:
         protocol=s.protocol.name,
         clock="host",
         sign=s.sign,
-        capacity_N=s.capacity_N,
+        capacity_N=s.given.capacity,
         settings={
             "port": line.url,
             "line": Message(
                 "{baud} {bytesize}{parity}{stopbits:g}", line.baud, line.bytesize, line.parity, line.stopbits
             ),
             "mode": s.mode,
-            "unit": s.unit,
+            "unit": s.given.unit,
             "gain": s.gain,
             "zero": s.zero,
             "calibration": None if s.calibration is None else asdict(s.calibration),
-            "mass_reads_force": s.mass_reads_force,
-            "max_step_N": s.max_step_N,
+            "mass_reads_force": s.given.mass_reads_force,
+            "max_step_N": s.given.max_step,
             "byte_time_s": s.byte_time_s,
             "usb": usb,
         },

@@ -21,7 +21,7 @@ from acquire.text import Message
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class SessionSettings:
-    """Of ``session:``: none; what was recorded is not changed."""
+    """``session:`` has no settings: a recording is not changed."""
 
 
 class _SessionDevice(Closing):
@@ -36,7 +36,7 @@ class _SessionDevice(Closing):
         self._stopped = True
 
     def close(self) -> None:
-        """Close the file; may be called again without effect."""
+        """Close the file; idempotent."""
         self._stopped = True
         self._session.close()
 

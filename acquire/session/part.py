@@ -260,7 +260,7 @@ class SessionPart(Closing):
                 still_reading()
 
     def close(self) -> None:
-        """Close the file; may be called again without effect."""
+        """Close the file; idempotent."""
         self.file.close()
 
 

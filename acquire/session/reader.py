@@ -81,7 +81,7 @@ class RotatingWriter(Closing):
 
     @property
     def bytes_written(self) -> int:
-        """Of all files."""
+        """Bytes written to all files."""
         return self._finished_bytes + self._writer.bytes_written
 
     def free_bytes(self) -> int:
@@ -302,7 +302,7 @@ class Session(Closing):
             part.refresh()
 
     def close(self) -> None:
-        """Close the files; may be called again without effect."""
+        """Close the files; idempotent."""
         for part in self._parts:
             part.close()
 

@@ -17,6 +17,7 @@ from acquire.events import Event, EventKind, Level
 from acquire.session.layout import SessionInfo
 from acquire.session.part import SessionPart
 from acquire.session.writer import SessionWriter
+from acquire.text import Message
 from acquire.text.printable import counted
 
 Item = TypeVar("Item")
@@ -45,15 +46,13 @@ class Recovered:
 
     def line(self) -> str:
         """One line for a person."""
-        saved = (
-            f"{self.path}: {self.frames} frames, {self.bursts} bursts, {self.load_samples} load samples,"
-            f" {self.events} events"
+        saved = Message(
+            "{path}: {frames} frames, {bursts} bursts, {load_samples} load samples, {events} events",
+            *(self.path, self.frames, self.bursts, self.load_samples, self.events),
         )
-        return (
-            f"{saved}; {counted(len(self.unreadable), 'thing')} could not be read"
-            if self.unreadable
-            else saved
-        )
+        if not self.unreadable:
+            return saved
+        return saved + Message("; {what} could not be read", counted(len(self.unreadable), "part"))
 
 
 def recover(source: str | os.PathLike[str], target: str | os.PathLike[str] | None = None) -> Recovered:

@@ -264,7 +264,7 @@ class SessionWriter(Closing):
         return self._watch.path.parent
 
     def close(self) -> None:
-        """Write what is held and close the file; may be called again without effect.
+        """Write what is held and close the file; idempotent.
 
         Raises
         ------

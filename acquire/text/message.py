@@ -10,9 +10,10 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
+from numbers import Real
 from typing import Any, Self
 
-from acquire.text.quantity import Amount
+from acquire.text.quantity import MINUS, Amount, number
 
 FIELD = re.compile(r"\{\{|\}\}|\{(\w+)(?::((?:(?!\d{3})[^{}])*))?\}")
 """A named field of a template, with its format (of a file's, no width of a gigabyte), or a doubled brace, which is one
@@ -33,13 +34,13 @@ def filled(template: str, values: Mapping[str, Any], shown: Callable[[Any, str],
 
 
 def formatted(value: Any, spec: str) -> str:
-    """As ``format``, but no exponent for what a person reads as a whole number: 6350, not 6.35e+03."""
+    """As ``format``, but 6 350, not 6.35e+03, and a true minus; a value without digits (``g``) may be typed again."""
+    if isinstance(value, Real) and re.fullmatch(r"\.\d+f", spec):
+        return number(float(value), int(spec[1:-1]))
     text = format(value, spec)
-    return (
-        format(float(text), spec[: spec.startswith("+")] + ".0f")
-        if "e+0" in text and spec.endswith("g")
-        else text
-    )
+    if "e+0" in text and spec.endswith("g"):
+        return "+" * (spec.startswith("+") and value > 0) + number(float(text))
+    return text.replace("-", MINUS, 1) if len(spec) > 1 and isinstance(value, Real) and value < 0 else text
 
 
 @cache
@@ -113,7 +114,8 @@ def word(text: str) -> str:
 
 def _words_of(error: Exception) -> str:
     """The message of an error of the program, else what it or the system says."""
-    return getattr(error, "text", None) or word(getattr(error, "strerror", None) or str(error))
+    told = next((one for one in error.args[:1] if isinstance(one, Message)), None)
+    return getattr(error, "text", None) or told or word(getattr(error, "strerror", None) or str(error))
 
 
 def _made(template: str, values: Mapping[str, Any]) -> Message:

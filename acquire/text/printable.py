@@ -48,7 +48,7 @@ def brief(text: object) -> str:
 
 def counted(n: int, noun: str) -> str:
     """As "1 frame" or "3 frames"."""
-    return Message(f"{{n}} {noun}{'' if n == 1 else 's'}", n)
+    return Message(f"{{n}} {noun}{'' if n == 1 else 's'}", Amount("count", n))
 
 
 def duration(seconds: float) -> str:

@@ -116,7 +116,8 @@ class V4L2Driver:
 
     def _fetched(self) -> Picture | None:
         try:
-            stamp, image = self._device.fetch(self._take)
+            with self._device.fetch() as (stamp, content):
+                image = self._take(content)
         except BlockingIOError:
             self._wakes += 1
             if self._wakes > EMPTY_WAKES:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -157,24 +157,22 @@ class V4L2Device:
 
     # What it offers
 
-    def _enumerate(self, code: int, make: Callable[[int], Any]) -> Iterator[Any]:
+    def _enumerate(self, code: int, kind: type[Any], **fields: int) -> Iterator[Any]:
         for index in range(1000):
-            argument = make(index)
+            argument = kind(index=index, **fields)
             if not self.tried(code, argument):
                 return
             yield argument
 
     def formats(self) -> list[FormatOffer]:
         """All pixel formats."""
-        found = self._enumerate(api.ENUM_FMT, lambda k: api.FormatDescription(index=k, type=api.CAPTURE))
+        found = self._enumerate(api.ENUM_FMT, api.FormatDescription, type=api.CAPTURE)
         return [FormatOffer(api.fourcc_text(item.pixelformat), _text(item.description)) for item in found]
 
     def sizes(self, fourcc: str) -> list[SizeRange]:
         """Frame sizes of a pixel format; empty where the driver does not list them."""
-        code = api.fourcc(fourcc)
-        found = self._enumerate(api.ENUM_FRAMESIZES, lambda k: api.FrameSize(index=k, pixel_format=code))
         sizes = []
-        for item in found:
+        for item in self._enumerate(api.ENUM_FRAMESIZES, api.FrameSize, pixel_format=api.fourcc(fourcc)):
             sizes.append(_size_range(item))
             if item.type != api.SIZE_DISCRETE:
                 break
@@ -182,13 +180,9 @@ class V4L2Device:
 
     def rates(self, fourcc: str, width: int, height: int) -> list[float]:
         """Frame rates, 1/s, highest first; the two ends where a whole range is offered."""
-        code = api.fourcc(fourcc)
-
-        def make(index: int) -> api.FrameInterval:
-            return api.FrameInterval(index=index, pixel_format=code, width=width, height=height)
-
+        size = {"pixel_format": api.fourcc(fourcc), "width": width, "height": height}
         rates: list[float] = []
-        for item in self._enumerate(api.ENUM_FRAMEINTERVALS, make):
+        for item in self._enumerate(api.ENUM_FRAMEINTERVALS, api.FrameInterval, **size):
             if item.type == api.INTERVAL_DISCRETE:
                 rates.append(_rate(item.interval.discrete))
             else:
@@ -198,7 +192,7 @@ class V4L2Device:
 
     def inputs(self) -> list[str]:
         """Names of its inputs."""
-        return [_text(item.name) for item in self._enumerate(api.ENUMINPUT, lambda k: api.Input(index=k))]
+        return [_text(item.name) for item in self._enumerate(api.ENUMINPUT, api.Input)]
 
     # How it is set up
 
@@ -265,8 +259,9 @@ class V4L2Device:
         """Whether a picture (or an error) is there within that time."""
         return self._kernel.poll(self.fd, timeout_s)
 
-    def fetch(self, take: Callable[[memoryview], Any]) -> tuple[Stamp, Any]:
-        """The next picture: ``take`` copies it out of the mapped buffer, which goes back at once.
+    @contextlib.contextmanager
+    def fetch(self) -> Iterator[tuple[Stamp, memoryview]]:
+        """The next picture: its stamp, and the mapped buffer to copy it from, which goes back at the end.
 
         Raises
         ------
@@ -277,12 +272,10 @@ class V4L2Device:
         """
         buffer = api.Buffer(type=api.CAPTURE, memory=api.MMAP)
         self.request(api.DQBUF, buffer)
-        stamp = _stamp(buffer)
         used = buffer.bytesused or buffer.length
         with memoryview(self._maps[buffer.index]) as whole, whole[:used] as content:
-            taken = take(content)
+            yield _stamp(buffer), content
         self.request(api.QBUF, self._buffer(buffer.index))
-        return stamp, taken
 
     def stop(self) -> None:
         """End the stream and give the buffers back: maps first, since they keep the device busy."""
@@ -298,7 +291,7 @@ class V4L2Device:
                 self.request(api.REQBUFS, api.RequestBuffers(type=api.CAPTURE, memory=api.MMAP))
 
     def close(self) -> None:
-        """Give everything back; may be called again without effect."""
+        """Give everything back; idempotent."""
         if self._fd is not None:
             self.stop()
             fd, self._fd = self._fd, None

@@ -24,7 +24,7 @@ def _control(word: str) -> int:
 # fmt: off
 @dataclass(frozen=True, slots=True)
 class V4L2Settings:
-    """Of ``/dev/video0?...``."""
+    """Settings of ``/dev/video0?...``."""
 
     format: str | None = setting(_fourcc, None,
         "four-character code; default the best raw grey format (Y12, Y14, Y10, Y16, GREY), then YUYV, UYVY, then a"

@@ -2,12 +2,7 @@
 
 numba keeps compiled code beside this package where that folder can be written, else in the
 user's cache folder; NUMBA_CACHE_DIR overrides both. Importing this module imports numba, so the
-rest of the package does that only when a kernel is made.
-
-Numba's files of compiled loops, each with a checksum behind it: one that is cut or damaged is compiled anew.
-
-A power cut leaves files that are empty, cut, or of zeros. Numba would raise an error on them, or run what they hold.
-It reads the files of this module too, since it ignores what follows. ``acquire.compiled_loops`` does the same.
+rest of the package does that only when a kernel is made. Its files are checked (``acquire.compiled_loops``).
 """
 
 from __future__ import annotations
@@ -16,60 +11,18 @@ import hashlib
 import logging
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from functools import cache, lru_cache
+from collections.abc import Callable, Iterable
+from functools import lru_cache
 from pathlib import Path
 from threading import Lock
 from typing import Any, TypeVar
 
 import numba
-from numba.core.caching import IndexDataCacheFile
 from numba.np.ufunc import parallel as numba_threads
 from numpy.typing import NDArray
 
+from acquire.compiled_loops import KeptFile
 from analysis.compiled.layer import give_start_lock, threading_layer
-
-_DIGEST = 32  # bytes of SHA-256
-
-
-class _Pieces(list[bytes]):
-    """A file in memory."""
-
-    write = list.append
-
-
-class CheckedFile(IndexDataCacheFile):  # type: ignore[misc]
-    """Index and data of one function; what is not whole is as if it were not there."""
-
-    def _load_index(self) -> dict[Any, str]:
-        index = super()._load_index() if is_whole(self._index_path) else {}
-        return {key: name for key, name in index.items() if is_whole(self._data_path(name))}
-
-    @contextmanager
-    def _open_for_write(self, filepath: str) -> Iterator[_Pieces]:
-        pieces = _Pieces()
-        yield pieces
-        data = b"".join(pieces)
-        with super()._open_for_write(filepath) as file:
-            file.write(data + hashlib.sha256(data).digest())
-
-
-def is_whole(path: str) -> bool:
-    """Whether the file is there, with the checksum that it was written with."""
-    try:
-        status = os.stat(path)  # noqa: PTH116 - a string, as numba has it
-        return _matches(path, status.st_mtime_ns, status.st_size)
-    except OSError:
-        return False
-
-
-@cache
-def _matches(path: str, time: int, size: int) -> bool:
-    """Read once a process and version of the file."""
-    data = Path(path).read_bytes()
-    return hashlib.sha256(data[:-_DIGEST]).digest() == data[-_DIGEST:]
-
 
 # Threads that wait by spinning keep the other threads of a live test, and other programs, from their cores: with
 # another program at work a frame took twice as long as with threads that soon fall asleep. Read when GNU OpenMP is
@@ -148,7 +101,7 @@ def stamped(dispatcher: Any) -> Any:
     """
     try:
         file = _cache_file(dispatcher)
-        file.__class__ = CheckedFile
+        file.__class__ = KeptFile
         file._source_stamp = _own_stamp()
         # An index of other modules is not even read: it may name types that have moved.
         file._version = f"{numba.__version__}, loops {_own_stamp_digest()}"

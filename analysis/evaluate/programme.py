@@ -114,7 +114,7 @@ def _found(curve: Curve) -> tuple[Kind, str, int | None]:
 
 
 def _noise(curve: Curve) -> float:
-    """Of the stress, Pa: what follows the strain is none, of a few samples a cycle either."""
+    """Noise of the stress, Pa: what follows the strain is none, of a few samples a cycle either."""
     both = np.isfinite(curve.strain) & np.isfinite(curve.stress)
     strain, stress = curve.strain[both], curve.stress[both]
     sigma = noise(curve.stress)

@@ -19,6 +19,7 @@ from analysis.evaluate.figure import Figure, quantile
 
 Indices = NDArray[np.intp]
 
+ENDED = Message("the test ended before the stress fell")
 # Annex A: a yield point falls by 0.5 % and is not passed again for 0.05 % strain
 _DROP, _RANGE = 0.005, 0.0005
 # Strain after ReH: its undershoot, and where ReL is looked for (clause 12)
@@ -99,7 +100,10 @@ def yield_point(loading: Loading, line: FittedLine) -> Yield:
 
 
 def tensile_strength(curve: Curve) -> Figure:
-    """Rm: the highest stress up to the break (3.10.1), whether strain is known there or not, Pa."""
+    """Rm: the highest stress up to the break (3.10.1), whether strain is known there or not, Pa.
+
+    A bound where the test ended before the stress fell.
+    """
     loading = Loading.of(replace(curve, strain=np.zeros_like(curve.stress)))
     if not loading.n:
         return Figure.none(Message("no stress is known"))
@@ -109,9 +113,7 @@ def tensile_strength(curve: Curve) -> Figure:
     if found.low <= 0:
         return Figure.none(Message("no tensile stress beyond its noise is known"))
     rises = not loading.broke and loading.level[-1] >= loading.level.max() - 3 * loading.noise_stress
-    return (
-        replace(found, why=Message("so far: the test ended while the stress still rose")) if rises else found
-    )
+    return found.remarked(ENDED).at_least() if rises else found
 
 
 def highest_stress(loading: Loading, at: int) -> Figure:
@@ -145,7 +147,7 @@ def strain_at_top(loading: Loading) -> Figure:
     flat = np.flatnonzero(loading.level >= loading.level.max() - doubt)
     first, last = int(flat[0]), int(flat[-1])
     if last == loading.n - 1 and not loading.broke:
-        return Figure.none(Message("the test ended before the stress fell"))
+        return Figure.none(ENDED)
     low, high = float(loading.course[first]), float(loading.course[last])
     # A neck beside the gauge lets that shorten: the highest stress may have more strain than the end of the flat top.
     high = max(high, float(loading.strain[loading.top])) if first <= loading.top <= last else high

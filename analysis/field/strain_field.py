@@ -267,6 +267,13 @@ class StrainField:
             variance += self.common.variance(name)
         return np.asarray(np.sqrt(np.maximum(variance, 0, out=variance), out=variance))
 
+    def own_share(self, name: str) -> float:
+        """Share of the variance of a value that is not of the reference, of a typical ZOI; 1 where none is known."""
+        sigma = self.sigma(name)
+        known = self.ok & (sigma > 0)
+        shares = (self.sigma(name, "current")[known] / sigma[known]) ** 2
+        return float(np.median(shares)) if shares.size else 1.0
+
     def _variance(self, name: str, covariance: NDArray[np.float32]) -> Floats:
         (first, factor), *others = products(name)
         out: Floats = covariance[first].astype(np.float64)

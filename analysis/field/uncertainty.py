@@ -39,12 +39,12 @@ class CommonError:
     covariance: Floats
 
     def variance(self, name: str) -> Floats:
-        """Of a value of each ZOI, (R, C)."""
+        """Variance of a value of each ZOI, (R, C)."""
         of_value = sum(share * self.shapes[:, i] for i, share in combination(name).items())
         return np.asarray(np.einsum("krc,kl,lrc->rc", of_value, self.covariance, of_value))
 
     def variance_of_sum(self, weights: Floats) -> float:
-        """Of the sum of the six parameters of all ZOIs times ``weights`` (6, R, C)."""
+        """Variance of the sum of the six parameters of all ZOIs times ``weights`` (6, R, C)."""
         made = np.einsum("kirc,irc->k", self.shapes, weights)
         return float(made @ self.covariance @ made)
 
@@ -58,7 +58,7 @@ class CommonError:
         return CommonError(np.concatenate([self.shapes, other.shapes]), covariance)
 
     def part(self, rows: slice, columns: slice) -> CommonError:
-        """That of some rows and columns of ZOIs."""
+        """The error of some rows and columns of ZOIs."""
         return CommonError(self.shapes[:, :, rows, columns], self.covariance)
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
 from analysis.compiled.forked import FORK_CHECK
 from analysis.field import Motion, Roi, Status, StrainField, ZoiGrid, profile
 from analysis.kernel.images import as_image
@@ -79,7 +80,7 @@ def threads() -> str:
     """How many threads the loops have, and by which library: "2 by OpenMP" and the like."""
     import numba
 
-    return f"{numba.get_num_threads()} by {threading_library()}"
+    return Message("{n} by {library}", numba.get_num_threads(), threading_library())
 
 
 def threading_library() -> str:
@@ -118,7 +119,7 @@ def warm_up(part: str = ALL, kinds: Sequence[str] = PICTURE_KINDS, *, phase: boo
         _phase()
         return
     if not_compiled(kinds, phase=phase):
-        log.info("compiling the kernel for this machine, once, about %d s", COMPILE_SECONDS)
+        log.info(Message("compiling the kernel for this machine, once, about {s} s", COMPILE_SECONDS))
     _everything(kinds, phase)
 
 

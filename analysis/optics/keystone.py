@@ -47,7 +47,7 @@ class Keystone(NamedTuple):
 
     @property
     def rise(self) -> float:
-        """Of both; 0 where they differ."""
+        """Rise of both; 0 where they differ."""
         return alike(self.by_u, self.by_v, 0.0)
 
     def tilt(self, focal_px: float) -> float:

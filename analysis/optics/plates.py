@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
 from analysis.evaluate import AreaStrain
 from analysis.evaluate.area.affine import Places, covariance_of
 from analysis.field import Block, CommonError, Roi, StrainField, ZoiGrid, fixed_sums, part_of
@@ -47,7 +48,7 @@ class PlateLayout:
 
     @classmethod
     def of(cls, grid: ZoiGrid, boxes: Mapping[str, Box]) -> PlateLayout:
-        """Of the grid of a test (``without_plates``) and the ``boxes`` (x, y, width, height, px) of the plates.
+        """Layout for the grid of a test (``without_plates``) and the ``boxes`` (x, y, width, height, px) of the plates.
 
         Raises
         ------
@@ -91,10 +92,11 @@ def _span(name: str, grid: ZoiGrid, box: Box) -> tuple[tuple[int, int], tuple[in
 
     rows, columns = along(y, height, grid.roi.y), along(x, width, grid.roi.x)
     if min(rows[1] - rows[0], columns[1] - columns[0]) < MIN_ZOIS:
-        raise ValueError(
-            f"plate {name} of {width:g} x {height:g} px has no room for {MIN_ZOIS} x {MIN_ZOIS} ZOIs of {grid.size} px,"
-            f" {grid.step} px apart; make it larger"
+        text = Message(
+            "plate {name} of {width:g} x {height:g} px has no room for {n} x {n} ZOIs of {size} px; make it larger",
+            *(name, width, height, MIN_ZOIS, grid.size),
         )
+        raise ValueError(text)
     return rows, columns
 
 
@@ -128,7 +130,7 @@ _VARIANCES = [0, 15]  # of u and v among the 21 pairs
 
 
 class _Weights(NamedTuple):
-    """Of one plate and model: (K, 6, R, C), and what the variances of u and v add, (K, K, 2, R, C)."""
+    """Weights of one plate and model: (K, 6, R, C), and what the variances of u and v add, (K, K, 2, R, C)."""
 
     weights: Floats
     noise: Floats

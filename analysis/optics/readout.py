@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from acquire.text import Message
 from analysis.field import CommonError, StrainField
 from analysis.optics.plane import affine_values
 
@@ -94,7 +95,7 @@ _KEPT = 0.1
 _CLEAR = 5.0  # over what noise explains by chance
 _NO_BANDS = "no bands that move from picture to picture"
 _FINE = 60  # steps of the golden section
-_LITTLE = "too little motion; move the specimen to and fro, faster, at a steady distance"
+_LITTLE = Message("too little motion; move the specimen to and fro, faster, at a steady distance")
 _JUMP = 0.02  # of the highest velocity: two ways to find it agree so far where it is steady
 _LEAST_POWER = 1e-12  # of a velocity, (px/s)^2
 _GOLDEN = (math.sqrt(5) - 1) / 2
@@ -127,7 +128,7 @@ def readout_of_bands(profiles: ArrayLike, lamp_Hz: float) -> Readout:
     """
     seen = np.asarray(profiles, np.float64)
     if len(seen) < MIN_PICTURES:
-        raise ValueError(f"{len(seen)} pictures; it takes {MIN_PICTURES}")
+        raise ValueError(Message("{n} pictures; it takes {needed}", len(seen), MIN_PICTURES))
     ratio = seen / np.maximum(seen.mean(axis=0), 1e-9)
     ratio -= ratio.mean(axis=1, keepdims=True)
     bands = _bands(ratio)
@@ -205,9 +206,8 @@ def readout_of_motion(
     times, u, v, du_dy, dv_dy = (np.asarray(one, np.float64) for one in (t, *moved, *along))
     known = np.isfinite(u + v + du_dy + dv_dy)
     if known.sum() < MIN_PICTURES or not np.all(np.diff(times[known]) > 0):
-        raise ValueError(
-            f"{int(known.sum())} pictures with a value, one after the other; it takes {MIN_PICTURES}"
-        )
+        n = int(known.sum())
+        raise ValueError(Message("{n} pictures with a value in order; it takes {needed}", n, MIN_PICTURES))
     times, u, v, du_dy, dv_dy = (one[known] for one in (times, u, v, du_dy, dv_dy))
     still = np.stack([np.ones(len(u)), *(_unit(one) ** k for one in (u, v) for k in (1, 2))], axis=1)
     found = [_slope(times, one, still, slope) for one, slope in ((u, du_dy), (v, dv_dy))]

@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.text import Message
 from analysis.field import PAIR_INDEX, CommonError, StrainField
 from analysis.optics.lens import LENS_NAMES, LensModel
 from analysis.optics.plane import MODELS, ApparentMotion, affine_values
@@ -145,10 +146,11 @@ def lens_of_shifts(
     """
     everywhere = np.logical_and.reduce([field.ok for field in fields]) if fields else np.zeros((0, 0), bool)
     if len(fields) < MIN_PICTURES or everywhere.sum() < MIN_ZOIS:
-        raise ValueError(
-            f"{len(fields)} shifted pictures with {int(everywhere.sum())} ZOIs that all of them show; it takes"
-            f" {MIN_PICTURES} and {MIN_ZOIS}"
+        text = Message(
+            "{n} shifted pictures with {zois} ZOIs that all of them show; it takes {pictures} and {needed}",
+            *(len(fields), int(everywhere.sum()), MIN_PICTURES, MIN_ZOIS),
         )
+        raise ValueError(text)
     grid = fields[0].grid.subset(active=everywhere)
     pictures = [
         _Picture.of(replace(one, grid=grid, status=np.where(everywhere, one.status, 5))) for one in fields

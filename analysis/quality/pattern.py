@@ -80,7 +80,7 @@ def exposure(pixels: NDArray[Any], top: int) -> Exposure:
 
 
 def _percentile(counts: NDArray[np.intp], share: float) -> float:
-    """Of values that occur ``counts`` times, as ``np.percentile`` has it."""
+    """Percentile of values that occur ``counts`` times, as ``np.percentile`` has it."""
     upto = counts.cumsum()
     place = share * (int(upto[-1]) - 1)
     below = math.floor(place)

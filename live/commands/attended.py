@@ -41,7 +41,7 @@ def attended(config: Config, screen: Screen, stop: StopSignal) -> Iterator[Calla
 
         if port is not None:
             stack.callback(port.close)
-        stack.enter_context(signals(lambda: stop.request(INTERRUPTED), screen.print))
+        stack.enter_context(signals(lambda: stop.request(INTERRUPTED), screen))
         yield attach
 
 

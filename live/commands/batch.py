@@ -86,7 +86,7 @@ def command(arguments: argparse.Namespace) -> int:
         scheduler=arguments.scheduler,
     )
     screen, stopping = TerminalScreen(), threading.Event()
-    with signals(stopping.set, screen.print):
+    with signals(stopping.set, screen):
         done = run_campaign(request, screen, stopping)
     for path in done.files:
         screen.print(f"  {path}")

@@ -47,6 +47,7 @@ from live.setup.check.check_list import CheckFigures, examine, table_lines
 from live.setup.check.quick_check import QUICK_FRAMES, QuickCheck, QuickChecker, RollingFrames
 from live.setup.check.sample import take
 from live.setup.check.verdict import DEFAULT_TARGET, check_lines
+from live.setup.compiling import Stopping
 from live.setup.devices import check_load_port, open_load
 from live.setup.frames import camera_of, report_warnings
 from live.setup.placement import with_auto_gauges
@@ -64,8 +65,8 @@ CLOSE_S = 5.0
 MAX_NOTES = 4  # the newest
 
 
-def watch(config: Config, target: float | None, screen: Screen, stopped: Callable[[], bool]) -> CheckFigures:
-    """Repeat the check until ``stopped`` or the camera ends; returns the figures of the last frames.
+def watch(config: Config, target: float | None, screen: Screen, stopping: Stopping) -> CheckFigures:
+    """Repeat the check until ``stopping`` is set or the camera ends; returns the figures of the last frames.
 
     Raises
     ------
@@ -80,7 +81,7 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
         _viewed(config, notes) as view,
     ):
         due = time.monotonic()
-        while not (stopped() or rolling.over):
+        while not (stopping.is_set() or rolling.over):
             stack = rolling.newest(QUICK_FRAMES)
             if stack is not None:
                 quick = checker.check(stack)
@@ -97,7 +98,7 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
                 display.lines(shown, short_line(quick, lines))
                 view(rolling, quick, lines)
             due = max(due + PERIOD_S, time.monotonic() - PERIOD_S)  # a check that took longer is made up for
-            while not (stopped() or rolling.over) and time.monotonic() < due:
+            while not (stopping.is_set() or rolling.over) and time.monotonic() < due:
                 time.sleep(0.02)
         last = rolling.last(frames)
     display.end()
@@ -107,16 +108,19 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
 def peak_line(quick: QuickCheck) -> str:
     """The sharpness as a bar that ends at the peak."""
     if not math.isfinite(quick.of_peak):
-        return "sharpness: no pattern is visible"
+        return Message("sharpness: no pattern is visible")
     full = round(BAR_LENGTH * min(quick.of_peak, 1.0))
     bar = "#" * full + "." * (BAR_LENGTH - full)
-    return f"sharpness {quick.figures.sharpness:.3f} [{bar}] {quick.of_peak:.0%} of the peak {quick.peak:.3f}"
+    return Message(
+        "sharpness {sharpness:.3f} [{bar}] {share:.0%} of the peak {peak:.3f}",
+        *(quick.figures.sharpness, bar, quick.of_peak, quick.peak),
+    )
 
 
 def blur_line(quick: QuickCheck) -> list[str]:
     """The blur since the sharpest picture; nothing where it is not known."""
     text = quick.blur.text
-    return [f"          {text} than the sharpest picture so far"] if text else []
+    return [Message("          {blur} than the sharpest picture so far", text)] if text else []
 
 
 def short_line(quick: QuickCheck, lines: list[CheckLine]) -> str:
@@ -257,7 +261,7 @@ def command(arguments: argparse.Namespace) -> int:
                 Message("--watch looks at the {first} only; without it all cameras are checked", word(first))
             )
         with interrupts() as stop:
-            figures = watch(one, target, screen, stop.is_set)
+            figures = watch(one, target, screen, stop)
         rate = write_rate(figures.stack, config)
         ready = _shown(figures, one, target, snapshots[first], screen, rate)
         screen.print(_verdict([figures], ready))

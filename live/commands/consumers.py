@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 
@@ -55,7 +55,7 @@ def signals_of(
                 )
                 screen.print(told)
         opened.pop_all()
-    means = ActionMeans(screen.bell, about.end, outputs)
+    means = ActionMeans(screen, about.end, outputs)
     alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]
     return [*_alarm_watch(alarms, about, run_state, joint), *outputs]
 
@@ -69,17 +69,8 @@ def _alarm_watch(
 ) -> list[Consumer]:
     if not alarms:
         return []
-    values, of_machine = ChannelValues(about.start.monotonic, run_state.snapshot), run_state.health.channels
-    if joint is None:
-        return [AlarmWatch(alarms, values, of_machine, run_state.alarms, run_state.event_log)]
-    both = joint
-
-    def channels(now: float) -> dict[str, float]:
-        return of_machine(now) | both.read(about.start.monotonic)
-
-    return [
-        AlarmWatch(alarms, values, channels, run_state.alarms, run_state.event_log, lost=lambda: both.lost)
-    ]
+    values = ChannelValues(about.start.monotonic, run_state)
+    return [AlarmWatch(alarms, values, run_state, joint=joint)]
 
 
 def _lines(about: RunInfo, run_state: RunState, joint: JointChannels | None) -> LineFormat:
@@ -92,8 +83,7 @@ def _lines(about: RunInfo, run_state: RunState, joint: JointChannels | None) -> 
         *(() if config.specimen.area_m2 else ("stress_MPa",)),
     }
     channels = [channel for channel in wanted if channel not in absent]
-    more = dict if joint is None else partial(joint.read, start)
-    return LineFormat(ChannelValues(start, run_state.snapshot, more), channels, config.strain_out.format)
+    return LineFormat(ChannelValues(start, run_state, joint), channels, config.strain_out.format)
 
 
 def _tcp(config: Config, lines: LineFormat) -> StrainOut | None:
@@ -178,14 +168,15 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
 
     def serving(view: View) -> None:
         run_state.health.view_port = view.port
-        _announce(view, v.spawn, screen, lambda text: tell(text, "warning"))
+        _announce(view, v.spawn, screen, run_state)
 
     port = v.port if v.enabled else None
     return View(setup, port=port, rrd=rrd, notify=tell, on_serving=serving)
 
 
-def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], None]) -> None:
+def _announce(view: View, spawn: bool, screen: Screen, run_state: RunState) -> None:
     """Open the viewer if there is a display; else print how to open it."""
+    trouble = partial(_emit, run_state, "view", level="warning")
     if spawn and view.port is not None and spawn_viewer(view.port, trouble) is not None:
         screen.print(Message("the viewer opens in its own window"))
         return

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from acquire.addresses import parse_address, with_setting
 from acquire.errors import LOSS
 from acquire.frame import Frame
-from acquire.text import Message
+from acquire.text.message import Message, word
+from acquire.text.quantity import Amount
 from analysis import PICTURE_KINDS
 from analysis.evaluate import AreaStrain
 from analysis.field import Status, StrainField, Sums
@@ -30,7 +31,7 @@ from live.commands.options import add_measure, add_options, configured
 from live.commands.run import finish, run_attended
 from live.config.loading import Config
 from live.config.values import AUTO
-from live.pipeline.consumer import Consumer
+from live.pipeline.consumer import Consumer, Screen
 from live.pipeline.measurement import AXIAL, Measurement
 from live.results.figures import tensile_table
 from live.results.folder import check_folder
@@ -78,17 +79,17 @@ def command(arguments: argparse.Namespace) -> int:
     config = configured(arguments, _defaults(arguments))
     check_folder(config.output.dir)
     # All that the next commands need too: 8-bit pictures, and a batch.
-    compile_ahead(PICTURE_KINDS, phase=True, show=screen.status)
+    compile_ahead(PICTURE_KINDS, phase=True, screen=screen)
     config = fitting(config)
     collector, operator = MeansCollector(), Operator(config.output.seconds)
     # The whole picture is specimen: it is only looked at where gauges are to be placed.
-    with located(config, screen.print) if config.measure.gauges == AUTO else nullcontext(config) as config:
+    with located(config, screen) if config.measure.gauges == AUTO else nullcontext(config) as config:
         test = run_attended({"": config}, screen, {"": [collector, operator]}, operator.attend)
     finish(test, screen, verbose=arguments.verbose)
     outcome = test.cameras[""]
     if outcome.rig.specimen is None or not collector.measurements:
         return outcome.exit_code
-    code = compare(outcome, collector, config, screen.print)
+    code = compare(outcome, collector, config, screen)
     return code if code == 1 else outcome.exit_code or code
 
 
@@ -272,7 +273,7 @@ class ZoiTruth:
 
 
 def _product(a: Array, b: Array) -> Array:
-    """Of two matrices, by this thread alone: those of BLAS wait for each other on a busy machine."""
+    """Product of two matrices, by this thread alone: threads of BLAS wait for each other on a busy machine."""
     return np.asarray(np.einsum("ij,jk->ik", a, b))
 
 
@@ -293,9 +294,7 @@ def middle_of(specimen: VirtualSpecimen, times: Array) -> float:
     return float(np.interp(strain.mean(), strain, times))
 
 
-def compare(
-    outcome: Outcome, collector: MeansCollector, config: Config, print_line: Callable[[str], None]
-) -> int:
+def compare(outcome: Outcome, collector: MeansCollector, config: Config, screen: Screen) -> int:
     """Print what was measured against the truth; 1 where the elastic part differs, 5 where E was not measured."""
     specimen = outcome.rig.specimen
     assert specimen is not None
@@ -311,21 +310,24 @@ def compare(
             ratios.append([np.abs(error) / (RELATIVE * np.abs(true) + k * sigma) for k in (3, 5)])
             errors.append(error)
             last = (elapsed, m)
-    print_line("")
-    print_line(Message("against the simulated truth (elastic part; exx, eyy, exy):"))
+    screen.print("")
+    screen.print(Message("against the simulated truth (elastic part; exx, eyy, exy):"))
     # Without a measured instant nothing is wrong: the machine was too slow, and E is not known.
-    agreed = _print_strain(np.array(ratios), np.array(errors), print_line) or not ratios
-    _print_force(outcome, specimen, print_line)
+    agreed = _print_strain(np.array(ratios), np.array(errors), screen) or not ratios
+    _print_force(outcome, specimen, screen)
     figures = outcome.test.figures
     there = specimen.E, specimen.nu
     # In an uneven field (the hole) the strain of the region is not that of a specimen without it.
     if figures.E.known and last is not None and AXIAL not in config.gauges:
         exx, eyy, _ = truth.region(last[0], last[1].valid, last[1].pattern)
         there = float(specimen.stress(last[0])) / eyy, -exx / eyy
-    agreed &= _print_modulus(figures, specimen, there, print_line)
+    agreed &= _print_modulus(figures, specimen, there, screen)
     if agreed and not figures.E.known and not outcome.exit_code:
-        print_line(
-            f"exit code {LOSS}: E was not measured ({figures.E.why}); end other programs, or give a smaller --burst"
+        screen.print(
+            Message(
+                "exit code {code}: E was not measured ({why}); end other programs, or give a smaller --burst",
+                *(LOSS, figures.E.why),
+            )
         )
         return LOSS
     return 0 if agreed else 1
@@ -335,43 +337,54 @@ def _print_modulus(
     figures: TensileFigures,
     specimen: VirtualSpecimen,
     there: tuple[float, float],
-    show: Callable[[str], None],
+    screen: Screen,
 ) -> bool:
     """E and nu against the truth ``there``; False where E is far off."""
     rows, off = tensile_table(figures, stresses=True), 0.0
-    true, true_nu = f"true {specimen.E / 1e9:g} GPa", f"true {specimen.nu:g}"
+    true = Message("true {value}", Amount("stress", specimen.E, digits=2))
+    true_nu = Message("true {value}", Amount("", specimen.nu, digits=2))
     if figures.E.known:
         off = abs(rows["E"].figure.value - there[0] / 1e9) / rows["E"].half
-        held = "within its interval" if off <= 1 else f"off by {off:.1f} times its interval"
-        true = f"by {figures.elastic_strain}: {held}, true {there[0] / 1e9:.5g} GPa there ({true} of the material)"
-        true_nu = f"true {there[1]:.4g} there ({true_nu})"
-    show(f"  E  {rows['E'].text}, {true}")
-    show(f"  nu {rows['nu'].text}, {true_nu}")
+        held = word("within its interval") if off <= 1 else Message("off by {n:.1f} times its interval", off)
+        here, here_nu = Amount.rough("stress", there[0], 5), Amount.rough("", there[1], 4)
+        true = Message(
+            "by {strain}: {held}, true {here} there ({true} of the material)",
+            *(figures.elastic_strain, held, here, true),
+        )
+        true_nu = Message("true {here} there ({true})", here_nu, true_nu)
+    screen.print(Message("  E  {E}, {true}", rows["E"].text, true))
+    screen.print(Message("  nu {nu}, {true}", rows["nu"].text, true_nu))
     return off <= FAR
 
 
-def _print_strain(ratios: Array, errors: Array, print_line: Callable[[str], None]) -> bool:
+def _print_strain(ratios: Array, errors: Array, screen: Screen) -> bool:
     """``ratios`` (N, 2, 3): the error of each of the three in units of 0.05 % + 3 sigma, and of 0.05 % + 5 sigma."""
     if not ratios.size:
-        print_line(Message("  no instant of the elastic part was measured"))
+        screen.print(Message("  no instant of the elastic part was measured"))
         return False
     within, rms = ratios[:, 0] <= 1, np.sqrt(np.mean(errors**2, axis=0)) * 1e6
     beyond = int(np.sum(~(ratios[:, 1] <= 1)))
-    print_line(
-        f"  strain of the region: error {rms[0]:.2f}, {rms[1]:.2f}, {rms[2]:.2f} µm/m rms in {len(ratios)} instants"
+    screen.print(
+        Message(
+            "  strain of the region: error {x:.2f}, {y:.2f}, {xy:.2f} µm/m rms in {n} instants",
+            *(*rms, len(ratios)),
+        )
     )
-    print_line(
-        f"  {within.mean():.1%} of these {within.size} values within {RELATIVE:.2%} of the strain + 3 sigma,"
-        f" {beyond} beyond 5 sigma"
+    screen.print(
+        Message(
+            "  {share:.1%} of these {n} values within {relative:.2%} of the strain + 3 sigma, {beyond} beyond 5 sigma",
+            *(within.mean(), within.size, RELATIVE, beyond),
+        )
     )
     return float(within.mean()) >= MIN_WITHIN and beyond == 0
 
 
-def _print_force(outcome: Outcome, specimen: VirtualSpecimen, print_line: Callable[[str], None]) -> None:
+def _print_force(outcome: Outcome, specimen: VirtualSpecimen, screen: Screen) -> None:
     t, force = outcome.run_state.loads.arrays()
     true = specimen.force(np.array([specimen.elapsed(time) for time in t]))
     error = (force - true)[np.isfinite(force)]
     if error.size:
-        print_line(
-            f"  force: mean error {error.mean():+.2f} N, scatter {error.std():.2f} N in {error.size} samples"
+        mean, scatter = (Amount.rough("force", float(one)) for one in (error.mean(), error.std()))
+        screen.print(
+            Message("  force: mean error {mean}, scatter {scatter} in {n} samples", mean, scatter, error.size)
         )

@@ -30,7 +30,7 @@ from acquire.frame import CameraInfo, Frame
 from acquire.load_cell import check
 from acquire.serial_line import identify
 from acquire.serial_line.ports import list_serial_ports
-from acquire.text import Message
+from acquire.text.message import Message, word
 from acquire.text.printable import brief, printable
 from live import VERSION
 from live.setup.devices import open_load
@@ -66,7 +66,7 @@ def report_lines(cameras: Sequence[str], loads: Sequence[str], seconds: float) -
         yield from _guarded(f"load cell {address}", _load_lines(address, seconds))
     for what, found, option in ("camera", listed, "--camera"), ("serial port", ports, "--load"):
         if everything and not found:
-            yield f"no {what} was found; {option} ADDRESS gives one"
+            yield Message("no {what} was found; {option} ADDRESS gives one", word(what), option)
 
 
 def without_names(line: str) -> str:
@@ -152,7 +152,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic devices``."""
     words = "watch each device and write what it does, to be sent: no pictures, no names (default FILE: %(const)s)"
     parser.add_argument("--report", nargs="?", const="phasedic-devices.txt", metavar="FILE", help=words)
-    words = "the settings that an address of each kind of camera takes"
+    words = "the settings that an address of each kind of camera and load cell takes"
     parser.add_argument("--settings", action="store_true", help=words)
     words = "with --report: only this camera; may be repeated"
     parser.add_argument("--camera", action="append", default=[], metavar="ADDRESS", help=words)
@@ -186,13 +186,15 @@ def command(arguments: argparse.Namespace) -> int:
 
 def _settings() -> int:
     from acquire.settings import settings_of
-    from live.setup.devices import camera_settings
+    from live.setup.devices import camera_settings, load_settings
 
-    for scheme, kind in camera_settings().items():
-        print_line(f"{scheme}:" if scheme else "/dev/...:")
-        for one in settings_of(kind):
-            more = "; ".join(filter(None, (one.allowed, one.unit, one.stands)))
-            print_line(f"  {one.key or '...'}: {one.words}" + f" ({more})" * bool(more))
+    for head, kinds in ((Message("cameras:"), camera_settings()), (Message("load cells:"), load_settings())):
+        print_line(head)
+        for scheme, kind in kinds.items():
+            print_line(f"  {scheme}:" if scheme else "  /dev/...:")
+            for one in settings_of(kind):
+                more = "; ".join(filter(None, (one.allowed, one.unit, one.stands)))
+                print_line(f"    {one.key or '...'}: {one.words}" + f" ({more})" * bool(more))
     return 0
 
 

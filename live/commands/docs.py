@@ -11,6 +11,7 @@ from pathlib import Path
 
 from acquire.errors import ConfigError, DataError
 from acquire.text import Message
+from live.ui.terminal.screen import print_line
 
 TOP = Path(__file__).parents[2]
 _HEADING = re.compile(r"^(?P<level>##+) (?P<title>.+)$", re.MULTILINE)
@@ -29,7 +30,7 @@ def command(arguments: argparse.Namespace) -> int:
     if arguments.name is None:
         for name, path in sorted(pages.items(), key=lambda page: ("/" in page[0], page[0])):
             print(f"{name:26} {_heading(path)}")
-        print(f"phasedic docs NAME shows one; all are in {folder}")
+        print_line(Message("phasedic docs NAME shows one; all are in {folder}", folder))
         return 0
     page, _, anchor = arguments.name.partition("#")
     name = page.removeprefix("docs/").removesuffix(".md")

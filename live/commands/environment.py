@@ -20,6 +20,7 @@ from typing import TextIO
 
 from acquire.errors import ConfigError
 from acquire.system import can_write, limit_memory_pools, private_folder
+from acquire.text import Message
 
 log = logging.getLogger(__name__)
 
@@ -76,10 +77,7 @@ def keep_loops() -> None:
             "no folder can be written for compiled loops ({why}); set NUMBA_CACHE_DIR to one that can", error
         ) from error
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
-    log.warning(
-        "compiled loops are kept in %s, since neither the installation nor %s can be written; set NUMBA_CACHE_DIR to a"
-        " folder that lasts", folder, own,
-    )  # fmt: skip
+    log.warning(Message("only {folder} can be written for compiled loops; set NUMBA_CACHE_DIR", folder))
 
 
 def _check_threading_layer(given: str) -> None:

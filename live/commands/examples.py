@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import ConfigError
+from acquire.text import Message
 from live.commands.docs import shipped
 from live.config.new_files import new_folder
+from live.ui.terminal.screen import print_line
 
 FOLDER = "phasedic-examples"
 CELL = "# %%"
@@ -37,10 +39,11 @@ def command(arguments: argparse.Namespace) -> int:
             raise OSError(error.args[0][0][2].partition(": ")[0]) from error
         cells = (part / "notebook.py").read_text(encoding="utf-8").split(f"\n{CELL}")
         (part / "notebook.ipynb").write_text(notebook(cells), encoding="utf-8")
-        print("rendering the pictures ...", flush=True)
+        print_line(Message("rendering the pictures ..."))
         write_pictures(part)
-    print(f"{folder}: {folder / 'README.md'} has a command for each, and what it gives. The first:")
-    print(
+    page = folder / "README.md"
+    print_line(Message("{page} has a command for each example, and what it gives. The first:", page))
+    print_line(
         f"  cd {folder}\n  phasedic replay shots --load forces.csv --section 20,2 --config gauges.toml --report"
     )
     return 0

@@ -55,7 +55,7 @@ def run(
         The start failed; the message names key, device or file.
     """
     screen = screen or TerminalScreen()
-    with located(_config(config), screen.print) as found:
+    with located(_config(config), screen) as found:
         made = standard_consumers(screen, consumers)
         return run_live(found, screen, stop=stop, consumers=made, on_start=on_start)
 

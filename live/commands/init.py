@@ -11,9 +11,9 @@ from pathlib import Path
 from acquire.addresses import parse_address
 from acquire.errors import LOSS, DeviceError
 from acquire.files.picture import write_picture
-from acquire.text import Message
-from acquire.text.message import about, joined
+from acquire.text.message import Message, about, joined, word
 from acquire.text.printable import printable
+from acquire.text.quantity import Amount
 from live.commands.options import (
     PICTURES,
     add_help_all,
@@ -73,13 +73,15 @@ def command(arguments: argparse.Namespace) -> int:
     given = overrides(arguments)
     found = find_devices(given, screen)
     config = load_config(None, {**given, "camera.address": found.camera, "load.address": found.load})
-    first = first_look(config, screen.print)
+    first = first_look(config, screen)
     descriptions = found.camera_words or printable(first.camera.name), found.load_words
     proposal = propose(first, config, given, descriptions, found.others)
     if proposal.contrast < NO_PATTERN:
         screen.print(
-            f"no pattern is visible: the contrast is {proposal.contrast:.1%} of full scale, so nothing is written. Set"
-            " light, exposure and focus, spray a pattern, and call again"
+            Message(
+                "no pattern is visible (contrast {share:.1%} of full scale), nothing is written: set light and focus",
+                proposal.contrast,
+            )
         )
         return LOSS
     if mask is not None and proposal.region.mask is not None:
@@ -134,9 +136,7 @@ def _camera() -> tuple[str, str, tuple[str, ...]]:
     cameras = list_cameras()
     usable = [camera for camera in cameras if not camera.trouble]
     if not usable:
-        why = joined("; ", (about(one.address, one.trouble) for one in cameras)) or Message(
-            "none is plugged in"
-        )
+        why = joined("; ", (about(one.address, one.trouble) for one in cameras)) or word("none is plugged in")
         raise DeviceError(
             "no camera can be used ({why}); plug one in, or give --camera ADDRESS (files:shots, sim:)", why
         )
@@ -156,8 +156,8 @@ def _load(camera: str, screen: Screen) -> tuple[str, str]:
 
     scheme = parse_address(with_scheme(camera)).scheme
     if scheme in ("sim", *RECORDED):
-        return ("sim:", "simulated") if scheme == "sim" else ("none:", "pictures have none")
-    return next(_listen(screen), ("none:", "none was found; give it with --load, see phasedic identify"))
+        return ("sim:", word("simulated")) if scheme == "sim" else ("none:", word("pictures have none"))
+    return next(_listen(screen), ("none:", word("none found; see phasedic identify, give it with --load")))
 
 
 def _listen(screen: Screen) -> Iterator[tuple[str, str]]:
@@ -187,16 +187,13 @@ def _draw(p: Proposal, png: Path) -> None:
 def _print(p: Proposal, rig: Path, png: Path, screen: Screen) -> None:
     grid = p.region.grid(p.config, *p.first_look.size)
     screen.print(p.region.words)
-    zois = Message("{n} ZOIs of {size} px, {step} px apart", grid.n_active, grid.size, grid.step)
+    n = Amount("count", grid.n_active)
+    zois = Message("{n} ZOIs of {size} px, {step} px apart", n, grid.size, grid.step)
     screen.print(zois + Message("; load along {axis}", p.config.specimen.axis))
     screen.print(Message("gauges: {names}", ", ".join(p.config.gauges) or Message("none")))
     for box in p.plates.plates:
-        text = Message(
-            "looks like a plate: {box}; in {rig} behind a #: it must hang from one grip, unloaded",
-            box.text,
-            rig,
-        )
-        screen.print(text)
+        what = Message("in {rig} behind a #: it must hang from one grip, unloaded", rig)
+        screen.print(Message("looks like a plate: {box}; {what}", box.text, what))
     for box in p.plates.unclear:
         screen.print(Message("a pattern beside the specimen that is not clearly a plate: {box}", box.text))
     screen.print(Message("written: {rig}, and {png} as a picture of it", rig, png))

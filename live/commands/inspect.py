@@ -45,21 +45,21 @@ def command(arguments: argparse.Namespace) -> int:
         if not (0 <= row < rows and 0 <= column < columns):
             raise ConfigError(
                 "--zoi {given}: the grid has rows 0 to {last_row} and columns 0 to {last_column}",
-                arguments.zoi,
-                rows - 1,
-                columns - 1,
+                *(arguments.zoi, rows - 1, columns - 1),
             )
         pictures = [_picture(session, n) for n in (arguments.reference, arguments.frame)]
     left, top = int(grid.first_x[column]), int(grid.first_y[row])
     spectrum = zoi_spectrum(pictures[0], pictures[1], left, top, grid.size)
-    where = f"ZOI {row},{column} ({grid.size} px at x {left}, y {top})"
     drawn = figure(15, 4)
-    title = f"{Path(arguments.session).name}: {where}, frame {arguments.frame}"
+    title = Message(
+        "{session}: ZOI {row},{column} ({size} px at x {left}, y {top}), frame {frame}",
+        *(Path(arguments.session).name, row, column, grid.size, left, top, arguments.frame),
+    )
     draw_spectrum(drawn, spectrum, title)
     save_new(drawn, out)
-    print_line(
-        f"{title}\nu = {spectrum.u:.4f} px, v = {spectrum.v:.4f} px from {spectrum.used.sum()} frequencies"
-    )
+    print_line(title)
+    found = (spectrum.u, spectrum.v, int(spectrum.used.sum()))
+    print_line(Message("u = {u:.4f} px, v = {v:.4f} px from {n} frequencies", *found))
     print_line(Message("figure: {path}", out))
     return 0
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError
+from acquire.text.message import Message, word
 from live.commands.options import add_config_file, add_options, add_verbose, overrides, require_new
 from live.commands.scale import add_board, board_of
 from live.config.loading import load_config, settings_in
@@ -52,7 +53,11 @@ def command(arguments: argparse.Namespace) -> int:
     for line in _lines(found):
         screen.print(line)
     write_rig(out, found.changes)
-    screen.print(f'written to {out}; use it with --lens {out}, or lens = "{out}" at the head of the rig file')
+    screen.print(
+        Message(
+            'written to {out}; use it with --lens {out}, or lens = "{out}" at the head of the rig file', out
+        )
+    )
     return 0
 
 
@@ -60,21 +65,21 @@ def _lines(found: LensCalibration) -> Iterator[str]:
     from analysis import Roi, ZoiGrid
 
     lens, (x, y, width, height) = found.fit.lens, found.box
-    yield f"lens: {found.method}, {found.fit.rms_px:.3g} px rms"
+    yield Message("lens: {method}, {rms:.3g} px rms", found.method, found.fit.rms_px)
     if found.fit.over_noise > 1.5:
-        yield (
-            f"LOOK  the fit leaves {found.fit.over_noise:.1f} times what noise explains: is the specimen flat, and"
-            " does it stand still in every picture?"
+        yield Message(
+            "LOOK  the fit leaves {over:.1f} times the noise: is the specimen flat and still in every picture?",
+            found.fit.over_noise,
         )
     for name, value, variance in zip(
         ("focal length, px", "axis x, px", "axis y, px", "k1", "k2", "p1", "p2", "k3"),
         lens.parameters, lens.covariance.diagonal(), strict=True,
     ):  # fmt: skip
         if variance > 0:
-            yield f"  {name:<17} {value:.6g} ± {variance**0.5:.2g}"
+            yield Message("  {name:<17} {value:.6g} ± {sigma:.2g}", word(name), value, variance**0.5)
     size = int(min(SHOWN_ZOI, width, height))
     grid = ZoiGrid.cover(Roi(int(x), int(y), int(width), int(height)), size, SHOWN_STEP)
-    yield f"over the calibrated part, {lens_words(lens, grid)}"
+    yield Message("over the calibrated part, {what}", lens_words(lens, grid))
 
 
 def _pictures(arguments: argparse.Namespace) -> Iterator[np.ndarray]:

@@ -51,7 +51,7 @@ def command(arguments: argparse.Namespace) -> int:
             interrupted.set()
             controller.quit()
 
-        with signals(interrupt, screen.print), page_opened(controller, screen):
+        with signals(interrupt, screen), page_opened(controller, screen):
             serve(controller, given, screen, interrupted)
     return EXIT_INTERRUPTED if interrupted.is_set() else 0
 

@@ -65,7 +65,7 @@ def command(arguments: argparse.Namespace) -> int:
     screen, stopping = TerminalScreen(), threading.Event()
     every, requests = CamerasScreen(screen), _of_each(request)
     done = {}
-    with signals(stopping.set, screen.print):
+    with signals(stopping.set, screen):
         for name, own in requests.items():
             done[name] = replay(own, every.of(name), stopping, standard_consumers(every.of(name)))
     folder = next(iter(done.values())).folder

@@ -127,7 +127,7 @@ def run_attended(
         cameras = {}
         for name, config in configs.items():
             own = every.of(name)
-            found = stack.enter_context(located(config, own.print))
+            found = stack.enter_context(located(config, own))
             made = standard_consumers(own, consumers.get(name, ()), joint if name == leading else None)
             cameras[name] = CameraOfTest(found, own, made)
         attach = stack.enter_context(attended(configs[leading], screen, stop))

@@ -111,7 +111,7 @@ def _scale(arguments: argparse.Namespace, config: Config, stand_off: float | Non
         return from_points((x1, y1, x2, y2), _needed(arguments, "length"), arguments.sigma)
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS or --config rig.toml")
-    first = first_look(config, screen.print)
+    first = first_look(config, screen)
     board = board_of(arguments)
     if board is not None:
         return from_board(first.picture, board, arguments.sigma, stand_off)

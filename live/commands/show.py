@@ -32,7 +32,7 @@ def command(arguments: argparse.Namespace) -> int:
     screen, stop = TerminalScreen(), threading.Event()
     request = ShowRequest(arguments.start_s, arguments.end_s, arguments.every)
     rrd = Path(arguments.rrd) if arguments.rrd else None
-    with signals(stop.set, lambda text: None), open_run(arguments.run) as run:
+    with signals(stop.set, None), open_run(arguments.run) as run:
         if arguments.more_gauges:
             add_gauges(run, Path(arguments.more_gauges))
         show(run, request, screen, stop, port=arguments.port, rrd=rrd)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from acquire.text import Message
 from live.config.cameras import BACK, FRONT
 from live.pipeline.consumer import Screen
 from live.ui.terminal.screen import TerminalScreen
@@ -64,7 +65,7 @@ def _strains(sides: SidesOfTest) -> Iterator[str]:
     from live.results.sides import at_end
     from live.ui.terminal.status_line import strain_text
 
-    yield "at the end:            mean of both        front minus mean"
+    yield Message("at the end:            mean of both        front minus mean")
     for name, one in at_end(sides.courses).items():
         mean, bending = (strain_text(value, one.sigma) for value in (one.mean, one.bending))
-        yield f"  {name:<16} {mean:>18}  {bending:>18}"
+        yield Message("  {name:<16} {mean:>18}  {bending:>18}", name, mean, bending)

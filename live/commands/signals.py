@@ -7,13 +7,17 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from acquire.system import HANGUP, signal_handler
 from acquire.text import Message
 
+if TYPE_CHECKING:
+    from live.pipeline.consumer import Screen
+
 
 @contextlib.contextmanager
-def signals(stop: Callable[[], None], print_line: Callable[[str], None]) -> Iterator[None]:
+def signals(stop: Callable[[], None], screen: Screen | None) -> Iterator[None]:
     """SIGINT and SIGTERM call ``stop``, the third one kills; the loss of the terminal is ignored."""
     times = 0
 
@@ -24,7 +28,8 @@ def signals(stop: Callable[[], None], print_line: Callable[[str], None]) -> Iter
             signal.signal(number, signal.SIG_DFL)
             signal.raise_signal(number)
         again = Message("still closing; a third signal ends it at once")
-        print_line(Message("closing the files ...") if times == 1 else again)
+        if screen is not None:
+            screen.print(Message("closing the files ...") if times == 1 else again)
         stop()
 
     with signal_handler(handle, signal.SIGINT, signal.SIGTERM), signal_handler(signal.SIG_IGN, *HANGUP):

@@ -94,7 +94,7 @@ def command(arguments: argparse.Namespace) -> int:
                 " 'phasedic replay' leaves beside its results"
             )
         compile_ahead(
-            picture_kinds(material.camera), phase=config.measure.estimator == "phase", show=screen.status
+            picture_kinds(material.camera), phase=config.measure.estimator == "phase", screen=screen
         )
         windows = take_windows(material, arguments.static, arguments.loaded)
         screen.print(
@@ -131,7 +131,7 @@ def _settings(arguments: argparse.Namespace) -> list[StudySetting]:
 
 # -- output -------------------------------------------------------------------------------------
 
-_HEAD = (
+_HEAD = Message(
     "  zoi step order window        l10 px  VSG px  noise µm/m  over predicted  strain µm/m     ±"
     "  gradient µm/m/px  valid"
 )
@@ -139,7 +139,7 @@ _HEAD = (
 
 def _line(one: StudyResult) -> str:
     s = one.setting
-    mark = "" if one.is_significant else "  noise"
+    mark = "" if one.is_significant else Message("  noise")
     over = f"{one.noise / one.predicted:.2f}" if one.measured else "-"
     return (
         f"{s.zoi:5d} {s.step:4d} {s.order:5d} {s.window:12s} {one.l10:7.1f} {one.vsg:7.1f} {one.noise * 1e6:11.1f}"

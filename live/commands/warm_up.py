@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic warm-up``; raises MachineUnfit if a known pattern is measured wrong."""
     screen = TerminalScreen()
-    took = compile_ahead(PICTURE_KINDS, phase=True, show=screen.status)
+    took = compile_ahead(PICTURE_KINDS, phase=True, screen=screen)
     compiled = Message("everything is compiled ({took:.0f} s)", took)
     screen.print(compiled if took else Message("everything was compiled already"))
     with on_fit_machine():

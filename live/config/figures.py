@@ -85,7 +85,7 @@ class LiveFigure:
 
     @property
     def unit(self) -> str:
-        """That of column and channel; "" (dimensionless), as of all gauges."""
+        """Unit of column and channel; "" (dimensionless), as of all gauges."""
         last = self.name.rpartition("_")[2]
         return last if last in _UNITS and "gauge_" not in self.name else ""
 

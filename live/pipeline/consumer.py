@@ -152,7 +152,7 @@ class RunInfo:
     ----------
     config : Config
     folder : Path
-        Of the files.
+        Folder of the run's files.
     camera : CameraInfo
     grid : ZoiGrid
     start : ClockPair

@@ -130,7 +130,7 @@ class EventLog:
             words = counted_text(words, count)
             if not self._shown.setdefault(likeness(event), RateLimiter(SHOWN_EVERY_S)).due(event.t):
                 level = logging.DEBUG
-        log.log(level, "%s", words)
+        log.log(level, words)
 
     def emit(
         self,

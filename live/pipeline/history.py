@@ -216,29 +216,30 @@ def curve_of(
         Of the load.
     t, stress : (N,) float64
     """
-    return replace(_curve_of(column, gauges, axis, t, stress), blur=column("blur"))
-
-
-def _curve_of(
-    strain: Callable[[str], Array | None], gauges: Container[str], axis: str, t: Array, stress: Array
-) -> Curve:
     axial, transverse = strains_along(gauges, axis)
-    elastic, extension = strain(axial), strain(extension_along(gauges, axis))
-    lens = strain(f"sigma_lens_e{axis}{axis}")
-    if axial == AXIAL:
-        source = Message("gauge {name}", AXIAL)
-        return Curve(t, _known(elastic, t), stress, strain(transverse), lens=lens, source=source)
+    elastic, extension = column(axial), column(extension_along(gauges, axis))
     region = Message("{axial} of the region", axial)
-    if extension is None or not np.isfinite(extension).any():
-        # Files of before November 2026 have no extension, and means of the gradients.
-        words = Message("mean {axial}", axial) if extension is None else region
-        return Curve(t, _known(elastic, t), stress, strain(transverse), lens=lens, source=words)
-    across = strain(TRANSVERSE if transverse == TRANSVERSE else f"extension_{'x' if axis == 'y' else 'y'}")
-    narrowing = None if across is None or not np.isfinite(across).any() else across
-    return Curve(
-        t, extension, stress, strain(transverse), elastic, strain(f"uneven_{axial}"), strain("misfit"),
-        narrowing, lens, Message("extension between strips along {axis}", axis), region,
+    plain = Curve(
+        t, _known(elastic, t), stress, column(transverse), lens=column(f"sigma_lens_e{axis}{axis}"), source=region,
+        blur=column("blur"),
     )  # fmt: skip
+    if axial == AXIAL:
+        return replace(plain, source=Message("gauge {name}", AXIAL))
+    if extension is None:  # files of before November 2026, with means of the gradients
+        return replace(plain, source=Message("mean {axial}", axial))
+    if not np.isfinite(extension).any():
+        return plain
+    across = column(TRANSVERSE if transverse == TRANSVERSE else f"extension_{'x' if axis == 'y' else 'y'}")
+    return replace(
+        plain,
+        strain=extension,
+        elastic=elastic,
+        uneven=column(f"uneven_{axial}"),
+        misfit=column("misfit"),
+        narrowing=None if across is None or not np.isfinite(across).any() else across,
+        source=Message("extension between strips along {axis}", axis),
+        elastic_source=region,
+    )
 
 
 def _known(strain: Array | None, t: Array) -> Array:

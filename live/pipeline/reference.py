@@ -16,8 +16,7 @@ from acquire.burst import BurstAccumulator, PictureMemory
 from acquire.errors import ConfigError, DataError, MachineUnfit, PhasedicError, TooLittleMemory
 from acquire.frame import Burst, Frame
 from acquire.system import available_MiB
-from acquire.text import Message
-from acquire.text.message import about
+from acquire.text.message import Message, about, joined
 from acquire.text.quantity import Amount
 from analysis.field import Status, StrainField
 from analysis.quality.steadiness import strain_drifts
@@ -177,7 +176,8 @@ class ReferenceMotion:
     @property
     def amount(self) -> str:
         """Its px, after the strain where that has changed."""
-        return f"{Amount('strain', self.strain)}, " * self.pulled + f"{self.px:.3f}"
+        px, strain = Message("{px:.3f}", self.px), Amount("strain", self.strain)
+        return joined(", ", (strain, px)) if self.pulled else px
 
 
 def motion_between(

@@ -10,6 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from acquire.text import Message
 from acquire.text.message import word
@@ -23,6 +24,25 @@ RATE_S = 1.0
 """The strain rate is the slope of the axial strain over this time."""
 
 
+class StateOfTest(Protocol):
+    """What gives the figures of a test at a time."""
+
+    def snapshot(self, now: float, step: TimeStep | None = None, /) -> Snapshot: ...
+
+
+class FurtherChannels(Protocol):
+    """Channels of several cameras together (``live.results.sides.JointChannels``)."""
+
+    @property
+    def lost(self) -> str:
+        """Why they have no value any more; empty while they have."""
+        ...
+
+    def read(self, start: float, /) -> Mapping[str, float]:
+        """Their values; ``start`` is time zero, s, monotonic."""
+        ...
+
+
 class ChannelValues:
     """Computes the channels of one measurement after the other; each user has its own.
 
@@ -30,11 +50,10 @@ class ChannelValues:
     ----------
     start : float, s
         Time zero, monotonic.
-    snapshot : callable
-        Takes a time (s, monotonic) and a TimeStep or None, gives the Snapshot
-        (``live.pipeline.run_state.RunState.snapshot``).
-    more : callable
-        Gives the values of further channels.
+    state : StateOfTest
+        A ``live.pipeline.run_state.RunState``.
+    joint : FurtherChannels, optional
+        Those of several cameras together.
     clock : callable giving monotonic seconds
 
     Attributes
@@ -46,20 +65,20 @@ class ChannelValues:
     def __init__(
         self,
         start: float,
-        snapshot: Callable[[float, TimeStep | None], Snapshot],
-        more: Callable[[], Mapping[str, float]] = dict,
+        state: StateOfTest,
+        joint: FurtherChannels | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._start, self._snapshot, self._more, self._clock = start, snapshot, more, clock
+        self.start, self._state, self._joint, self._clock = start, state, joint, clock
         self._recent: deque[tuple[float, float]] = deque()
         self.now = Snapshot(math.nan)
 
     def read(self, measurement: Measurement | None = None) -> dict[str, float]:
         """All channels by name, NaN where one is not known; without a measurement those of this moment."""
         step = None if measurement is None else measurement.time_step
-        self.now = now = self._snapshot(self._clock(), step)
+        self.now = now = self._state.snapshot(self._clock(), step)
         values = {one.name: getattr(now.figure(one.of), one.part) / one.one for one in OF_SNAPSHOT}
-        values |= {"time_s": (now.t if step is None else step.t) - self._start, **now.cycles}
+        values |= {"time_s": (now.t if step is None else step.t) - self.start, **now.cycles}
         if measurement is not None and step is not None:
             values |= {name: getattr(step, of) for name, of in _CHANNELS_OF_STEP.items()}
             values |= {name: getattr(measurement.burst, of) for name, of in _OF_BURST.items()}
@@ -67,7 +86,7 @@ class ChannelValues:
             for name in (f"gauge_{gauge}" for gauge in step.gauges):
                 figure = now.figure(name)
                 values |= {name: figure.value, f"sigma_{name}": figure.sigma}
-        return {**values, **self._more()}
+        return values if self._joint is None else {**values, **self._joint.read(self.start)}
 
     @property
     def states(self) -> dict[str, str]:

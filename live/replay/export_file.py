@@ -171,10 +171,8 @@ class _Reader:
         self._forces.extend(forces)
         if len(self._forces) > MAX_ROWS or len(self._names) > MAX_NAMES:
             raise DataError(
-                "{where}: has more than {most_rows:,} rows, or {most_names:,} names; export fewer a second",
-                self._where,
-                MAX_ROWS,
-                MAX_NAMES,
+                "{where}: has more than {most_rows} rows, or {most_names} names; export fewer a second",
+                *(self._where, grouped(MAX_ROWS), grouped(MAX_NAMES)),
             )
 
     def _of_width(self, lines: Sequence[int], rows: Rows) -> Rows:

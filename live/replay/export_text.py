@@ -27,6 +27,7 @@ import numpy as np
 from acquire.errors import ConfigError, DataError
 from acquire.protocols.units import is_mass, newtons_per
 from acquire.text import Message
+from acquire.text.quantity import Amount
 
 HEAD = 1 << 18
 """Bytes or characters at the beginning of a file in which its form is found."""
@@ -83,10 +84,8 @@ def lines_of(file: BinaryIO, encoding: str, where: str) -> Iterator[list[str]]:
             count += len(lines)
             if len(left) > _LONGEST:
                 raise DataError(
-                    "{where}: line {line} has more than {most:,} characters; no table",
-                    where,
-                    count + 1,
-                    _LONGEST,
+                    "{where}: line {line} has more than {most} characters; no table",
+                    *(where, count + 1, Amount("count", _LONGEST)),
                 )
             yield lines
         if left:

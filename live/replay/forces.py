@@ -24,6 +24,7 @@ from acquire.load_sample import LoadSample
 from acquire.text import Message
 from acquire.text.message import about
 from acquire.text.printable import counted
+from acquire.text.quantity import Amount
 from live.config.sections import LoadConfig
 from live.replay.export_file import Export, read_export
 
@@ -146,11 +147,9 @@ class ForceTable:
             return self._by_name(pictures)
         if len(e.forces) != len(pictures):
             raise DataError(
-                "{path}: has no times and no names, and {rows:,} rows for {pictures:,} pictures; give a column time_s"
+                "{path}: has no times and no names, and {rows} rows for {pictures} pictures; give a column time_s"
                 " or file, or name it: --load-column FORCE,TIME",
-                self.path,
-                len(e.forces),
-                len(pictures),
+                *(self.path, Amount("count", len(e.forces)), Amount("count", len(pictures))),
             )
         remark = Message("no times and no names: row k is taken as the force of picture k")
         return PlacedForces(np.array(list(pictures.values())), e.forces, True, (remark, *e.remarks))

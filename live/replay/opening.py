@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +22,7 @@ from live.replay.pictures import picture_source, with_reference
 from live.replay.session import session_config, session_path, session_source
 from live.replay.source import ReplayRequest, ReplaySource, check_window
 from live.results.folder import differing_versions
+from live.setup.compiling import Stopping
 from live.setup.frames import camera_of
 from live.setup.grid import grid_for
 from live.setup.pictures import read_mask
@@ -81,14 +82,15 @@ def _notes(session: Session, request: ReplayRequest) -> Iterator[str]:
     if session.recovered:
         yield session.recovered
     if session.mode.every > 1:
-        yield f"one frame in {session.mode.every} was recorded; measured as a slower camera"
+        yield Message("one frame in {every} was recorded; measured as a slower camera", session.mode.every)
     elif session.mode.kind == "all" and not request.as_measured and _were_shortened(session):
-        yield (
-            "the run shortened its bursts while the picture moved; here they have one length, with --as-measured"
-            " they are those of the run"
+        yield Message(
+            "the run shortened its bursts while the picture moved; here they have one length (as in the run:"
+            " --as-measured)"
         )
     if request.as_measured and (otherwise := differing_versions(session.versions)):
-        yield f"recorded with {', '.join(otherwise)}; the last digits of the results may differ"
+        versions = ", ".join(otherwise)
+        yield Message("recorded with {versions}; the last digits of the results may differ", versions)
 
 
 def _were_shortened(session: Session) -> bool:
@@ -119,16 +121,16 @@ def prepare_replay(
     config: Config,
     name: str,
     screen: Screen,
-    stopped: Callable[[], bool] = lambda: False,
+    stopping: Stopping | None = None,
 ) -> PreparedKernel:
     """Find the specimen where configured, and prepare the kernel; raises as ``replay``. ``name`` is for messages."""
     camera = source.camera
     mask = read_mask(config.measure.mask, camera.width, camera.height)
     if AUTO in (config.measure.roi, config.measure.gauges):
         look = FirstLook(source.reference.mean, _noise_of(source.reference), camera)
-        config, mask = located_on(config, look, screen.print)
+        config, mask = located_on(config, look, screen)
     plan = MeasurePlan.of(config, camera, mask)
-    plan.compile(camera, screen.status, stopped)
+    plan.compile(camera, screen, stopping)
     return plan.on(source.reference, f"the reference of {name}")
 
 

@@ -111,7 +111,7 @@ class StoredResults:
 
     @classmethod
     def of(cls, parts: Sequence[Path], ready: PreparedKernel) -> StoredResults | None:
-        """Of ``parts``; None without any."""
+        """Results of ``parts``; None without any."""
         return cls(parts, ready) if parts else None
 
     def bursts(self) -> Iterator[Burst]:

@@ -34,6 +34,7 @@ from live.config.values import AUTO
 from live.pipeline.consumer import Compose, RunInfo, Screen
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
+from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import FrameCounts, RunState
 from live.pipeline.timed.force_watch import with_force_watch
 from live.replay.forces import read_forces
@@ -192,9 +193,8 @@ def _run(
 ) -> Replayed:
     check_folder(config.output.dir)
     config = with_film(config, source.camera)
-    ready = prepare_replay(source, config, request.source, screen, stopping.is_set)
+    ready = prepare_replay(source, config, request.source, screen, stopping)
     stored = StoredResults.of(request.parts, ready)
-    measured = stored.measurements if stored else ready.measurements
     bursts = _not_empty(stored.bursts() if stored else source.bursts, request, source.count)
     check_channel(ready.plan.config, forces=len(source.loads) > 0)
     folder = make_folder(ready.plan.config.output.dir, datetime.datetime.now(datetime.UTC))
@@ -209,67 +209,105 @@ def _run(
     )
     write_names(request.source, folder / "pictures.csv")
     screen.print(Message("replaying {source} into {folder}", request.source, request.final_folder or folder))
-    about = RunInfo(
-        config,
-        folder,
-        source.camera,
-        ready.plan.grid,
-        source.start,
-        deferred=request.final_folder is not None,
-    )
+    deferred = request.final_folder is not None
+    about = RunInfo(config, folder, source.camera, ready.plan.grid, source.start, deferred=deferred)
     made = with_force_watch(consumers(about, run_state), run_state)
     stream = Stream()
     stream.add(StateKeeper(run_state, ""))
     outputs = Outputs(made, run_state.loads, event_log, stream)
     event_log.add_listener(stream.publish)
-    began, work = time.perf_counter(), prefetch(bursts)
     failures, held = BurstFailures(run_state, folder), FolderWatch(folder)
+    run = _Run(source, request, screen, stopping, run_state, outputs, failures)
+    work = prefetch(bursts)
+    measured = (stored or ready).measurements(
+        _counted(work, run_state.frame_counts), source.loads, event_log, failures
+    )
     try:
-        _publish_recorded(source, stream)
-        for m in measured(
-            _counted(work, run_state.frame_counts), source.loads, run_state.event_log, failures
-        ):
-            run_state.frame_counts.add(measured=m.burst.n)
-            if stream.wants(Frame):
-                stream.publish(picture_of(m.burst))
-            stream.publish(m)
-            screen.progress(m.time_step, m.number + 1, source.expected, time.perf_counter() - began)
-            del m  # frees its pictures before the next burst is measured
-            if stopping.is_set():
-                break
-        took = time.perf_counter() - began
+        took = run.measure(measured, stream)
     finally:
         work.close()
         run_state.health.ended = True
         outputs.end()
         folder = held.end()
-    chunks = len(request.parts)
-    speed = Message("joined of {chunks} chunks", chunks) if chunks else speed_line(run_state.history, took)
-    lines = [*_account(source, run_state), speed]
-    left_out, repeats = (source.count.left_out, source.count.repeats) if source.count else (0, [])
-    cut_off = [e.text for e in event_log.events("warning") if "missing" in e.data and not stopping.is_set()]
-    stopped = [
-        Message("{name} stopped: {why}", one.name, one.failed) for one in outputs.reports if one.failed
-    ]
-    failed = Message(
-        "{bursts} could not be measured; {log} has the details",
-        counted(failures.count, "burst"),
-        folder / LOG,
-    )
-    lines = [*[failed] * (failures.count > 0), *cut_off, *repeats, *source.doubts, *stopped, *lines]
-    lossy = (
-        outputs.failed
-        or bool(source.doubts)
-        or not run_state.history.ends_with_values
-        or left_out > 0
-        or cut_off
-        or failures.count
-    )
-    code = EXIT_INTERRUPTED if stopping.is_set() else LOSS if lossy else 0
+    lines, code = run.lines(took, folder), run.exit_code()
     at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
-    start_t = source.start.monotonic
-    test = finished(folder, config, run_state, code, at_reference, start_t, lines)
+    test = finished(folder, config, run_state, code, at_reference, source.start.monotonic, lines)
+    left_out = source.count.left_out if source.count else 0
     return Replayed(folder, run_state, config, code, test, tuple(lines), left_out)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Run:
+    """A replay that goes on, and what there is to say of it at its end."""
+
+    source: ReplaySource
+    request: ReplayRequest
+    screen: Screen
+    stopping: threading.Event
+    run_state: RunState
+    outputs: Outputs
+    failures: BurstFailures
+
+    def measure(self, measured: Iterable[Measurement], stream: Stream) -> float:
+        """Publish what was recorded and all that is measured; returns the time that it took, s."""
+        began = time.perf_counter()
+        _publish_recorded(self.source, stream)
+        for m in measured:
+            self.run_state.frame_counts.add(measured=m.burst.n)
+            if stream.wants(Frame):
+                stream.publish(picture_of(m.burst))
+            stream.publish(m)
+            self.screen.progress(m.time_step, m.number + 1, self.source.expected, time.perf_counter() - began)
+            del m  # frees its pictures before the next burst is measured
+            if self.stopping.is_set():
+                break
+        return time.perf_counter() - began
+
+    def lines(self, took: float, folder: Path) -> list[str]:
+        """What there is to say at the end: what failed and what was lost first, then counts and speed."""
+        source, chunks = self.source, len(self.request.parts)
+        failed = Message(
+            "{bursts} could not be measured; {log} has the details",
+            counted(self.failures.count, "burst"),
+            folder / LOG,
+        )
+        stopped = [
+            Message("{name} stopped: {why}", one.name, one.failed)
+            for one in self.outputs.reports
+            if one.failed
+        ]
+        speed = (
+            Message("joined of {chunks} chunks", chunks)
+            if chunks
+            else speed_line(self.run_state.history, took)
+        )
+        return [
+            *[failed] * (self.failures.count > 0),
+            *self._cut_off(),
+            *(source.count.repeats if source.count else ()),
+            *source.doubts,
+            *stopped,
+            *_account(source, self.run_state),
+            speed,
+        ]
+
+    def _cut_off(self) -> list[str]:
+        """Where the recording ends before its test did."""
+        warnings = self.run_state.event_log.events("warning")
+        return [e.text for e in warnings if "missing" in e.data and not self.stopping.is_set()]
+
+    def exit_code(self) -> int:
+        """That of an interrupted replay, of one that lost something, or 0."""
+        source = self.source
+        lossy = (
+            self.outputs.failed
+            or source.doubts
+            or not self.run_state.history.ends_with_values
+            or (source.count and source.count.left_out)
+            or self._cut_off()
+            or self.failures.count
+        )
+        return EXIT_INTERRUPTED if self.stopping.is_set() else LOSS if lossy else 0
 
 
 def _counted(work: Iterable[Work], frame_counts: FrameCounts) -> Iterator[Work]:

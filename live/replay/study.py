@@ -289,7 +289,8 @@ def _largest(first: Array, second: Array) -> float:
 
 
 def _least_noise(kept: int) -> str:
-    return "it alone shows" if kept == 1 else f"it has the least noise of the {kept} settings that show"
+    alone = Message("it alone shows")
+    return alone if kept == 1 else Message("it has the least noise of the {n} settings that show", kept)
 
 
 def recommended(found: Sequence[StudyResult]) -> Advice:
@@ -308,17 +309,19 @@ def recommended(found: Sequence[StudyResult]) -> Advice:
     top = max(significant, key=lambda one: one.seen - one.sigma)
     keep = [one for one in significant if one.seen >= KEPT_SHARE * (top.seen - top.sigma)]
     best = min(keep, key=lambda one: one.noise)
-    why = (
-        f"{_least_noise(len(keep))} at least {KEPT_SHARE:.0%} of the largest strain"
-        f" ({Amount('strain', top.seen)}, with {top.setting.words})"
+    strain = Amount("strain", top.seen)
+    why = Message(
+        "{what} at least {share:.0%} of the largest strain ({strain}, with {setting})",
+        *(_least_noise(len(keep)), KEPT_SHARE, strain, top.setting.words),
     )
     larger = [one for one in significant if one.noise < best.noise]
     if larger:
         nearest = max(larger, key=lambda one: one.seen)
-        why += f"; {nearest.setting.words} has less, but shows {nearest.seen / top.seen:.0%}"
+        share = nearest.seen / top.seen
+        why += Message("; {setting} has less, but shows {share:.0%}", nearest.setting.words, share)
     sizes = [one.setting.zoi for one in found]
     if best.setting.zoi == max(sizes):
-        why += "; it is the largest tried, larger ones may do as well"
+        why += Message("; it is the largest tried, larger ones may do as well")
     elif best.setting.zoi == min(sizes):
-        why += "; it is the smallest tried, smaller ones may show more"
+        why += Message("; it is the smallest tried, smaller ones may show more")
     return Advice(best, why)

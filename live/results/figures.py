@@ -39,7 +39,6 @@ HEADLINE = ("E", "nu", "Rp02", "Rm")
 """The figures that are shown first, and compared between tests."""
 _STRENGTHS = ("Rp01", "Rp02", "Rp1", "ReH", "ReL", "Rm")
 _EXTENSIONS, _FLOW = ("Ag", "Agt", "A", "At"), ("r", "n")
-_REMARKED = ("E", "nu", *_FLOW)
 
 _PLAIN, _PERCENT, _MPA, _GPA, _KN = ("", 1.0), ("%", 0.01), ("MPa", 1e6), ("GPa", 1e9), ("kN", 1e3)
 _STRENGTH_SUFFIXES = dict(zip(_STRENGTHS, ("p0.1", "p0.2", "p1", "eH", "eL", "m"), strict=True))
@@ -77,14 +76,11 @@ class TensileRow:
     unit : str
     figure : Figure
         In that unit, or why it is not known.
-    remarked : bool
-        The text shows the remark of a figure that is known.
     """
 
     name: str
     unit: str
     figure: Figure
-    remarked: bool = False
 
     @property
     def column(self) -> str:
@@ -99,7 +95,7 @@ class TensileRow:
     @property
     def remark(self) -> str:
         """What must be shown with the figure; mostly nothing."""
-        return self.figure.why if self.remarked and self.figure.known else ""
+        return self.figure.why if self.figure.known else ""
 
     @property
     def number(self) -> str:
@@ -136,7 +132,7 @@ def tensile_table(figures: TensileFigures, *, stresses: bool) -> dict[str, Tensi
     names |= {key: (letter + end, strength) for key, end in _STRENGTH_SUFFIXES.items()}
     names |= {key: (key, _PERCENT) for key in _EXTENSIONS} | {key: (key, _PLAIN) for key in _FLOW}
     return {
-        key: TensileRow(name, unit, getattr(figures, key).over(one), key in _REMARKED)
+        key: TensileRow(name, unit, getattr(figures, key).over(one))
         for key, (name, (unit, one)) in names.items()
     }
 

@@ -36,8 +36,7 @@ from acquire.hdf5 import (
     read_superblock,
     stored_rows,
 )
-from acquire.text import Message
-from acquire.text.message import about
+from acquire.text.message import Message, about, word
 from analysis.field import ZoiGrid
 from live.results import layout
 from live.results.quantities import Display, mean_name, quantity_of
@@ -260,7 +259,7 @@ def _open(path: Path, probed: bool) -> tuple[Any, bool]:
             "{path}: cannot be opened ({why}); make it again with phasedic replay", path, error
         ) from error
     if block.unfinished:
-        _log.warning("%s was not closed by its writer; reading all its complete rows", path)
+        _log.warning(Message("{path} was not closed by its writer; reading all its complete rows", path))
     return file, block.unfinished
 
 
@@ -279,9 +278,7 @@ def _grid(strain: Any, text: Any, path: Path) -> ZoiGrid:
     if active.shape != shape:
         raise DataError(
             "{where} is described as {shape} ZOIs, but {found} are there; make it again",
-            where,
-            shape,
-            active.shape,
+            *(where, shape, active.shape),
         )
     grid = ZoiGrid.from_dict(described, read_scalar(active, layout.GRID["active"]).astype(bool))
     for name, places in (("x", grid.x), ("y", grid.y)):
@@ -319,11 +316,11 @@ def _rows(path: Path, datasets: Sequence[Any], *, whole: bool) -> int:
 
 def _warn_of_times(path: Path, times: NDArray[np.float64]) -> None:
     for count, what in (
-        (np.count_nonzero(np.isnan(times)), "rows have no time"),
-        (np.count_nonzero(np.diff(times) < 0), "times run backwards"),
+        (np.count_nonzero(np.isnan(times)), word("rows have no time")),
+        (np.count_nonzero(np.diff(times) < 0), word("times run backwards")),
     ):
         if count:
-            _log.warning("%s: %d %s; they are used as they are", path, count, what)
+            _log.warning(Message("{path}: {n} {what}; they are used as they are", path, count, what))
 
 
 def whole_maps(path: Path) -> dict[str, NDArray[Any]]:

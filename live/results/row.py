@@ -137,10 +137,9 @@ def _noise(field: StrainField) -> tuple[float, NDArray[np.float64]]:
     """As ``StrainRow.noise``, the share of a typical ZOI; the correlation is 0 where it is not known."""
     x, y = field.sigma("exx"), field.sigma("eyy")
     known = field.ok & (x > 0) & (y > 0)
-    shares = (field.sigma("eyy", "current")[known] / y[known]) ** 2
     both = np.zeros(known.shape)
     np.divide(field.covariance[PAIR_INDEX[1, 5]], x * y, out=both, where=known)  # of du_dx and dv_dy
-    return float(np.median(shares)) if shares.size else 1.0, both
+    return field.own_share("eyy"), both
 
 
 def _values(
@@ -174,7 +173,7 @@ def _plates(measurement: Measurement) -> dict[str, float]:
 
 
 def _strains(measurement: Measurement, measure: StrainMeasure) -> dict[str, float]:
-    """Of the region, in ``measure``: those of the time step, where its field has that measure."""
+    """Strains of the region, in ``measure``: those of the time step, where its field has that measure."""
     if measurement.field.measure == measure:
         return {name: getattr(measurement.time_step, name) for name in STRAINS}
     area = AreaStrain.of(replace(measurement.field, measure=measure))

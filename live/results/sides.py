@@ -182,7 +182,7 @@ class SideOfTest:
 
     @classmethod
     def of_folder(cls, run: RunFolder, shift_s: float = 0.0) -> SideOfTest:
-        """Of a finished run, ``shift_s`` later."""
+        """Side of a finished run, ``shift_s`` later."""
         t = np.asarray(run.strain.time_s, np.float64) + shift_s
 
         def course(column: str) -> Course:
@@ -197,7 +197,7 @@ class SideOfTest:
 
     @classmethod
     def of_state(cls, state: RunState, specimen: SpecimenConfig) -> SideOfTest:
-        """Of a test so far; its time is that of the machine."""
+        """Side of a test so far; its time is that of the machine."""
         history, force = state.history, state.history.forces(state.loads)
         t, steps = history.column("t"), history.time_steps
         names = dict(zip((AXIAL, TRANSVERSE), strains_along((), history.current_axis), strict=True))
@@ -267,7 +267,7 @@ class SidesOfTest:
         for where, figures in self.figures.items():
             rows = (row for row in headline(figures, stresses=stresses) if row.figure.known)
             known = joined("  ", [Message("{name} = {text}", row.name, row.text) for row in rows])
-            yield Message("{where:<7}{known}", f"{where}:", known or Message("no figure is known"))
+            yield Message("{where:<8}{known}", word(f"{where}:"), known or Message("no figure is known"))
         if held := beyond_scatter(self.figures["both"]):
             yield Message("±: {CONFIDENCE:.0%} interval, of E with {held}", CONFIDENCE, held)
 

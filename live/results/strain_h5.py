@@ -9,7 +9,8 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -77,7 +78,8 @@ class StrainWriter:
         self._path, self.failed, self._axis = path, False, info.axis
         self._flushed = 0  # rows
         self._timer = FlushTimer(flush_s, now)
-        self._file = self._guard(lambda: create_file(path, lambda file: _declare(file, grid, info)))
+        with self._guard():
+            self._file = create_file(path, lambda file: _declare(file, grid, info))
         entry = self._file["entry"]
         self._maps = {n: PictureStack(entry["strain"][n]) for n in layout.maps(grid.shape)}
         self._values = RowTable(entry["mean"], list(layout.mean(info.gauges, info.extras)))
@@ -90,7 +92,8 @@ class StrainWriter:
 
     def write(self, row: StrainRow) -> None:
         """Append one row."""
-        self._guard(lambda: self._append(row))
+        with self._guard():
+            self._append(row)
         self._timer.wrote()
         self.flush_when_due()
 
@@ -103,7 +106,8 @@ class StrainWriter:
             Time after which this must be called again if no row comes; infinite where none waits.
         """
         if self._timer.left_s() == 0:
-            self._guard(self._flush)
+            with self._guard():
+                self._flush()
         return self._timer.left_s()
 
     def close(self) -> None:
@@ -111,10 +115,11 @@ class StrainWriter:
         if self.failed:
             abandon_file(self._file)
         else:
-            self._guard(self._flush)
-            self._guard(self._write_default_slice)
-            self._guard(self._write_axis)
-            self._guard(self._file.close)
+            with self._guard():
+                self._flush()
+                self._write_default_slice()
+                self._write_axis()
+                self._file.close()
 
     def _append(self, row: StrainRow) -> None:
         values = self._values.row(row.values)
@@ -156,9 +161,10 @@ class StrainWriter:
         mean.attrs.modify("load_axis", np.array(load.axis, "S1"))
         mean.attrs.modify("load_angle_deg", np.float64(math.degrees(load.angle.value)))
 
-    def _guard(self, action: Callable[[], Any]) -> Any:
+    @contextmanager
+    def _guard(self) -> Iterator[None]:
         try:
-            return action()
+            yield
         except (OSError, RuntimeError) as error:  # HDF5 reports a full disk as a RuntimeError
             self.failed = True
             raise self._trouble(error) from error

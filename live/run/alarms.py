@@ -14,17 +14,17 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from acquire.errors import ConfigError
-from acquire.events import Event, EventKind, EventSink
+from acquire.events import Event, EventKind
 from acquire.text import Message
 from acquire.text.message import word
 from acquire.text.quantity import Amount
 from live.config.figures import OF_LOAD, OF_SECTION, figure_of, is_joint
 from live.config.loading import Config
 from live.config.sections import AlarmConfig
-from live.pipeline.consumer import Consumer, Policy
+from live.pipeline.consumer import Consumer, Policy, Screen
 from live.pipeline.measurement import Measurement
-from live.pipeline.run_state import ActiveAlarms
-from live.pipeline.snapshot import BURST, ChannelValues, Snapshot
+from live.pipeline.run_state import RunState
+from live.pipeline.snapshot import BURST, ChannelValues, FurtherChannels
 from live.pipeline.timed.figure import BEYOND, LACKING, FigureState, TimedFigure
 from live.run.strain_output import StrainOut
 
@@ -41,14 +41,14 @@ class ActionMeans:
 
     Attributes
     ----------
-    bell : callable
-        Rings the bell of the terminal.
+    screen : Screen
+        Whose bell is rung.
     end : callable taking a str
         Ends the run for this reason.
     outs : sequence of StrainOut
     """
 
-    bell: Callable[[], None]
+    screen: Screen
     end: Callable[[str], None]
     outs: Sequence[StrainOut] = ()
 
@@ -77,7 +77,7 @@ class RingBell(Action):
 
     def fire(self, event: Event) -> None:
         """Ring."""
-        self.means.bell()
+        self.means.screen.bell()
 
 
 class SendLine(Action):
@@ -243,14 +243,11 @@ class AlarmWatch(Consumer):
     Parameters
     ----------
     alarms : sequence of Alarm
-    values : ChannelValues or None
-    machine : callable
-        The channels of the machine at a monotonic time.
-    active : ActiveAlarms
-    on_event : callable taking an Event
+    values : ChannelValues
+    run_state : RunState
     clock : callable giving monotonic seconds
-    lost : callable
-        Why channels of two cameras have no value any more; empty while they have. Alarms on them then come.
+    joint : FurtherChannels, optional
+        Of two cameras. Alarms on them come too where they have no value any more.
     """
 
     name = "alarms"
@@ -260,20 +257,13 @@ class AlarmWatch(Consumer):
     def __init__(
         self,
         alarms: Sequence[Alarm],
-        values: ChannelValues | None,
-        machine: Callable[[float], Mapping[str, float]],
-        active: ActiveAlarms,
-        on_event: EventSink,
+        values: ChannelValues,
+        run_state: RunState,
         clock: Callable[[], float] = time.monotonic,
-        lost: Callable[[], str] = str,
+        joint: FurtherChannels | None = None,
     ) -> None:
-        self._alarms, self._lost = alarms, lost
-        self._values, self._machine, self._active = (
-            values or ChannelValues(0.0, lambda t, _: Snapshot(t)),
-            machine,
-            active,
-        )
-        self._on_event, self._clock = on_event, clock
+        self._alarms, self._values, self._clock, self._joint = alarms, values, clock, joint
+        self._health, self._active, self._on_event = run_state.health, run_state.alarms, run_state.event_log
         self._count = 0
 
     def measurement(self, measurement: Measurement) -> None:
@@ -287,7 +277,9 @@ class AlarmWatch(Consumer):
 
     def idle(self) -> float:
         """Check what is due by itself: age, force, machine, and whether two cameras still have values."""
-        values = {**self._values.read(), **self._machine(self._clock())}
+        values = {**self._values.read(), **self._health.channels(self._clock())}
+        if self._joint is not None:
+            values |= self._joint.read(self._values.start)
         if self._values.now.figure(BURST).state is not FigureState.ENDED:
             self._check(values, None)
         self._check_lost()
@@ -318,7 +310,7 @@ class AlarmWatch(Consumer):
                 self._active.renew(alarm.name, text)
 
     def _check_lost(self) -> None:
-        why = self._lost()
+        why = "" if self._joint is None else self._joint.lost
         for alarm in self._alarms:
             channel = alarm.config.channel
             if why and is_joint(channel) and alarm.lose():

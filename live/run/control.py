@@ -66,8 +66,6 @@ _COMMANDS = {
     "alarm off": (EventKind.ALARM, ""),
 }
 
-EmitEvent = Callable[[EventKind, str, str, Level], None]  # kind, source, text, level
-
 
 class ControlRefused(Spoken):
     """Its text is why a command is not carried out, and what to do; ``risk``: of a tare that may be confirmed."""
@@ -114,6 +112,23 @@ class TareableCell(Protocol):
     def undo_tare(self) -> None: ...
 
 
+class TareableTest(Protocol):
+    """The test in whose middle a cell may be tared."""
+
+    @property
+    def has_measured(self) -> bool:
+        """Whether anything has been measured yet; before that a tare falsifies nothing."""
+        ...
+
+    @property
+    def latest_load(self) -> LoadSample | None:
+        """The newest sample."""
+        ...
+
+    def emit(self, kind: EventKind, source: str, text: str, level: Level) -> None:
+        """Put an event into the log."""
+
+
 class TareControl:
     """Carries out tare commands: at once without load or before the test, else only when given again after 0.5 to 3 s.
 
@@ -123,11 +138,7 @@ class TareControl:
     Parameters
     ----------
     cell : LoadCell
-    measured : callable
-        Whether anything has been measured yet; before that a tare falsifies nothing.
-    latest : callable giving LoadSample or None
-        The newest sample.
-    emit : callable taking kind, source, text and level
+    test : TareableTest
     clock : callable giving monotonic seconds
     wait_s : float, s
         Longest wait for the event with which the cell reports what it did (``take_event``).
@@ -136,14 +147,11 @@ class TareControl:
     def __init__(
         self,
         cell: TareableCell,
-        measured: Callable[[], bool],
-        latest: Callable[[], LoadSample | None],
-        emit: EmitEvent,
+        test: TareableTest,
         clock: Callable[[], float],
         wait_s: float = TARED_S,
     ) -> None:
-        self._cell, self._measured, self._latest = cell, measured, latest
-        self._emit, self._clock, self._wait_s = emit, clock, wait_s
+        self._cell, self._test, self._clock, self._wait_s = cell, test, clock, wait_s
         self._confirm_t = -math.inf  # time of the last request for a confirmation
         self._done: queue.SimpleQueue[Event] = queue.SimpleQueue()
 
@@ -173,7 +181,7 @@ class TareControl:
         while not self._done.empty():
             self._done.get()
         if how == UNDO:
-            self._emit(EventKind.TARE, "operator", Message("undo the last tare"), "info")
+            self._test.emit(EventKind.TARE, "operator", Message("undo the last tare"), "info")
             self._cell.undo_tare()
         elif risk and (how == ONCE or not BOUNCE_S <= self._clock() - confirm_t <= CONFIRM_S):
             text = Message(
@@ -190,7 +198,7 @@ class TareControl:
             )
         else:
             text = Message("tare, forced") if how == FORCED else Message("tare")
-            self._emit(EventKind.TARE, "operator", text, "info")
+            self._test.emit(EventKind.TARE, "operator", text, "info")
             self._cell.tare(force=how == FORCED)
         return self._outcome()
 
@@ -205,10 +213,12 @@ class TareControl:
 
     def _risk(self) -> str:
         """Why a tare now would falsify what was measured; "" where it would not."""
-        sample, capacity = self._latest(), self._cell.info.capacity_N
-        if sample is None or not self._measured() or abs(sample.force) <= NO_LOAD * (capacity or 0.0):
+        sample, capacity = self._test.latest_load, self._cell.info.capacity_N
+        if sample is None or not self._test.has_measured or abs(sample.force) <= NO_LOAD * (capacity or 0.0):
             return ""
-        load = Message("an unknown load") if math.isnan(sample.force) else f"{sample.force:.6g} N"
+        load = (
+            Message("an unknown load") if math.isnan(sample.force) else Message("{force:.6g} N", sample.force)
+        )
         return Message("not tared yet: {load} in mid-test", load)
 
 
@@ -324,5 +334,5 @@ class ControlPort:
         return server.port
 
     def close(self) -> None:
-        """Take no more commands; again without effect."""
+        """Take no more commands; idempotent."""
         self._closing.close()

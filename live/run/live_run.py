@@ -17,6 +17,7 @@ from pathlib import Path
 from acquire.errors import ConfigError
 from acquire.events import EventKind, Level
 from acquire.load_cell import LoadCell
+from acquire.load_sample import LoadSample
 from live.config.cameras import FRONT
 from live.config.loading import Config
 from live.pipeline.consumer import Compose, Screen
@@ -54,15 +55,21 @@ class LiveRun:
     ) -> None:
         self.cameras, self.folder, self._load, self._stop = cameras, folder, load, stop
         self._load_source = LoadSource(load, stream)
-        self._tares = TareControl(
-            load, self._has_measured, lambda: self.run_state.loads.latest, self._emit, time.monotonic
-        )
+        self._tares = TareControl(load, self, time.monotonic)
         self.run_state.event_log.add_listener(self._tares.take_event)
 
-    def _has_measured(self) -> bool:
+    @property
+    def has_measured(self) -> bool:
+        """Whether any camera has measured."""
         return any(run.has_measured for run in self.cameras.values())
 
-    def _emit(self, kind: EventKind, source: str, text: str, level: Level) -> None:
+    @property
+    def latest_load(self) -> LoadSample | None:
+        """The newest sample."""
+        return self.run_state.loads.latest
+
+    def emit(self, kind: EventKind, source: str, text: str, level: Level) -> None:
+        """Put an event into the log of every camera that goes on."""
         for run in self._running:
             run.run_state.event_log.emit(kind, source, text, level)
 
@@ -106,7 +113,7 @@ class LiveRun:
 
     @property
     def states(self) -> dict[str, RunState]:
-        """That of each camera."""
+        """The state of each camera."""
         return {name: run.run_state for name, run in self.cameras.items()}
 
     def stop(self, reason: str) -> None:

@@ -70,7 +70,7 @@ class OutcomeOfTest:
 
     @property
     def exit_code(self) -> int:
-        """That of all (``acquire.errors.exit_code_of_all``)."""
+        """Exit code of all cameras (``acquire.errors.exit_code_of_all``)."""
         return exit_code_of_all(outcome.exit_code for outcome in self.cameras.values())
 
 
@@ -101,7 +101,6 @@ class StopSignal:
         if self._requested.is_set():
             callback()
 
-    @property
-    def requested(self) -> bool:
+    def is_set(self) -> bool:
         """Whether the stop is requested."""
         return self._requested.is_set()

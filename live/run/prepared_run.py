@@ -112,7 +112,7 @@ def set_up(config: Config, rig: Rig, event_log: EventLog, screen: Screen, stop: 
     plan = MeasurePlan.of(config, camera, _mask(config, rig))
     check_channel(plan.config, forces=config.load.address != "none:")
     bursts = _burst_lengths(config, camera.live)
-    took = plan.compile(camera, screen.status, lambda: stop.requested)
+    took = plan.compile(camera, screen, stop)
     if took > 0:
         screen.print(Message("everything is compiled ({took:.0f} s)", took))
     compile_loops()

@@ -14,8 +14,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from types import FrameType
+from typing import Protocol
 
 from acquire.errors import ConfigError, Interrupted
 from acquire.system import (
@@ -25,6 +26,8 @@ from acquire.system import (
     signal_handler,
     unblock_signals,
 )
+from acquire.text import Message
+from live.pipeline.consumer import Screen
 
 log = logging.getLogger(__name__)
 _POLL_S, _MODULE = 0.25, "live.setup.compiling"
@@ -34,12 +37,18 @@ _INTERRUPTED = (
 )
 
 
+class Stopping(Protocol):
+    """What ends a step before its time: a ``threading.Event``, or the stop of a run."""
+
+    def is_set(self) -> bool: ...
+
+
 def compile_ahead(
     kinds: Sequence[str],
     *,
     phase: bool = False,
-    show: Callable[[str], object] = lambda text: None,
-    stopped: Callable[[], bool] = lambda: False,
+    screen: Screen | None = None,
+    stopping: Stopping | None = None,
 ) -> float:
     """Compile what pictures of these kinds need and the cache lacks; returns the seconds that took.
 
@@ -49,15 +58,15 @@ def compile_ahead(
         Of ``analysis.PICTURE_KINDS``.
     phase : bool
         Also for the phase estimator.
-    show : callable taking a text, optional
-        Receives the progress several times a second.
-    stopped : callable, optional
-        Polled several times a second; True ends the compilation.
+    screen : Screen, optional
+        Its status line shows the progress several times a second.
+    stopping : Stopping, optional
+        Looked at several times a second; once set it ends the compilation.
 
     Raises
     ------
     Interrupted
-        ``stopped`` returned True, or Ctrl-C or SIGTERM came; handlers of these signals are called too.
+        ``stopping`` was set, or Ctrl-C or SIGTERM came; handlers of these signals are called too.
     """
     from analysis import COMPILE_PARTS, not_compiled, share_compiled
 
@@ -76,9 +85,11 @@ def compile_ahead(
             while any(process.poll() is None for process in processes):
                 interrupted.wait(_POLL_S)
                 over = any(process.poll() == -signal.SIGINT for process in processes)
-                if over or interrupted.is_set() or stopped():
+                if over or interrupted.is_set() or (stopping and stopping.is_set()):
                     raise Interrupted(_INTERRUPTED)
-                show(progress_text(share_compiled(kinds, began_file, phase=phase), time.monotonic() - began))
+                share = share_compiled(kinds, began_file, phase=phase)
+                if screen:
+                    screen.status(progress_text(share, time.monotonic() - began))
     except KeyboardInterrupt:  # from the handler of a command that has no other
         raise Interrupted(_INTERRUPTED) from None
     finally:
@@ -87,20 +98,18 @@ def compile_ahead(
                 process.terminate()
             process.wait()
     if not_compiled(kinds, phase=phase):
-        log.warning("what was compiled could not be kept; make numba's cache writable (NUMBA_CACHE_DIR)")
+        log.warning(Message("compiled code could not be kept; set NUMBA_CACHE_DIR to a writable folder"))
     return time.monotonic() - began
 
 
 def progress_text(share: float, seconds: float) -> str:
     """A bar of what is compiled after so many seconds, and about how long the rest takes."""
     full = round(BAR_LENGTH * share)
-    left = (
-        "about a minute"
-        if share < KNOWN_SHARE
-        else f"about {math.ceil(seconds * (1 / share - 1)) + 1} s left"
-    )
+    left = Message("about a minute")
+    if share >= KNOWN_SHARE:
+        left = Message("about {s} s left", math.ceil(seconds * (1 / share - 1)) + 1)
     bar = "#" * full + "." * (BAR_LENGTH - full)
-    return f"compiling for this processor, once: [{bar}] {seconds:.0f} s, {left}"
+    return Message("compiling for this processor, once: [{bar}] {s:.0f} s, {left}", bar, seconds, left)
 
 
 @contextlib.contextmanager

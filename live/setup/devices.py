@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 from acquire.addresses import parse_address, with_setting
 from acquire.camera import CAMERAS, Camera, CroppedCamera, open_camera
 from acquire.errors import ConfigError
 from acquire.events import Event, EventSink, ignore_event
-from acquire.load_cell import LoadCell, ZeroedLoadCell, open_load_cell
+from acquire.load_cell import LOAD_CELLS, LoadCell, ZeroedLoadCell, open_load_cell
 from acquire.record_mode import Crop
 from live.config.sections import CameraConfig, LoadConfig
 
@@ -139,9 +139,20 @@ def check_load_sign(load: LoadConfig) -> None:
 
 def camera_settings() -> dict[str, type]:
     """The class of the settings of every kind of camera, by scheme."""
+    from hw_mocks.memory_camera import MemorySettings
     from hw_mocks.sim_settings import SimSettings
 
-    return {"sim": SimSettings, **dict(CAMERAS.settings())}
+    return {"sim": SimSettings, "bench": MemorySettings, **dict(CAMERAS.settings())}
+
+
+def load_settings() -> dict[str, type]:
+    """The class of the settings of every kind of load cell, by scheme, and of every protocol that has its own."""
+    from acquire.protocols.base import PROTOCOLS, find_protocol
+    from hw_mocks.sim_load_cell import SimLoadSettings
+
+    protocols = {f"protocol={name}": find_protocol(name).settings for name in PROTOCOLS}
+    own = {name: kind for name, kind in protocols.items() if fields(kind)}
+    return {"sim": SimLoadSettings, **dict(LOAD_CELLS.settings()), **own}
 
 
 def at_rest(address: str) -> str:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
 from acquire.text import Message
+from acquire.text.message import word
 from analysis.field import StrainField
 from analysis.optics import LensFit, LensModel, lens_of_shifts, strain_of_shift
 from live.config.loading import Config
@@ -90,9 +91,7 @@ def lens_words(lens: LensModel, grid: ZoiGrid) -> str:
     return Message(
         "a shift of {SHOWN_SHIFT_PX:g} px shows {strain:.1f} µm/m in the region; removed, known to "
         "{sigma:.2g} µm/m",
-        SHOWN_SHIFT_PX,
-        strain * 1e6,
-        sigma * 1e6,
+        *(SHOWN_SHIFT_PX, strain * 1e6, sigma * 1e6),
     )
 
 
@@ -155,7 +154,8 @@ def from_shifts(fields: Sequence[StrainField], width: int, height: int, *, squar
             "{why}; give more pictures of the still specimen, shifted in its plane", error
         ) from None
     places = np.concatenate([_places(field) for field in fields])
-    method = f"{len(fields)} shifted pictures of the specimen" + (", camera square to it" if square else "")
+    method = Message("{n} shifted pictures of the specimen", len(fields))
+    method += Message(", camera square to it") if square else ""
     return LensCalibration(fit, (width, height), _box(places), method)
 
 
@@ -195,13 +195,12 @@ def from_boards(pictures: Iterable[NDArray[Any]], board: Board, *, k3: bool = Fa
         raise DataError(
             "{found} of {count} pictures show the board; it takes {needed}, at many places and tilted by 10 to 30"
             " degrees in all directions; look at its corners, focus, light",
-            len(found),
-            count,
-            MIN_BOARDS,
+            *(len(found), count, MIN_BOARDS),
         )
     fit = lens_of_corners(found, size, k3)
-    kind = "ChArUco board" if board.marker_mm else "checkerboard"
-    method = f"{kind}, {sum(len(one.px) for one in found)} corners in {len(found)} of {count} pictures"
+    kind = word("ChArUco board" if board.marker_mm else "checkerboard")
+    corners = sum(len(one.px) for one in found)
+    method = Message("{kind}, {n} corners in {found} of {count} pictures", kind, corners, len(found), count)
     return LensCalibration(fit, size, _box(np.concatenate([one.px for one in found])), method)
 
 

@@ -17,11 +17,12 @@ from acquire.text import Message
 from analysis.optics import LensCorrection, LensModel, PlateFit, ShutterCorrection
 from live.config.gauges import gauges_for
 from live.config.loading import Config
+from live.pipeline.consumer import Screen
 from live.pipeline.guards import DilatationGuard, TiltGuard, standard_guards
 from live.pipeline.measure import Corrections, NewReference, OnFailure, PlateCorrection, Tracker, measure
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import Correction, prepare
-from live.setup.compiling import compile_ahead
+from live.setup.compiling import Stopping, compile_ahead
 from live.setup.dry_run import picture_kinds
 from live.setup.grid import grid_for, kernel_settings, plates_for
 from live.setup.lens import lens_for
@@ -112,12 +113,10 @@ class MeasurePlan:
         """The ZOIs that the kernel measures: those of the test, and of plates."""
         return self.grid if self.plates is None else self.plates.layout.whole
 
-    def compile(
-        self, camera: CameraInfo, show: Callable[[str], object], stopped: Callable[[], bool]
-    ) -> float:
+    def compile(self, camera: CameraInfo, screen: Screen, stopping: Stopping | None) -> float:
         """Compile what is not compiled yet (``compile_ahead``); returns the seconds that took."""
         phase = self.settings.estimator == "phase"
-        return compile_ahead(picture_kinds(camera), phase=phase, show=show, stopped=stopped)
+        return compile_ahead(picture_kinds(camera), phase=phase, screen=screen, stopping=stopping)
 
     def on(self, reference: Burst, what: str = Message("the reference")) -> PreparedKernel:
         """The kernel on ``reference``, named ``what`` in errors; raises as ``live.pipeline.reference.prepare``."""

@@ -6,7 +6,7 @@ its folder and a replay use it from there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -23,6 +23,7 @@ from acquire.frame import QUANTISATION, CameraInfo
 from acquire.text import Message
 from live.config.loading import Config
 from live.config.values import ALL, AUTO
+from live.pipeline.consumer import Screen
 from live.setup.frames import camera_of, report_warnings, whole_frames
 from live.setup.grid import grid_for, whole_picture
 from live.setup.pictures import read_mask, with_mask
@@ -175,10 +176,10 @@ class FirstLook:
         return width, height
 
 
-def first_look(config: Config, print_line: Callable[[str], None]) -> FirstLook:
+def first_look(config: Config, screen: Screen) -> FirstLook:
     """Open the camera, take a few frames, and close it; raises as ``open_rig``.
 
-    ``print_line`` receives the warnings of the camera meanwhile.
+    ``screen`` shows the warnings of the camera meanwhile.
 
     Raises
     ------
@@ -187,7 +188,7 @@ def first_look(config: Config, print_line: Callable[[str], None]) -> FirstLook:
     DeviceError
         See ``frames_of``.
     """
-    with camera_of(config.camera.address, report_warnings(print_line), crop=config.camera.crop) as camera:
+    with camera_of(config.camera.address, report_warnings(screen.print), crop=config.camera.crop) as camera:
         n = FIRST_LOOK_FRAMES if camera.info.live else 1
         images = [frame.image for frame in islice(whole_frames(camera), n)]
     if not images:
@@ -204,7 +205,7 @@ def _mean_and_noise(images: list[NDArray[Any]]) -> tuple[NDArray[Any], float | N
 
 
 @contextmanager
-def located(config: Config, print_line: Callable[[str], None]) -> Iterator[Config]:
+def located(config: Config, screen: Screen) -> Iterator[Config]:
     """The configuration of a test with the specimen found, if no region is given, and automatic gauges placed.
 
     The mask lies in a temporary folder; a run copies it into its own.
@@ -213,14 +214,12 @@ def located(config: Config, print_line: Callable[[str], None]) -> Iterator[Confi
         yield config
         return
     auto_region = is_auto_region(config)
-    config, mask = located_on(config, first_look(config, print_line), print_line)
+    config, mask = located_on(config, first_look(config, screen), screen)
     with TemporaryDirectory(prefix="phasedic-") as folder:
         yield with_mask(config, mask if auto_region else None, Path(folder))
 
 
-def located_on(
-    config: Config, first: FirstLook, print_line: Callable[[str], None]
-) -> tuple[Config, Bools | None]:
+def located_on(config: Config, first: FirstLook, screen: Screen) -> tuple[Config, Bools | None]:
     """The configuration with region and automatic gauges in px, and the mask (H, W).
 
     Raises
@@ -230,5 +229,5 @@ def located_on(
     """
     region = region_of(config, first.picture, first.visible_noise)
     if is_auto_region(config):
-        print_line(Message("{words} (--roi all or --roi X,Y,W,H choose another region)", region.words))
+        screen.print(Message("{words} (--roi all or --roi X,Y,W,H choose another region)", region.words))
     return with_auto_gauges(region.config(config), region.grid(config, *first.size)), region.mask

@@ -7,7 +7,8 @@ import math
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from acquire.errors import PhasedicError
@@ -71,7 +72,8 @@ class Adapted(Subscriber):
         if self._consumer.blocks:
             self._thread.start()
         else:
-            self._guarded(self._consumer.begin)
+            with self._guarded():
+                self._consumer.begin()
 
     def take(self, record: Record) -> None:
         """Deliver or queue its body; blocks only with ``Policy.WAIT``."""
@@ -131,17 +133,16 @@ class Adapted(Subscriber):
 
     def _work(self) -> None:
         lower_priority(OUTPUT)
-        self._guarded(self._consumer.begin)
+        with self._guarded():
+            self._consumer.begin()
         while (batch := self._next()) is not None:
             while batch:
                 self._deliver(*batch.popleft())  # and drop the reference: a measurement has pictures
-            self._guarded(self._idle)
+            self._idle_s = math.inf
+            if not self._failed:
+                with self._guarded():
+                    self._idle_s = self._consumer.idle()
         self._close()
-
-    def _idle(self) -> None:
-        self._idle_s = math.inf
-        if not self._failed:
-            self._idle_s = self._consumer.idle()
 
     def _next(self) -> deque[tuple[str, Any]] | None:
         """What is queued, kind by kind; nothing where the consumer's idle time is over; None at the end."""
@@ -159,27 +160,25 @@ class Adapted(Subscriber):
             return batch if batch or not self._ending else None
 
     def _deliver(self, kind: str, item: Any) -> None:
-        if not self._failed and self._guarded(lambda: getattr(self._consumer, kind)(item)):
-            self._taken[kind] += 1
+        if not self._failed:
+            with self._guarded():
+                getattr(self._consumer, kind)(item)
+                self._taken[kind] += 1
 
     def _close(self) -> None:
-        def close() -> None:
+        with self._guarded():
             self._summary = self._consumer.end()
 
-        self._guarded(close)
-
-    def _guarded(self, step: Callable[[], None]) -> bool:
-        """One step of the consumer; the first one that fails ends this consumer only, and is reported."""
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
+        """Around a step of the consumer; the first one that fails ends this consumer only, and is reported."""
         try:
-            step()
+            yield
         except PhasedicError as error:
             self._fail(error.text)
         except BaseException as error:  # a panic inside a library is not an Exception
             log.exception("%s failed", self._consumer.name)
             self._fail(Message("by a defect: {error}", repr(error)))
-        else:
-            return True
-        return False
 
     def _fail(self, why: str) -> None:
         if self._failed:

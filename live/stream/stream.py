@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -100,7 +101,7 @@ class Record:
     role: Role = "plain"
 
 
-class Subscriber:
+class Subscriber(ABC):
     """Takes the records of some kinds, in the thread that publishes them.
 
     Attributes
@@ -111,9 +112,9 @@ class Subscriber:
 
     takes: Iterable[type] = ()
 
+    @abstractmethod
     def take(self, record: Record) -> None:
         """Take one record; returns at once, but for sources that wait for their readers, and does not raise."""
-        raise NotImplementedError
 
 
 class Stream:

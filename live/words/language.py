@@ -11,6 +11,7 @@ import logging
 import os
 from collections.abc import Mapping
 from functools import cache
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -107,7 +108,7 @@ def said(text: str, language: str) -> str:
         if isinstance(value, Amount):
             return str(value.printed(language))
         number = formatted(value, spec)
-        return number.replace(".", decimal_mark(language)) if isinstance(value, float) else number
+        return number.replace(".", decimal_mark(language)) if isinstance(value, Real) else number
 
     try:
         return filled(words.get(text.template, text.template), text.values, shown)

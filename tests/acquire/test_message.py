@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from acquire.text import Message
-from acquire.text.message import about, filled, from_json, joined, kept, taken
+from acquire.text.message import about, filled, formatted, from_json, joined, kept, taken
 from acquire.text.quantity import Amount
 
 
@@ -31,6 +31,19 @@ def test_values_stand_in_the_order_of_the_fields() -> None:
     for wrong in ((1,), (1, 2, 3)):
         with pytest.raises(ValueError, match="zip"):
             Message("{a} {b}", *wrong)
+
+
+@pytest.mark.parametrize(
+    ("value", "spec", "text"),
+    [
+        (6350.4, ".3g", "6\u202f350"), (-12345.67, ".1f", "−12\u202f345.7"), (-0.04, ".1f", "0.0"),
+        (np.float32(-1.5), ".3g", "−1.5"), (float("nan"), ".1f", "–"), (-1.5, "g", "-1.5"), (54321, "", "54321"),
+    ],
+)  # fmt: skip
+def test_numbers_are_printed_as_quantities_but_for_what_may_be_typed_again(
+    value: float, spec: str, text: str
+) -> None:
+    assert formatted(value, spec) == text
 
 
 def test_braces_of_the_text_and_of_a_value_stay() -> None:

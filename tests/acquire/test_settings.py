@@ -100,7 +100,10 @@ def test_those_of_another_package_are_listed_behind_ours(
     assert [scheme for scheme, _ in CAMERAS.settings()] == [*KINDS, "film"]
     assert main(["devices", "--settings"]) == 0
     told = capsys.readouterr().out
-    assert told.endswith(
-        "film:\n  gray: what is grey in a colour picture (one of luma, r, g, b; default luma)\n"
+    film = "  film:\n    gray: what is grey in a colour picture (one of luma, r, g, b; default luma)\n"
+    assert f"{film}load cells:\n  sim:\n" in told
+    assert "    timeout: silence that is reported (a number from 0.05 to 3600; s; default 2.0)\n" in told
+    assert (
+        "  protocol=hbm-aed:\n    nominal: load of 1 000 000 counts" in told and "protocol=sauter" not in told
     )
-    assert "  fps: pictures a second (a number from 1e-06 to 1e+06; 1/s; default 1.0)\n" in told
+    assert "    fps: pictures a second (a number from 1e-06 to 1e+06; 1/s; default 1.0)\n" in told

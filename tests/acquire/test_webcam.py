@@ -132,13 +132,6 @@ def test_a_dead_handle_is_opened_again_and_told() -> None:
     assert first.read_count == 3  # one failure is enough
 
 
-def test_the_same_picture_again_and_again_is_not_measured() -> None:
-    events: list[Event] = []
-    frames = take(camera_of(FakeCapture(shots(0, 7, 7, 7, 7, 8)), events=events.append), 5)
-    assert [frame.damaged for frame in frames] == [False, False, True, True, False]
-    assert sum("same picture" in event.text for event in events) == 1
-
-
 def test_what_is_not_honoured_is_refused_with_what_there_is() -> None:
     capture = FakeCapture(shots(1), FRAME_WIDTH=640)
     with pytest.raises(ConfigError, match="width=1920, the driver gives 640"):

@@ -99,7 +99,7 @@ def test_the_time_of_a_picture_is_that_of_its_lines_but_one() -> None:
     for one in (u, dv_dy):
         one[::9] = np.nan
     assert readout_of_motion(t, (u, v), (du_dy, dv_dy), 41).seconds == pytest.approx(40 * 1e-4, rel=1e-3)
-    with pytest.raises(ValueError, match="90 pictures with a value, one after the other; it takes 16"):
+    with pytest.raises(ValueError, match="90 pictures with a value in order; it takes 16"):
         readout_of_motion(t[::-1], *((one, one) for one in (swung(90, 1e-4)[1:3])), 41)  # type: ignore[arg-type]
 
 

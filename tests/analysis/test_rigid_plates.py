@@ -119,7 +119,7 @@ def test_two_zois_a_side_make_a_plate(width: float, room: bool) -> None:
             assert min(PlateLayout.of(GRID, {"p": box}).plates["p"].of(GRID_WIDE).shape) == 2
         else:
             with pytest.raises(
-                ValueError, match=r"plate p of .* has no room for 2 x 2 ZOIs of 32 px, 16 px apart"
+                ValueError, match=r"plate p of .* has no room for 2 x 2 ZOIs of 32 px; make it larger"
             ):
                 PlateLayout.of(GRID, {"p": box})
 

@@ -91,8 +91,10 @@ def test_a_weight_that_hangs_on_a_quiet_load_cell_creeps() -> None:
 
 
 def test_the_highest_stress_is_uncertain_by_its_resolution() -> None:
-    found = evaluate_test(pulled(resolution=5e6)).Rm
-    assert found.value == pytest.approx(310e6) and found.low < STRESS.max() < found.high
+    test = pulled(resolution=5e6)
+    test.stress[-1] = 0.0  # it breaks
+    found = evaluate_test(test).Rm
+    assert found.value == pytest.approx(310e6) and found.low < STRESS[:-1].max() < found.high
     assert found.high - found.low < 7e6
 
 

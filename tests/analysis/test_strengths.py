@@ -64,7 +64,8 @@ def test_a_stress_that_ends_within_three_sigmas_of_the_highest_still_rose(below:
     stress[-1] = stress.max() - below
     found = tensile_strength(Curve(np.arange(50.0), np.zeros(50), stress))
     assert found.value == 40.1e6
-    assert found.why == ("so far: the test ended while the stress still rose" if so_far else "")
+    assert found.why == ("the test ended before the stress fell" if so_far else "")
+    assert found.is_bound == so_far and math.isinf(found.high) == so_far
 
 
 def test_agt_is_the_middle_of_what_noise_leaves_of_the_top() -> None:

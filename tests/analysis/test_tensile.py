@@ -68,7 +68,8 @@ def test_the_intervals_hold_the_truth(name: str) -> None:
         figures: list[Figure] = [getattr(one, key) for one in found]
         inside = sum(f.low <= values(truth)[key] <= f.high for f in figures)
         assert inside >= 0.85 * SEEDS, f"{key}: {inside} of {SEEDS}"
-        widest = max((f.high - f.low) / 2 for f in figures) / values(truth)[key]
+        halves = [f.value - f.low if f.is_bound else (f.high - f.low) / 2 for f in figures]
+        widest = max(halves) / values(truth)[key]
         assert widest < (0.2 if key == "nu" else 0.06), f"{key}: +- {100 * widest:.1f} %"
 
 
@@ -163,7 +164,7 @@ def test_what_cannot_be_had_has_a_reason() -> None:
     assert "no yield point" in found.ReH.why
     assert "no break" in found.At.why
     assert "before the stress fell" in found.Agt.why
-    assert "so far" in found.Rm.why
+    assert found.Rm.is_bound and found.Rm.why == found.Agt.why
     laminate = evaluate_test(noisy(composite(), 0), LAMINATE)
     assert laminate.Rp02.why == "not a figure of astm-d3039"
     assert found.standard == "iso6892"

@@ -24,16 +24,16 @@ ACQUIRE = {
 }
 ANALYSIS = {
     "analysis.field": "acquire.text",
-    "analysis.compiled": "",
+    "analysis.compiled": "acquire.compiled_loops",
     "analysis.picture": "analysis.field analysis.compiled",
     "analysis.follow": "analysis.field analysis.compiled",
     "analysis.evaluate": "analysis.field analysis.compiled acquire.text",
-    "analysis.optics": "analysis.field analysis.evaluate",
+    "analysis.optics": "analysis.field analysis.evaluate acquire.text",
     "analysis.quality": "analysis.field analysis.picture",
     "analysis.fit": "analysis.field analysis.compiled analysis.picture",
     "analysis.self_test": "analysis.field analysis.compiled acquire acquire.text",
     "analysis.kernel": "analysis.field analysis.compiled analysis.picture analysis.fit analysis.follow"
-    " analysis.self_test",
+    " analysis.self_test acquire.text",
     "analysis": "analysis.field analysis.kernel analysis.self_test",
 }
 # From the bottom to the top: each may import those before it, and acquire and analysis.

@@ -198,8 +198,8 @@ def test_the_exposure_is_half_a_period_at_most(fps: int, exposure_us: float) -> 
 
 def test_a_load_cell_and_a_memory_camera_of_which_nothing_is_said() -> None:
     plain = SimLoadSettings()
-    assert (plain.protocol, plain.style, plain.rate, plain.noise_N) == ("ascii", "millis", 80, 1)
-    assert (plain.resolution_N, plain.capacity_N, plain.weight_N, plain.seed) == (0.1, 10_000, 0, 0)
+    assert (plain.protocol, plain.line, plain.rate, plain.noise_N) == ("ascii", "millis", 80, 1)
+    assert (plain.resolution_N, plain.range_N, plain.weight_N, plain.seed) == (0.1, 10_000, 0, 0)
     with open_sim_load(parse_address("sim:"), ignore_event, VirtualSpecimen(nominal=True)) as cell:
         stated = cell.info.settings
     assert stated["noise_N"] == pytest.approx(math.sqrt(1 + 0.1**2 / 12))

@@ -88,15 +88,15 @@ LINES = {"baud": "9600", "bytesize": "8", "parity": "N"}
 TIMED = {"millis": "1", "column": "2"}
 READERS: dict[str, tuple[SimLoadSettings, dict[str, str]]] = {
     "ascii": (SimLoadSettings(), LINES | {"baud": "115200"} | TIMED),
-    "ascii plain": (SimLoadSettings(style="plain"), LINES | {"baud": "115200"}),
-    "ascii label": (SimLoadSettings(style="label"), LINES | {"baud": "115200"}),
-    "ascii openscale": (SimLoadSettings(style="openscale"), LINES | {"baud": "115200"} | TIMED),
+    "ascii plain": (SimLoadSettings(line="plain"), LINES | {"baud": "115200"}),
+    "ascii label": (SimLoadSettings(line="label"), LINES | {"baud": "115200"}),
+    "ascii openscale": (SimLoadSettings(line="openscale"), LINES | {"baud": "115200"} | TIMED),
     "mt-sics": (SimLoadSettings("mt-sics"), LINES),
     "aed-standard": (SimLoadSettings("aed-standard"), {"baud": "2400", "bytesize": "7", "parity": "E"}),
     "mark10": (SimLoadSettings("mark10"), LINES),
     "sauter": (SimLoadSettings("sauter"), LINES | {"unit": "N"}),
     "hbm-aed": (
-        SimLoadSettings("hbm-aed", capacity_N=500.0),
+        SimLoadSettings("hbm-aed", range_N=500.0),
         LINES | {"parity": "E", "unit": "N", "nominal": "500"},
     ),
     "modbus": (

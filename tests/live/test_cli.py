@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from acquire.errors import EXIT_INTERRUPTED, ConfigError, DataError, DeviceError
+from acquire.text import Message
 from live import cli
 from tests.live.screens import Terminal
 
@@ -134,6 +135,19 @@ def test_a_message_replaces_the_status_line_of_a_terminal_and_is_printable(
     handler.setFormatter(cli._PrintableFormatter("%(message)s"))
     handler.emit(logging.LogRecord("live", logging.INFO, "", 0, "bad \x1b[31m", None, None))
     assert stream.getvalue() == f"{lead}bad \\x1b[31m\n"
+
+
+def test_the_log_has_the_language_of_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LC_ALL", "de_DE.UTF-8")
+    text = Message(
+        "the viewer {path} did not start: {error}", "100 %s", OSError(2, "No such file or directory")
+    )
+    record = logging.LogRecord("live", logging.WARNING, "", 0, text, None, None)
+    shown = cli._PrintableFormatter("%(levelname)s %(message)s").format(record)
+    assert (
+        shown == "WARNUNG der Betrachter 100 %s ist nicht gestartet: keine solche Datei, kein solcher Ordner"
+    )
+    assert record.levelname == "WARNING"
 
 
 @pytest.mark.parametrize(("verbose", "root", "ours"), [(False, 30, 20), (True, 10, 10)])

@@ -7,6 +7,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -146,8 +147,11 @@ def test_a_limit_over_the_value_of_a_cycle(
     modulus = rows_of(folder)["secant_modulus_Pa"]
     config, events = AlarmConfig(channel="secant_modulus", below=0.99, of_cycle=of_cycle), list[Event]()
     state = outcome.run_state
-    values = ChannelValues(0.0, lambda t, step: replace(state.snapshot(t, step), figures={}))
-    AlarmWatch([Alarm(config)], values, lambda t: {}, ActiveAlarms(), events.append).idle()
+    unjudged: Any = SimpleNamespace(snapshot=lambda t, step: replace(state.snapshot(t, step), figures={}))
+    test: Any = SimpleNamespace(
+        health=SimpleNamespace(channels=lambda t: {}), alarms=ActiveAlarms(), event_log=events.append
+    )
+    AlarmWatch([Alarm(config)], ChannelValues(0.0, unjudged), test).idle()
     if not number:
         return
     (event,) = events

@@ -25,7 +25,7 @@ from live.pipeline.event_log import sentence
 from live.results.maps.painting import FIELD_MAPS
 from live.results.quantities import KNOWN as QUANTITIES
 from live.results.report.record import FIGURES
-from live.setup.devices import camera_settings
+from live.setup.devices import camera_settings, load_settings
 from live.ui.web.broadcaster import json_bytes
 from live.words import language
 from live.words.language import LANGUAGES, entries, parsed, said
@@ -188,7 +188,11 @@ def test_every_text_of_the_page_is_translated(name: str) -> None:
     served = {word for kind in GAUGE_KINDS.values() for word in (kind.label, kind.hint)}
     served |= {str(kind) for kind in EventKind}
     served |= {one.words for one in QUANTITIES.values() if not isinstance(one.words, Message)}
-    served |= {one.words for kind in camera_settings().values() for one in settings_of(kind)}
+    served |= {
+        one.words
+        for kind in (*camera_settings().values(), *load_settings().values())
+        for one in settings_of(kind)
+    }
     served |= {words for _, _, words in FIGURES} | {item for item, _, _ in practice_rows()}
     assert not {text for text in {*of_the_page(), *FIELD_MAPS, *served} if text not in entries(name)}
 

@@ -50,7 +50,7 @@ class Places(NamedTuple):
 
     @classmethod
     def of(cls, grid: ZoiGrid, window: Window) -> Places:
-        """Of ``grid`` with a window."""
+        """Places of the ZOIs of ``grid`` with a window."""
         return cls(grid.shape, grid.size, grid.step, window)
 
 
@@ -251,7 +251,7 @@ def _solved(places: Places, area: bytes) -> _Solved:
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """Of displacement and two gradients of all ZOIs of a grid, for noise of 1 of the pixels.
+    """Covariance of displacement and two gradients of all ZOIs of a grid, for pixel noise of 1.
 
     ``down`` and ``across`` have the matrices (R, R) and (C, C) of moments 0 and 0, 0 and 1, 1 and 1.
     """

@@ -67,7 +67,7 @@ class AreaStrain:
 
     @classmethod
     def of(cls, field: StrainField, where: ArrayLike | None = None) -> AreaStrain | None:
-        """Of the active ZOIs of ``field``, or of those in ``where`` (R, C).
+        """Strain of the active ZOIs of ``field``, or of those in ``where`` (R, C).
 
         None where none has a value, or where they have come apart (``StrainField.parts``).
         """
@@ -168,7 +168,7 @@ class StrainShapes:
 
 
 def strain_shapes(places: Places, area: Bools) -> StrainShapes | None:
-    """Of the ZOIs of an area (R, C); None where they are too few or lie in a row."""
+    """Shapes of the ZOIs of an area (R, C); None where they are too few or lie in a row."""
     return _shapes(places, area.tobytes())
 
 

@@ -252,7 +252,7 @@ class CycleTable:
 
     @classmethod
     def of(cls, load: Iterable[Track] | None, bursts: BurstStrains, start_t: float = 0.0) -> CycleTable:
-        """Of a test that is over; without a ``load``, which comes by the piece, by the strain.
+        """Cycles of a finished test; without a ``load``, which comes by the piece, by the strain.
 
         Both have increasing times, s; ``start_t`` is the zero of those of the table.
         """

@@ -156,7 +156,7 @@ class Loops:
 
     @classmethod
     def of(cls, waves: Waves, bursts: BurstStrains) -> Loops:
-        """Of the bursts in cycles of the load; their times increase."""
+        """Loops of the bursts in cycles of the load; their times increase."""
         first, last = (
             np.searchsorted(bursts.t, waves.middle + side * waves.duration / 2) for side in (-1, 1)
         )

@@ -44,7 +44,7 @@ class Parameter:
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """Of its field."""
+        """Metadata of its field."""
         return {"parameter": self}
 
 

@@ -48,7 +48,7 @@ def inside_polygon(x: Floats, y: Floats, corners: Sequence[Point] | Floats) -> M
 
 
 def corners_of(box: Box) -> tuple[Point, ...]:
-    """Of x, y, width, height."""
+    """Corners of a box x, y, width, height."""
     x, y, width, height = box
     return (x, y), (x + width, y), (x + width, y + height), (x, y + height)
 

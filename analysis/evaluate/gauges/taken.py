@@ -69,7 +69,7 @@ class Row(NamedTuple):
 
     @classmethod
     def of(cls, maps: Sequence[int], at: Flat, weights: Floats, count: int) -> Row:
-        """Of the ZOIs ``at`` (n,) of ``count`` in some maps, by ``weights`` (maps, n)."""
+        """What is taken of the ZOIs ``at`` (n,) of ``count`` in some maps, by ``weights`` (maps, n)."""
         return cls(np.add.outer(count * np.array(maps), at).ravel(), weights.ravel())
 
 
@@ -100,7 +100,7 @@ class Taken:
     kind: int = 0
 
     def factors(self, sums: Floats) -> Sequence[float]:
-        """Of the covariances of ``pairs``, in a field with these ``sums`` (S, 1 + K)."""
+        """Factors of the covariances of ``pairs``, in a field with these ``sums`` (S, 1 + K)."""
         return 0.0, 0.0, 0.0
 
     def read(self, now: Now, sums: Floats, variance: float) -> Read:
@@ -193,7 +193,7 @@ class EndsTaken(Taken):
 
     @classmethod
     def of(cls, first: Flat, second: Flat, field: StrainField) -> Taken:
-        """Of the ZOIs of two ends, at least one each."""
+        """What is taken of the ZOIs of two ends, at least one each."""
         share = np.zeros(field.status.size)
         share[second] += 1 / len(second)
         share[first] -= 1 / len(first)
@@ -211,7 +211,7 @@ class EndsTaken(Taken):
         return x * x, 2 * x * y, y * y
 
     def direction(self, sums: Floats) -> Point:
-        """Of the line in this field, a unit vector."""
+        """Direction of the line in this field, a unit vector."""
         (x, y), (u, v) = self.before, sums[:, 0].tolist()
         now = math.hypot(x + u, y + v)
         return (x + u) / now, (y + v) / now

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.evaluate.response import WINDOW, Departures, ResponseSums
-from analysis.field import StrainField, Sums
+from analysis.field import Sums
 from live.pipeline.measurement import Measurement
 
 Floats = NDArray[np.float64]
@@ -20,12 +20,12 @@ _SLOPES = {STRESS: "compliance", TIME: "rate"}
 
 
 def slope_name(channel: str) -> str:
-    """Of the map of slopes over ``channel``: compliance, rate or amplification."""
+    """Name of the map of slopes over ``channel``: compliance, rate or amplification."""
     return _SLOPES.get(channel, "amplification")
 
 
 def leaves_name(channel: str) -> str:
-    """Of the map of where places leave their lines; empty over time."""
+    """Name of the map of where places leave their lines; empty over time."""
     return "" if channel == TIME else "leaves_at_stress" if channel == STRESS else "leaves_at_strain"
 
 
@@ -95,7 +95,7 @@ class ResponseWatch:
         else:
             gauge = m.time_step.gauges[self.channel]
             value, sigma = gauge.value, gauge.sigma
-        return value, sigma * _own_share(m.field, along)
+        return value, sigma * math.sqrt(m.field.own_share(along))
 
     def maps(self) -> Mapping[str, Floats]:
         """``shown_names`` and ``sigma_`` of the first, (R, C), in SI units; nothing before there are two bursts."""
@@ -105,9 +105,3 @@ class ResponseWatch:
         lines, name = sums.lines(), slope_name(self.channel)
         leaves = {leaves_name(self.channel): one.at for one in self._over[:1]}
         return {name: lines.slope, f"sigma_{name}": lines.sigma, "chi2": lines.chi2, **leaves}
-
-
-def _own_share(field: StrainField, name: str) -> float:
-    """Of a sigma, what is not of the reference: that of a typical ZOI."""
-    shares = field.sigma(name, "current")[field.ok] / field.sigma(name)[field.ok]
-    return float(np.nanmedian(shares)) if shares.size else 1.0

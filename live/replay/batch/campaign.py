@@ -284,7 +284,7 @@ def _compile(processes: WorkerProcesses, screen: Screen, stopping: threading.Eve
     if not ready:
         from analysis import PICTURE_KINDS
 
-        compile_ahead(PICTURE_KINDS, phase=True, show=screen.status, stopped=stopping.is_set)
+        compile_ahead(PICTURE_KINDS, phase=True, screen=screen, stopping=stopping)
 
 
 def _cuts(tasks: Sequence[Task], screen: Screen) -> dict[str, ChunkPlan]:

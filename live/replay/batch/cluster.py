@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import ConfigError, DataError
+from acquire.text import Message
 from acquire.text.printable import printable
 from live.pipeline.consumer import Screen
 from live.replay.batch.keys import deciding_versions
@@ -101,7 +102,7 @@ class Cluster:
         if self._quiet_s > _QUIET_S and self._client.status == "running":
             self._quiet_s = 0.0
             if not self._client.nthreads():
-                self._screen.print(f"note: {self._address} has no workers any more; waiting for some")
+                self._screen.print(Message("{address} has no workers; waiting for some", self._address))
 
     def close(self) -> None:
         """Cancel what has not begun, and close the connection; a worker completes a task that it has begun."""
@@ -140,7 +141,7 @@ class Cluster:
     def _compile(self, found: Mapping[str, Mapping[str, Any]]) -> None:
         """Compile on one worker of each machine, before any task waits for it."""
         last = {answer["host"]: worker for worker, answer in found.items()}
-        self._screen.status(f"compiling on {len(last)} machines, once")
+        self._screen.status(Message("compiling on {n} machines, once", len(last)))
         futures = [
             self._client.submit(compile_on_worker, workers=[worker], pure=False) for worker in last.values()
         ]
@@ -301,4 +302,5 @@ def _row_without_result(task: Task, future: Any) -> BatchRow:
         return row
     error = future.exception() if future.status == "error" else None
     why = f"{type(error).__name__}: {error}" if error else f"no result arrived ({future.status})"
-    return failed(task.title, task.source, f"the cluster gave it up: {printable(why)[:300]}", 1)
+    words = Message("the cluster gave it up: {why}", printable(why)[:300])
+    return failed(task.title, task.source, words, 1)

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DEFECT, PhasedicError
-from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text.message import Message, about, joined
 from acquire.text.printable import duration
+from acquire.text.quantity import Amount
 from live.pipeline.consumer import Screen
 from live.replay.batch.keys import is_session, key_of_chunk
 from live.replay.batch.row import RENEWED, BatchRow, failed
@@ -144,7 +144,7 @@ class BatchProgress:
             zois = sum(progress.zois for progress in self._last.values())
             share = sum(share * self._part(title) for title, share in self._shares.items()) / self._tests
         left = Message("{time} left", duration(took * (1 - share) / share)) if 0 < share < 1 else ""
-        rate = Message("{rate:.0f} ZOI/s", zois / took) if took > 0 else ""
+        rate = Message("{rate} ZOI/s", Amount("count", zois / took)) if took > 0 else ""
         tests = Message("{done} of {tests} tests", self._ended, self._tests)
         return joined("  ", (tests, Message("{n} instants", time_steps), rate, left))
 
@@ -231,7 +231,8 @@ class Scheduler:
 
     def _whole(self, name: str) -> Sequence[Task]:
         del self._left[name]
-        self._screen.print(f"{name}: a reference was renewed in it; it is not cut, but measured whole")
+        text = Message("a reference was renewed in it; it is not cut, but measured whole")
+        self._screen.print(about(name, text))
         for chunk in self._cuts[name].chunks:
             self._progress.expect(chunk.title, 0)
         self._progress.expect(name)

@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from acquire.system import blocked_signals, python_command, python_environment, unblock_signals
+from acquire.text import Message
 from analysis import PICTURE_KINDS, not_compiled
 from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow, failed
@@ -337,7 +338,7 @@ class Pool:
         try:
             worker = self._processes.take()
         except OSError as error:
-            log.error("no worker could be started: %s", error)
+            log.error(Message("no worker could be started: {error}", error))
             return None
         with self._lock:
             self._workers.add(worker)

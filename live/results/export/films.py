@@ -145,7 +145,7 @@ def _images(job: ExportJob, pictures: Pictures | None) -> Generator[Any]:
 
 
 def _size(job: ExportJob, pictures: Pictures | None) -> tuple[int, int]:
-    """Of the pictures; without pictures, the extent of the ZOIs with equal margins."""
+    """Size of the pictures; without pictures, the extent of the ZOIs with equal margins."""
     if pictures is not None:
         return pictures.info.width, pictures.info.height
     grid = job.strain.grid

@@ -46,11 +46,12 @@ def belief(rows: Sequence[TensileRow], troubles: Sequence[str], limits: str = ""
     """The sentence on the figures ``rows``.
 
     What the data say against a test (``troubles``) stands against all of its figures. ``limits`` are those of error
-    that the interval of E holds beside the scatter, in words (``beyond_scatter``).
+    that the interval of E holds beside the scatter, in words (``beyond_scatter``). A bound says by itself what it is:
+    it is in doubt only where nothing else is known.
     """
     known = [row for row in rows if row.figure.known]
-    doubtful = ", ".join(row.name for row in known if row.remark)
     sure = ", ".join(row.name for row in known if not row.remark)
+    doubtful = ", ".join(row.name for row in known if row.remark and not (sure and row.figure.is_bound))
     if not known:
         return Belief("bad", Message("No figure is known; the list says why."))
     held = Message("The intervals (95 %) hold the scatter.")
@@ -87,7 +88,7 @@ class MeasuredAgain:
 
     @classmethod
     def of(cls, folder: Path, n_frames: float, skipped: int) -> MeasuredAgain:
-        """Of a run or replay in ``folder``."""
+        """What a run or replay in ``folder`` answers."""
         if not (folder / SESSION).exists():
             return cls(Message("the same command with"), n_frames)
         return cls(f"phasedic replay {shlex.quote(str(folder))}", n_frames, skipped)

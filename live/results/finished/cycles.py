@@ -78,7 +78,7 @@ class Cycles:
 
     @classmethod
     def none(cls) -> Cycles:
-        """Of a test that is not cyclic."""
+        """A test that is not cyclic."""
         return cls(CycleTable.none())
 
     @property
@@ -96,7 +96,7 @@ class Cycles:
         area_m2: float | None,
         start_t: float = 0.0,
     ) -> Cycles:
-        """Of the ``strain`` (T,) of bursts that are means over ``width`` (s), and ``samples`` of the force (N).
+        """Cycles in the ``strain`` (T,) of bursts that are means over ``width`` (s), and ``samples`` of the force (N).
 
         Both on one clock, of which ``start_t`` (s) is the zero of the table.
         """
@@ -122,7 +122,7 @@ class Cycles:
 
     @property
     def change(self) -> Figure:
-        """Of the secant modulus from the first cycle to the last, over that of the first."""
+        """Change of the secant modulus from the first cycle to the last, over that of the first."""
         if len(self.moduli) < 2:
             return Figure.none(Message("two cycles with a secant modulus are needed"))
         first, last = self.moduli.values()
@@ -132,7 +132,7 @@ class Cycles:
 
     @property
     def unit(self) -> tuple[str, float]:
-        """Of the modulus, for a person, and what it is in that of the table."""
+        """Unit of the modulus for a person, and what it is in that of the table."""
         return ("GPa", 1e9) if self.area_m2 else ("kN", 1e3)
 
     @property

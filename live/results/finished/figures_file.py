@@ -41,7 +41,7 @@ class FiguresFile:
     Attributes
     ----------
     figures : sequence of mapping
-        name, value, low, high, confidence, unit, reason, qualifier; SI units, None where unknown.
+        name, value, low, high, confidence, unit, reason, qualifier, remark; SI units, None where unknown.
     counts : mapping of str to int or None
         ``COUNTS``.
     checks : sequence of DataCheck
@@ -184,6 +184,7 @@ def _row(name: str, figure: Figure, unit: str) -> dict[str, Any]:
         "unit": unit,
         "reason": None if figure.known else figure.why or "not known",
         "qualifier": figure.qualifier or None,
+        "remark": (figure.why or None) if figure.known else None,
     }
 
 

@@ -58,7 +58,7 @@ class DataCheck:
 
 def findings(test: FinishedTest) -> list[DataCheck]:
     """All checks of a finished test, in the order in which they are shown."""
-    return [_finding(name, check, test) for name, check in _CHECKS.items()]
+    return [_finding(name, test) for name in _CHECKS]
 
 
 def doubts(found: Sequence[DataCheck]) -> list[str]:
@@ -66,10 +66,10 @@ def doubts(found: Sequence[DataCheck]) -> list[str]:
     return [one.text for one in found if one.outcome == "doubt"][:SHOWN]
 
 
-def _finding(name: str, check: Callable[[FinishedTest], str | None], test: FinishedTest) -> DataCheck:
+def _finding(name: str, test: FinishedTest) -> DataCheck:
     if name not in _WITHOUT_FORCE and not test.has_force:
         return DataCheck(name, "not checked", NO_FORCE)
-    text = check(test)
+    text = _CHECKS[name](test)
     if text is None:
         return DataCheck(name, "not checked", Message("the test does not show it"))
     return DataCheck(name, "doubt" if text else "good", text)

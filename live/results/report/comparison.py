@@ -104,7 +104,7 @@ def write_table(tests: Sequence[ComparedTest], file: TextIO) -> None:
 
 
 def _summary(rows: Sequence[TensileRow]) -> tuple[float, float, int]:
-    """Of the values; a bound is none."""
+    """Mean, scatter and number of the values; a bound is none."""
     return summary([math.nan if row.figure.is_bound else row.figure.value for row in rows])
 
 

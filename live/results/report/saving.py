@@ -30,7 +30,9 @@ NO_BROWSER = Message(
     "no browser was found (chromium, Chrome or Edge); print the page from yours, or install one: {command}",
     _INSTALL,
 )
-NO_PNG = f"no browser was found, so the figures are SVG and CSV without PNG ({_INSTALL} installs one)"
+NO_PNG = Message(
+    "no browser was found, so the figures are SVG and CSV without PNG ({command} installs one)", _INSTALL
+)
 _TIMEOUT_S = 120
 
 
@@ -122,7 +124,7 @@ def _png_trouble(pictures: Sequence[Path]) -> str:
         for svg in pictures:
             to_png(svg, svg.with_suffix(".png"), WIDTH, HEIGHT)
     except (DataError, OSError) as error:
-        return f"the figures are SVG and CSV without PNG: {error}"
+        return Message("the figures are SVG and CSV without PNG: {error}", error)
     return ""
 
 

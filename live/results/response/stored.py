@@ -134,7 +134,7 @@ class StoredResponse:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the maps."""
+        """Names of the maps."""
         return tuple(self._maps)
 
     def map(self, name: str) -> NDArray[Any]:

@@ -11,7 +11,8 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +68,7 @@ def open_recording(
         int(record.buffer_MB * 1e6),
         mode=mode,
         waits=not camera.live,
-        on_failure=lambda: stop.request(Message("recording failed")) if record.when_full == "stop" else None,
+        stop=stop if record.when_full == "stop" else None,
         health=run_state.health,
     )
     settings = PreTrigger(
@@ -132,8 +133,8 @@ class Recorder:
         Size of the buffer.
     waits : bool
         Wait for free space instead of leaving a gap (sources that wait for their reader).
-    on_failure : callable
-        Called once when nothing more can be written.
+    stop : StopSignal, optional
+        Requested when nothing more can be written.
     health : Health, optional
         Takes the time until the disk is full.
     now : callable
@@ -149,13 +150,13 @@ class Recorder:
         *,
         mode: RecordMode | None = None,
         waits: bool = False,
-        on_failure: Callable[[], None] = lambda: None,
+        stop: StopSignal | None = None,
         health: Health | None = None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._writer, self._frame_counts, self._event_log = writer, frame_counts, event_log
         self._buffer: BoundedQueue[Item] = BoundedQueue(limit, waits=waits)
-        self._limit, self._on_failure = limit, on_failure
+        self._limit, self._stop = limit, stop
         self._mode = mode or RecordMode()
         self._number = self._gap = 0
         self._health, self._now = health or Health(), now
@@ -223,31 +224,34 @@ class Recorder:
         self._buffer.close()
         self._thread.join()
         if self.failed is None:
-            self._guarded(lambda: self._writer.write_ledger(frame_counts | self._frame_counts.as_dict()))
-            self._guarded(lambda: self._writer.write_clock(ClockPair.now()))
-        self._guarded(self._writer.close)
+            with self._guarded():
+                self._writer.write_ledger(frame_counts | self._frame_counts.as_dict())
+            with self._guarded():
+                self._writer.write_clock(ClockPair.now())
+        with self._guarded():
+            self._writer.close()
 
     def _work(self) -> None:
-        self._guarded(lambda: self._writer.write_clock(ClockPair.now()))
+        with self._guarded():
+            self._writer.write_clock(ClockPair.now())
         while not self._buffer.finished:
             item = self._buffer.get(self._wait_s)
             if item is not None:
                 self._write(item)
             if self.failed is None:
-                self._guarded(self._flush_when_due)
+                with self._guarded():  # by time too: the last item must not wait for another one
+                    self._wait_s = min(_MAX_WAIT_S, self._writer.flush_when_due())
                 self._do_periodic(self._now())
-
-    def _flush_when_due(self) -> None:
-        """Flush by time too: the last item must not wait for another one."""
-        self._wait_s = min(_MAX_WAIT_S, self._writer.flush_when_due())
 
     def _do_periodic(self, now: float) -> None:
         if now > self._next_clock:
             self._next_clock += _CLOCK_EVERY_S
-            self._guarded(lambda: self._writer.write_clock(ClockPair.now()))
+            with self._guarded():
+                self._writer.write_clock(ClockPair.now())
         if now > self._next_disk:
             self._next_disk = now + DISK_EVERY_S
-            self._guarded(self._writer.flush)  # a file that is gone is noticed where nothing is written, too
+            with self._guarded():  # a file that is gone is noticed where nothing is written, too
+                self._writer.flush()
             self._check_disk(now - self._began)
 
     def _check_disk(self, elapsed_s: float) -> None:
@@ -264,31 +268,36 @@ class Recorder:
         self._disk_warned = left < _DISK_WARN_S
 
     def _write(self, item: Item) -> None:
+        written = False
+        if self.failed is None:
+            with self._guarded():
+                self._put(item)
+                written = True
         if isinstance(item, Frame):
-            written = self.failed is None and self._guarded(lambda: self._writer.write_frame(item))
             self._frame_counts.add(**{"recorded" if written else "unrecorded": 1})
         elif isinstance(item, Burst):
-            written = self.failed is None and self._guarded(lambda: self._writer.write_burst(item))
             self._frame_counts.add(**{"recorded" if written else "unrecorded": item.n, "thinned": -item.n})
-        elif self.failed is not None:
-            return
-        elif isinstance(item, LoadSample):
-            self._guarded(lambda: self._writer.write_load(item))
-        else:
-            self._guarded(lambda: self._writer.write_event(item))
 
-    def _guarded(self, write: Callable[[], object]) -> bool:
-        """Run one write; the first one that fails ends only the recording, and is reported."""
+    def _put(self, item: Item) -> None:
+        if isinstance(item, Frame):
+            self._writer.write_frame(item)
+        elif isinstance(item, Burst):
+            self._writer.write_burst(item)
+        elif isinstance(item, LoadSample):
+            self._writer.write_load(item)
+        else:
+            self._writer.write_event(item)
+
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
+        """Around one write; the first one that fails ends only the recording, and is reported."""
         try:
-            write()
+            yield
         except DataError as error:
             self._fail(error.text)
         except Exception as error:
             log.exception("the recorder failed")
             self._fail(Message("a defect of the recorder: {error}", repr(error)))
-        else:
-            return True
-        return False
 
     def _fail(self, why: str) -> None:
         if self.failed is not None:
@@ -298,4 +307,5 @@ class Recorder:
         self._frame_counts.add(recorded=-lost, unrecorded=lost)
         text = Message("recording has stopped, measuring goes on: {why}", why)
         self._event_log.emit(EventKind.RECORDER, "recorder", text, "error")
-        self._on_failure()
+        if self._stop is not None:
+            self._stop.request(Message("recording failed"))

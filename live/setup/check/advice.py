@@ -92,8 +92,8 @@ def _common(s: PictureStillness) -> Iterator[CheckLine]:
 def _vibration(s: Steadiness, unit: float, name: str, digits: int) -> str:
     """A vibration with its frequency, or its upper limit by the noise."""
     if not s.vibration > s.noise / 2:
-        return Message("less than {noise} {name}", format(s.noise * unit, f".{digits}f"), name)
-    text = Message("{vibration} {name} rms", format(s.vibration * unit, f".{digits}f"), name)
+        return Message("less than {noise} {name}", Message(f"{{n:.{digits}f}}", s.noise * unit), name)
+    text = Message("{vibration} {name} rms", Message(f"{{n:.{digits}f}}", s.vibration * unit), name)
     if s.frequency is None:
         return text
     mains = mains_of(s, 1)

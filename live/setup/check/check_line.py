@@ -89,7 +89,7 @@ def disk_lines(rate: float, config: Config) -> list[CheckLine]:
     try:
         free = free_bytes(folder)
     except OSError as error:
-        words = Message("connect the disk, or choose another with --out")
+        words = Message("connect the disk, or choose a folder on another")
         return [
             CheckLine(
                 "disk",
@@ -110,8 +110,8 @@ def disk_lines(rate: float, config: Config) -> list[CheckLine]:
             ),
             free / rate >= wanted_s,
             Message(
-                "too little for a test of {wanted_s:.3g} min: free some space, choose another disk with --out, or "
-                "record less (--record bursts)",
+                "too little for a test of {wanted_s:.3g} min: free some space, choose a folder on another disk, or "
+                "record bursts only",
                 wanted_s / 60,
             ),
         )
@@ -147,6 +147,6 @@ def _line(cause: str, *cells: str) -> str:
 
 
 def _noise(figures: CheckFigures) -> float:
-    """Of the gauge along the load, else of the mean of the region."""
+    """Noise of the gauge along the load, else of the mean of the region."""
     known = {gauge.name: gauge.sigma for gauge in figures.gauges}
     return known.get(AXIAL, known.get("", math.nan))

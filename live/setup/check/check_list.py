@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from acquire.load_cell.check import LoadReport
 from acquire.text import Message
+from acquire.text.quantity import number
 from analysis.picture.blocks import BLOCKS, blockiness
 from analysis.quality.pattern import Depth, Exposure, depth, exposure, speckle_radius, zoi_pattern
 from live.config.loading import Config
@@ -280,7 +281,8 @@ def table_lines(figures: CheckFigures) -> list[str]:
     bursts = sorted({noise.burst for floor in figures.floors for noise in floor.noises})
     scale = figures.px_per_mm
     unit = "px" if scale is None else "mm"
-    head = f"  ZOI order {f'l_10% {unit}':>9} {f'VSG {unit}':>7}  " + "".join(f"{n:>15}" for n in bursts)
+    head = Message("  ZOI order {l10:>9} {vsg:>7}  ", f"l_10% {unit}", f"VSG {unit}")
+    head += "".join(f"{n:>15}" for n in bursts)
     reference = figures.floors[0].reference if figures.floors else 0
     return [
         Message(
@@ -305,5 +307,4 @@ def _row(floor: ZoiFloor, bursts: list[int], figures: CheckFigures) -> str:
 def _cell(noise: StrainNoise | None) -> str:
     if noise is None:
         return "-"
-    measured = f"{noise.measured * 1e6:.0f}" if math.isfinite(noise.measured) else "-"
-    return f"{measured} ({noise.predicted * 1e6:.0f})"
+    return f"{number(noise.measured * 1e6)} ({number(noise.predicted * 1e6)})"

@@ -69,12 +69,12 @@ class PictureStillness:
 
     @property
     def worse(self) -> Steadiness:
-        """Of u and v, the one with more vibration."""
+        """The one of u and v with more vibration."""
         return max((self.u, self.v), key=lambda s: s.vibration)
 
     @property
     def worse_strain(self) -> Steadiness:
-        """Of exx and eyy, the one with more vibration."""
+        """The one of exx and eyy with more vibration."""
         return max((self.exx, self.eyy), key=lambda s: s.vibration)
 
 

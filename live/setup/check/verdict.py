@@ -67,7 +67,7 @@ def _camera(f: CheckFigures) -> Iterator[CheckLine]:
             "frames lost",
             Message("{lost} between the {count} looked at", f.stack.lost, len(f.stack)),
             False,
-            "a lower frame rate, a smaller picture (--crop), another port or a faster machine",
+            "take a lower frame rate, a smaller picture (crop), another port or a faster machine",
         )
     automatic = ", ".join(f.automatic)
     yield CheckLine(
@@ -78,8 +78,8 @@ def _camera(f: CheckFigures) -> Iterator[CheckLine]:
     )
     yield _bits(f)
     value = Message(
-        "not visible in a still picture: it shows as strain when the specimen moves (--dark, --flat correct "
-        "it)"
+        "not visible in a still picture: it shows as strain when the specimen moves; dark and flat "
+        "pictures correct it"
     )
     if f.removed is not None:
         value = Message(
@@ -123,7 +123,7 @@ def _light(f: CheckFigures) -> Iterator[CheckLine]:
     )
     yield CheckLine(
         "saturated pixels",
-        f"{e.saturated:.3%}",
+        Message("{share:.3%}", e.saturated),
         e.saturated <= MAX_SATURATED,
         "less exposure or light, no glare",
     )
@@ -295,7 +295,9 @@ def _floor(f: CheckFigures, target: float | None) -> CheckLine:
     if noise is not None and noise.measured > MAX_OVER_PREDICTED * noise.predicted:
         return CheckLine(what, value, False, "something moves or flickers: vibration, air, lamp")
     wanted = DEFAULT_TARGET if target is None else target
-    limit = Message("asked for") if target is not None else Message("that are the limit without --target")
+    limit = (
+        Message("asked for") if target is not None else Message("that are the limit where no target is given")
+    )
     enough = known <= wanted
     words = Message(
         "more than the {wanted:.1f} µm/m {limit}: {value}",

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
 from acquire.opencv.images import read_image
+from acquire.text import Message
 from analysis.picture.pattern import PatternReport, describe_pattern
 from live.config.values import numbers_of
 from live.setup.pattern.imposed import ExpectedErrors, Imposed, expected
@@ -29,6 +30,7 @@ from live.setup.pattern.outcome import (
     write_outcome,
     write_page,
 )
+from live.words.language import told
 
 SIZES = (16, 24, 32, 48, 64, 96, 128)
 BURSTS = (1, 4, 16, 64)
@@ -76,7 +78,7 @@ def characterise_pattern(arguments: argparse.Namespace, folder: Path) -> int:
         f"phasedic characterise --pattern {Path(arguments.pattern).name}",
         INTRODUCTION,
     )
-    print(f"page: {target}")
+    print(told(Message("page: {path}", target)))
     return 0
 
 
@@ -93,9 +95,7 @@ def _picture(path: Path, roi: str | None) -> tuple[NDArray[Any], int]:
         if min(x, y) < 0 or x + width > columns or y + height > rows or min(width, height) < 1:
             raise ConfigError(
                 "--roi {roi} leaves the picture of {width} x {height} px",
-                roi,
-                picture.shape[1],
-                picture.shape[0],
+                *(roi, picture.shape[1], picture.shape[0]),
             )
         picture = picture[y : y + height, x : x + width]
     top, left = (max(0, (side - LARGEST) // 2) for side in picture.shape)

@@ -134,19 +134,11 @@ class _PlayedMessages:
 
 def _report_selection(shown: int, run: RunFolder, screen: Screen) -> None:
     if shown < run.strain.n:
-        screen.print(
-            Message(
-                "{shown} of {n} instants are shown; --from, --to and --every choose others",
-                shown,
-                run.strain.n,
-            )
-        )
+        what = Message("{shown} of {n} instants", shown, run.strain.n)
+        screen.print(Message("{what} are shown; --from, --to and --every choose others", what))
     if run.pictures is None and not run.notes:
-        screen.print(
-            Message(
-                "note: {what}", Message("the pictures that were measured are not here any more; maps alone")
-            )
-        )
+        maps = Message("the pictures that were measured are not here any more; maps alone")
+        screen.print(Message("note: {what}", maps))
     for note in run.notes:
         screen.print(Message("note: {what}", note))
 

@@ -15,6 +15,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,8 +30,7 @@ from acquire.system import (
     send_within,
     start_with_socket,
 )
-from acquire.text import Message
-from acquire.text.message import word
+from acquire.text.message import Message, from_json, word
 from live.pipeline.latency import OUTPUT
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox
@@ -170,7 +170,8 @@ class Supervisor:
 
     def start(self) -> None:
         """Start the process, which inherits the nice value of the caller, then the thread, which has its own."""
-        self._guarded(self._start_process)
+        with self._guarded():
+            self._start_process()
         self._thread.start()
 
     def close(self, seconds: float) -> None:
@@ -183,7 +184,8 @@ class Supervisor:
     def _run(self) -> None:
         lower_priority(OUTPUT)
         while not self._closing.is_set() and not self.failed:
-            self._guarded(self._step)
+            with self._guarded():
+                self._step()
         if self._renderer is not None or not self.starts:
             self._outbox.end()
             self._finish(time.monotonic() + self._close_s)
@@ -214,8 +216,9 @@ class Supervisor:
                 self._notify(Message("the view is now on port {port}", meta["port"]), "warning")
             self._on_serving()
         elif message.kind is Kind.TROUBLE:
-            self._notify(meta["text"], "warning")
-            self.failed = meta["text"] if meta["lasting"] else self.failed
+            text = from_json(meta["text"])
+            self._notify(text, "warning")
+            self.failed = text if meta["lasting"] else self.failed
         elif message.kind is Kind.FULL:
             self._cause = Message("had grown to {size} MiB", meta["memory_MiB"])
         elif message.kind is Kind.ENDED:
@@ -245,9 +248,10 @@ class Supervisor:
             target = replace(target, rrd=str(path.with_stem(f"{path.stem}-{self.starts}")))
         return target
 
-    def _guarded(self, step: Callable[[], object]) -> None:
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
         try:
-            step()
+            yield
         except (OSError, EOFError, WireError) as error:
             self._handle_loss(error)
 

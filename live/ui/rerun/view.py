@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from acquire.text import Message
+from acquire.text.message import joined
 from live.ui.rerun.messages import ViewSetup, ViewTarget, row_of
 from live.ui.rerun.outbox import MessageSource, Outbox, Pending
 from live.ui.rerun.supervisor import Notify, Supervisor
@@ -165,12 +166,12 @@ class View:
     def report(self) -> str:
         """Counts of what was drawn and dropped."""
         fields, pictures = (self._outbox.sent[kind] for kind in (Kind.FIELD, Kind.PICTURE))
-        parts = [f"{fields} maps and {pictures} pictures drawn"]
+        parts = [Message("{fields} maps and {pictures} pictures drawn", fields, pictures)]
         if self._pending.dropped:
-            parts.append(f"{self._pending.dropped} rows or events dropped")
+            parts.append(Message("{n} rows or events dropped", self._pending.dropped))
         if self._supervisor.starts > 1:
-            parts.append(f"its process was started {self._supervisor.starts} times")
-        return ", ".join(parts)
+            parts.append(Message("its process was started {n} times", self._supervisor.starts))
+        return joined(", ", parts)
 
     @property
     def instructions(self) -> str:
@@ -195,7 +196,8 @@ def url(port: int) -> str:
 
 def remote_access(port: int) -> str:
     """How to watch from another machine: a tunnel, since the view accepts connections of this machine alone."""
-    return f"ssh -N -L {port}:{HOST}:{port} {socket.gethostname()}, and there: rerun --connect {url(port)}"
+    tunnel = f"ssh -N -L {port}:{HOST}:{port} {socket.gethostname()}"
+    return Message("{tunnel}, and there: rerun --connect {url}", tunnel, url(port))
 
 
 def viewer_binary() -> Path | None:
@@ -244,7 +246,7 @@ def spawn_viewer(
         )
     except OSError as error:
         words.close()
-        _log.warning("the viewer %s did not start: %s", binary, error)
+        _log.warning(Message("the viewer {path} did not start: {error}", binary, error))
         return None
     threading.Thread(target=_watch_start, args=(process, words, notify), name="viewer", daemon=True).start()
     return process

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, TextIO
 from acquire.text import Message
 from acquire.text.message import about, joined
 from acquire.text.printable import duration, printable, share_text
-from acquire.text.quantity import IN_ASCII
+from acquire.text.quantity import IN_ASCII, Amount
 from live.pipeline.consumer import Screen
 from live.ui.terminal.status_line import GAP, cameras_line, force_text, gauge_texts, status_line
 from live.words.language import told
@@ -114,7 +114,7 @@ class TerminalScreen(Screen):
             bursts = Message("{done} of {expected} bursts", done, expected)
             left = Message("{time} left", duration(elapsed_s / done * (expected - done)))
         if elapsed_s > 0:
-            rate = Message("{rate:.0f} ZOI/s", done * i.n_zoi / elapsed_s)
+            rate = Message("{rate} ZOI/s", Amount("count", done * i.n_zoi / elapsed_s))
         valid = Message("{valid}/{zois} ZOIs", i.n_valid, i.n_zoi)
         strains = (*gauge_texts(i), share_text(i.area_share))
         self.status(joined(GAP, (bursts, force_text(i.force), *strains, valid, rate, left)))

@@ -37,7 +37,7 @@ class FigureLimits:
             self._last.popleft()
 
     def rate(self, name: str) -> float:
-        """Of a figure, 1/s; NaN where it is not known."""
+        """Rate of a figure, 1/s; NaN where it is not known."""
         known = [(t, values[name]) for t, values in self._last if math.isfinite(values[name])]
         if len(known) < 2 or known[-1][0] - known[0][0] < LEAST_S:
             return math.nan

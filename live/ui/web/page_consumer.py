@@ -143,7 +143,7 @@ class PageConsumer(Consumer):
             self._cameras = CamerasPanel(states, self._config.specimen, self._now)
         self._running, self._start_t = running, running.run_state.health.began_t
         self.map.response = running.run_state.response.maps
-        self._channels = ChannelValues(self._start_t, running.run_state.snapshot)
+        self._channels = ChannelValues(self._start_t, running.run_state)
 
     def select_map(self, request: Mapping[str, Any]) -> str:
         """Show another map or range; the reason of a refusal, or empty."""

@@ -41,7 +41,7 @@ class PageConsumers:
 
     @property
     def first(self) -> PageConsumer | None:
-        """That of the first camera."""
+        """The consumer of the first camera."""
         return next(iter(self.by_name.values()), None)
 
     def attach(self, live: RunningTest) -> None:
@@ -95,7 +95,7 @@ class PageConsumers:
         return Answer(why, refused=bool(why))._asdict()
 
     def _of(self, side: str) -> PageConsumer:
-        """That of the camera that a request names, else the first."""
+        """The consumer of the camera that a request names, else the first."""
         consumer = self.by_name.get(side, self.first)
         if consumer is None:
             raise HttpError(404, "nothing has been measured")

@@ -14,7 +14,7 @@ import secrets
 import socket
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
@@ -27,7 +27,7 @@ from live.config.listen_address import listening_socket
 from live.pipeline.latency import OUTPUT
 from live.ui.web.authorization import HttpError, RequestCheck
 from live.ui.web.broadcaster import Broadcaster, json_bytes
-from live.ui.web.setup.device_lists import camera_kinds
+from live.ui.web.setup.device_lists import kinds_of_devices
 from live.words.language import LANGUAGES, entries
 
 log = logging.getLogger(__name__)
@@ -99,7 +99,7 @@ def json_response(value: Any) -> Response:
 def _file(path: str) -> Response:
     """A file of the page, the entries of a language, or the settings of cameras; raises ``HttpError``."""
     if path == "/settings.json":
-        return json_response(camera_kinds())
+        return json_response(kinds_of_devices())
     if path in (f"/words/{language}.json" for language in LANGUAGES):
         return json_response(entries(path[7:9]))
     return static("index.html" if path == "/" else path.removeprefix("/static/"))
@@ -269,16 +269,18 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer with a file of the page, the events, or a handler of ``gets``."""
-        self._checked(self._get)
+        with self._checked():
+            self._get()
 
     def do_POST(self) -> None:
         """Answer with a handler of ``posts``."""
-        self._checked(self._post)
+        with self._checked():
+            self._post()
 
-    def _checked(self, step: Callable[[], None]) -> None:
+    @contextlib.contextmanager
+    def _checked(self) -> Iterator[None]:
         try:
-            self.server.page.access.check_host(self.headers)
-            step()
+            yield
         except HttpError as refused:
             self._refuse(refused.reason, refused.status)
         except (OSError, ValueError):  # the browser closed the connection, or does not send HTTP
@@ -294,6 +296,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _get(self) -> None:
         page, parts = self.server.page, urlsplit(self.path)
+        page.access.check_host(self.headers)
         query = {key: values[-1] for key, values in parse_qs(parts.query).items()}
         if parts.path == "/" and "token" in query:
             self._log_in(query["token"])
@@ -319,6 +322,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _post(self) -> None:
         page = self.server.page
+        page.access.check_host(self.headers)
         length = page.access.check_post(self.headers)
         page.access.check_cookie(self.headers)
         handler = page.posts.get(urlsplit(self.path).path)

@@ -63,13 +63,23 @@ def test_presets_that_are_asked_have_their_commands() -> None:
     [
         ("ascii", "column=0", "column=0 is not possible; allowed: a whole number from 1 to 64"),
         ("ascii", "millis=65", "millis=65 is not possible; allowed: a whole number from 1 to 64"),
-        ("ascii", "decimal=dot", "decimal=dot is not possible; allowed: one of , point, comma"),
+        ("ascii", "decimal=dot", "decimal=dot is not possible; allowed: one of point, comma"),
         ("aed-standard", "digits=17", "allowed: a whole number from 1 to 16"),
         ("aed-standard", "decimal=", "allowed: one of point, comma"),
         ("hbm-aed", "decimals=9", "allowed: a whole number from 0 to 8"),
         ("hbm-aed", "nominal=0", "allowed: a number from 1e-12"),
         ("hbm-aed", "nominal=5&decimals=1", "give nominal or decimals, not both"),
         ("modbus", "profile=pt113&scale=0", "scale=0 is not possible; allowed: a number other than zero"),
+        (
+            "lines",
+            "pattern=(?P<value>.+)&ends=crlf",
+            "ends=crlf is not possible; allowed: one of line, cr, lf, etx",
+        ),
+        (
+            "lines",
+            "pattern=(?P<value>.+)&decimal=dot",
+            "decimal=dot is not possible; allowed: one of point, comma",
+        ),
         ("modbus", "scale=2", "needs profile=, for example laumas-tlb"),
     ],
 )

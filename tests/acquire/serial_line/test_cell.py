@@ -387,7 +387,7 @@ def test_wrong_addresses_name_the_key(address: str, words: str) -> None:
 def test_a_pyserial_url_keeps_its_own_settings() -> None:
     settings = read_settings(parse_address("socket://host:7000?unit=N&logging=debug&baud=115200"))
     assert settings.line.url == "socket://host:7000?logging=debug"
-    assert settings.line.baud == 115200 and settings.unit == "N"
+    assert settings.line.baud == 115200 and settings.given.unit == "N"
 
 
 def test_the_line_is_that_of_the_address_or_of_the_protocol() -> None:

@@ -169,7 +169,7 @@ def test_beyond_the_range_is_told_once_and_its_end_too() -> None:
     flags = [made.sample(Reading(value, "N", b"", 0), 0.0).flags for value in values]
     assert [LoadFlag.OUT_OF_RANGE in one for one in flags] == [False, False, True, True, False, False]
     assert told == [
-        ("error", "load alarm: out of range; last valid sample -100.5 N"),
+        ("error", "load alarm: out of range; last valid sample −100.5 N"),
         ("info", "the load is within its range again"),
     ]
 

@@ -41,7 +41,7 @@ def test_an_impossible_value_is_refused_with_what_is_allowed(key: str) -> None:
 
 def test_what_is_not_said() -> None:
     s = read_settings(parse_address("/dev/fake"))
-    assert (s.protocol.name, s.mode, s.unit, s.sign, s.gain, s.zero) == (
+    assert (s.protocol.name, s.mode, s.given.unit, s.sign, s.gain, s.zero) == (
         "ascii",
         "listen",
         None,
@@ -49,8 +49,13 @@ def test_what_is_not_said() -> None:
         None,
         0.0,
     )
-    assert (s.capacity_N, s.max_step_N, s.mass_reads_force, s.calibration) == (None, None, False, None)
-    assert (s.timeout_s, s.wait_s, s.rate, s.tare) == (2.0, 5.0, 10.0, "auto")
+    assert (s.given.capacity, s.given.max_step, s.given.mass_reads_force, s.calibration) == (
+        None,
+        None,
+        False,
+        None,
+    )
+    assert (s.given.timeout, s.given.wait, s.rate, s.given.tare) == (2.0, 5.0, 10.0, "auto")
     assert s.byte_time_s == pytest.approx(10 / 9600)
     assert (s.line.url, s.line.baud, s.line.bytesize, s.line.parity, s.line.stopbits) == (
         "/dev/fake", 9600, 8, "N", 1.0,
@@ -70,8 +75,8 @@ def test_capacity_and_step_are_not_mixed_up_and_a_line_may_have_no_wire() -> Non
     s = read_settings(
         parse_address("/dev/fake?unit=N&capacity=500&max_step=20&wire=no&timeout=7&wait=3&rate=4")
     )
-    assert (s.capacity_N, s.max_step_N, s.byte_time_s) == (500.0, 20.0, 0.0)
-    assert (s.timeout_s, s.wait_s, s.rate) == (7.0, 3.0, 4.0)
+    assert (s.given.capacity, s.given.max_step, s.byte_time_s) == (500.0, 20.0, 0.0)
+    assert (s.given.timeout, s.given.wait, s.rate) == (7.0, 3.0, 4.0)
 
 
 @pytest.mark.parametrize(("sign", "taken"), [("1", 1), ("+1", 1), ("-1", -1)])
@@ -136,3 +141,13 @@ def test_the_rate_of_a_stream_is_commanded(mode: str, rate: str, start: bytes) -
     """Of a device that is polled the reader keeps the rate."""
     address = f"/dev/fake?protocol=hbm-aed&unit=N&mode={mode}&rate={rate}"
     assert read_settings(parse_address(address)).commands["start"] == start
+
+
+def test_how_an_address_tares_is_not_the_command_of_a_preset() -> None:
+    s = read_settings(parse_address("/dev/fake?protocol=lines&preset=loadstar&unit=N&tare=device&zero=3"))
+    assert (s.given.tare, s.zero, s.commands["tare"], "zero" in s.commands) == (
+        "device",
+        3.0,
+        b"CT0\r",
+        False,
+    )

@@ -143,7 +143,7 @@ def test_a_frame_that_cannot_be_read_becomes_a_counted_loss(tmp_path: Path) -> N
     with Session.open(path) as back, pytest.raises(DataError, match="frame 1 cannot be read"):
         list(back.frames())
     done = recover(path, tmp_path / "clean.h5")
-    assert done.frames == 3 and len(done.unreadable) == 1 and "1 thing could not be read" in done.line()
+    assert done.frames == 3 and len(done.unreadable) == 1 and "1 part could not be read" in done.line()
     with Session.open(done.path) as back:
         assert [f.lost_before for f in back.frames()] == [0, 1, 0]
         assert back.frame_counts == {"grabbed": 4}

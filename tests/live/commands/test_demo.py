@@ -26,6 +26,7 @@ from live.pipeline.run_state import RunState
 from live.results.figures import evaluate
 from tests.live.made_run import finished
 from tests.live.made_up import START, make_grid, make_measurement
+from tests.live.screens import RecordingScreen
 
 SHORT = ["--seconds", "2", "--fps", "10", "--reference-burst", "2", "--burst", "2", "--step", "64"]
 
@@ -53,7 +54,7 @@ def test_it_compiles_what_every_kind_of_picture_needs(
     """What that spares the next commands: test_compiled_once.py."""
     asked: list[tuple[object, object]] = []
 
-    def compile_ahead(kinds: object, *, phase: bool, show: object) -> None:
+    def compile_ahead(kinds: object, *, phase: bool, screen: object) -> None:
         asked.append((kinds, phase))
         raise Interrupted("enough")
 
@@ -136,23 +137,25 @@ def test_what_the_demo_keeps_of_a_measurement() -> None:
 def test_ninety_seven_percent_must_agree_and_none_may_be_far_off(
     within: int, beyond: int, agreed: bool
 ) -> None:
-    ratios, lines = np.full((100, 2, 3), 0.5), list[str]()
+    ratios, screen = np.full((100, 2, 3), 0.5), RecordingScreen()
+    lines = screen.lines
     ratios[within:, 0] = 1.01
     ratios[:beyond, 1, 0] = 1.01
     errors = np.tile([3e-6, -4e-6, 0.0], (100, 1))
-    assert demo._print_strain(ratios, errors, lines.append) is agreed
+    assert demo._print_strain(ratios, errors, screen) is agreed
     assert "error 3.00, 4.00, 0.00 µm/m rms in 100 instants" in lines[0]
     assert (
         f"{within:.1f}% of these 300 values within 0.05% of the strain + 3 sigma, {beyond} beyond" in lines[1]
     )
     ratios[0, 1, 0] = math.nan
-    assert demo._print_strain(ratios, errors, lines.append) is False
-    assert demo._print_strain(np.zeros(0), np.zeros(0), lines.append) is False
+    assert demo._print_strain(ratios, errors, screen) is False
+    assert demo._print_strain(np.zeros(0), np.zeros(0), screen) is False
     assert lines[-1].endswith("no instant of the elastic part was measured")
 
 
 def test_the_demo_compares_the_elastic_part_with_its_truth() -> None:
-    state, lines = RunState.new(1.0), list[str]()
+    state, screen = RunState.new(1.0), RecordingScreen()
+    lines = screen.lines
     for t in (1.0, 2.0):
         state.loads.append(LoadSample(START + t, 100.0 * t + (3.0 if t > 1 else 1.0)))
     state.loads.append(LoadSample(START + 3.0, math.nan))
@@ -173,17 +176,17 @@ def test_the_demo_compares_the_elastic_part_with_its_truth() -> None:
     collector.measurements = [measured(2.0, 0.0), measured(4.0, 4e-4), measured(4.95, 5.0)]  # the last yields
     config = load_config(None, {"specimen.area_mm2": 40.0})
     outcome.test = finished(state, config.specimen)
-    code = demo.compare(outcome, collector, config, lines.append)
+    code = demo.compare(outcome, collector, config, screen)
     assert code == 5 and any("exit code 5: E was not measured" in line for line in lines)
     assert any("100.0% of these 6 values" in line for line in lines)
-    assert "  force: mean error +2.00 N, scatter 1.00 N in 2 samples" in lines
+    assert "  force: mean error 2 N, scatter 1 N in 2 samples" in lines
     assert any(line.endswith("true 70 GPa") for line in lines) and any(
         line.endswith("true 0.3") for line in lines
     )
     collector.measurements = [measured(2.0, 0.01)]
-    assert demo.compare(outcome, collector, config, lines.append) == 1
+    assert demo.compare(outcome, collector, config, screen) == 1
     collector.measurements, outcome.exit_code = [measured(2.0, 0.0)], 130
-    assert demo.compare(outcome, collector, config, lines.append) == 0
+    assert demo.compare(outcome, collector, config, screen) == 0
 
 
 def test_the_rig_of_the_demo() -> None:
@@ -291,9 +294,10 @@ def test_the_modulus_is_held_against_that_of_what_was_measured(
     value: float, agrees: bool, words: str
 ) -> None:
     """The strain of a region with a hole in it is larger than that of the material: 61.4 GPa are right there."""
-    lines, specimen = list[str](), MachineOf("hole").specimen
+    screen, specimen = RecordingScreen(), MachineOf("hole").specimen
+    lines = screen.lines
     modulus = Figure(value * 1e9, (value - 0.5) * 1e9, (value + 0.5) * 1e9)
-    assert demo._print_modulus(figures_of(modulus), specimen, (61.4e9, 0.327), lines.append) is agrees
+    assert demo._print_modulus(figures_of(modulus), specimen, (61.4e9, 0.327), screen) is agrees
     assert words in lines[0] and "true 61.4 GPa there" in lines[0] and "true 0.327 there" in lines[1]
 
 
@@ -302,7 +306,8 @@ def test_a_machine_too_slow_to_measure_has_no_defect() -> None:
         rig=SimpleNamespace(specimen=Stretched()), grid=make_grid(), run_state=RunState.new(1.0), exit_code=0
     )
     outcome.run_state.loads.close()
-    lines, config = list[str](), load_config(None, {"specimen.area_mm2": 40.0})
+    screen, config = RecordingScreen(), load_config(None, {"specimen.area_mm2": 40.0})
+    lines = screen.lines
     outcome.test = finished(outcome.run_state, config.specimen)
-    assert demo.compare(outcome, MeansCollector(), config, lines.append) == 5
+    assert demo.compare(outcome, MeansCollector(), config, screen) == 5
     assert any("no instant of the elastic part was measured" in line for line in lines)

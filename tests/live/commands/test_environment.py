@@ -15,7 +15,6 @@ import pytest
 from acquire import compiled_loops
 from acquire.errors import ConfigError
 from acquire.system import can_write, private_folder, python_command, python_environment
-from analysis.compiled import loops
 from live.commands import environment
 
 ROOT = Path(__file__).parents[3]
@@ -46,9 +45,9 @@ def test_nor_does_python_m_live(name: str, tmp_path: Path) -> None:
     assert done.returncode == 0 and "phasedic" in done.stdout
 
 
-def kept(checked: Any, folder: Path) -> Any:
+def kept(folder: Path) -> Any:
     """A file of the cache, with one function of two signatures in it."""
-    file = checked(str(folder), "f", 1)
+    file = compiled_loops.KeptFile(str(folder), "f", 1)
     file.save("a", {"code": b"1" * 999})
     file.save("b", {"code": b"2" * 999})
     return file
@@ -75,11 +74,8 @@ def random_bytes(data: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("harm", [emptied, halved, zeroed, one_bit, random_bytes])
-@pytest.mark.parametrize("checked", [loops.CheckedFile, compiled_loops.KeptFile])
-def test_a_damaged_file_of_the_cache_is_as_if_it_were_not_there(
-    checked: Any, harm: Any, tmp_path: Path
-) -> None:
-    file = kept(checked, tmp_path)
+def test_a_damaged_file_of_the_cache_is_as_if_it_were_not_there(harm: Any, tmp_path: Path) -> None:
+    file = kept(tmp_path)
     assert file.load("a") == {"code": b"1" * 999} and file.load("b") == {"code": b"2" * 999}
     data = tmp_path / "f.1.nbc"
     data.write_bytes(harm(data.read_bytes()))
@@ -94,8 +90,8 @@ def test_a_damaged_file_of_the_cache_is_as_if_it_were_not_there(
 
 
 def test_numba_itself_reads_what_is_kept(tmp_path: Path) -> None:
-    kept(loops.CheckedFile, tmp_path)
-    assert loops.IndexDataCacheFile(str(tmp_path), "f", 1).load("b") == {"code": b"2" * 999}
+    kept(tmp_path)
+    assert compiled_loops.IndexDataCacheFile(str(tmp_path), "f", 1).load("b") == {"code": b"2" * 999}
 
 
 def test_all_compiled_loops_are_checked() -> None:
@@ -104,9 +100,8 @@ def test_all_compiled_loops_are_checked() -> None:
     from analysis.picture.prefilter import coefficients
     from hw_mocks.speckle_loops import splat
 
-    for loop in (tile_sums, fletcher32, splat):
+    for loop in (tile_sums, fletcher32, splat, getattr(coefficients, "dispatcher", coefficients)):
         assert isinstance(loop._cache._cache_file, compiled_loops.KeptFile)
-    assert isinstance(getattr(coefficients, "dispatcher", coefficients)._cache._cache_file, loops.CheckedFile)
 
 
 def test_loops_are_kept_below_the_temporary_folder_where_nothing_else_can_be_written(

@@ -17,6 +17,7 @@ from acquire.errors import Interrupted
 from acquire.system import signal_handler
 from analysis import PICTURE_KINDS, share_compiled
 from live import cli
+from live.pipeline.consumer import Screen
 from live.setup.compiling import compile_ahead, progress_text
 from tests.bench.soak import children
 from tests.live.ui.waiting import until
@@ -108,6 +109,16 @@ def never_ending(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(subprocess, "Popen", lambda command, **more: begin(sleep, **more))
 
 
+class Killing(Screen):
+    """Sends this process a signal once there is something to show."""
+
+    def __init__(self, number: signal.Signals) -> None:
+        self._number = number
+
+    def status(self, text: str) -> None:
+        os.kill(os.getpid(), self._number)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_whoever_handles_a_signal_hears_of_it(
     monkeypatch: pytest.MonkeyPatch, number: signal.Signals
@@ -117,7 +128,7 @@ def test_whoever_handles_a_signal_hears_of_it(
     before = signal.signal(number, lambda number, frame: heard.append(number))
     try:
         with pytest.raises(Interrupted, match="what is compiled is kept"):
-            compile_ahead(("uint8",), show=lambda text: os.kill(os.getpid(), number))
+            compile_ahead(("uint8",), screen=Killing(number))
         assert heard == [number]
         signal.raise_signal(number)
         assert heard == [number, number], "the handler is not back"
@@ -131,13 +142,15 @@ def test_ctrl_c_in_a_command_without_a_handler(monkeypatch: pytest.MonkeyPatch) 
     # Python's own handler: a shell that starts the tests in the background has SIGINT ignored.
     handler = signal_handler(signal.default_int_handler, signal.SIGINT)
     with handler, pytest.raises(Interrupted, match="what is compiled is kept"):
-        compile_ahead(("uint8",), show=lambda text: os.kill(os.getpid(), signal.SIGINT))
+        compile_ahead(("uint8",), screen=Killing(signal.SIGINT))
 
 
 def test_it_was_stopped_before(monkeypatch: pytest.MonkeyPatch) -> None:
     never_ending(monkeypatch)
     with pytest.raises(Interrupted):
-        compile_ahead(("uint8",), stopped=lambda: True)
+        stopping = threading.Event()
+        stopping.set()
+        compile_ahead(("uint8",), stopping=stopping)
 
 
 def test_a_process_that_was_interrupted_ends_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,8 +192,10 @@ def test_the_share_that_is_compiled() -> None:
 GIVEN = """
 import os, signal, sys
 from live.commands.signals import signals
-stops = []
-with signals(lambda: stops.append(1), lambda line: print(line, flush=True)):
+from live.pipeline.consumer import Screen
+stops, screen = [], Screen()
+screen.print = lambda line: print(line, flush=True)
+with signals(lambda: stops.append(1), screen):
     for _ in range(int(sys.argv[1])):
         signal.raise_signal(signal.SIGTERM)
 print(len(stops), "stops", flush=True)

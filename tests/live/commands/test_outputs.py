@@ -96,24 +96,14 @@ def test_the_channels_of_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_alarms_see_the_machine_and_both_sides(monkeypatch: pytest.MonkeyPatch) -> None:
     config, state = load_config(None, {"alarm": [{"channel": "axial", "above": 0.01}]}), RunState.new(1.0)
-    machine = lambda self, now: {"disk_min": now, "mean_axial": 0.0}  # noqa: E731
-    monkeypatch.setattr(type(state.health), "channels", machine)
     made: list[Any] = []
     monkeypatch.setattr(consumers, "AlarmWatch", lambda *given, **more: made.append((given, more)))
-
-    class Joint(JointChannels):
-        lost = "why"  # type: ignore[assignment]
-
-        def read(self, start: float) -> dict[str, float]:
-            return {"mean_axial": start}
-
-    for joint in (None, Joint()):
+    both = JointChannels()
+    for joint in (None, both):
         signals_of(about(config), state, RecordingScreen(), joint)
-    (alone, nothing), (both, more) = made
-    assert len(alone[0]) == len(both[0]) == 1 and not nothing
-    assert alone[2](5.0) == {"disk_min": 5.0, "mean_axial": 0.0}
-    assert both[2](5.0) == {"disk_min": 5.0, "mean_axial": START} and more["lost"]() == "why"
-    assert both[3:] == alone[3:] == (state.alarms, state.event_log)
+    for (alarms, values, watched), _ in made:
+        assert (len(alarms), values.start, watched) == (1, START, state)
+    assert [more["joint"] for _, more in made] == [None, both]
 
 
 def test_the_view_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:

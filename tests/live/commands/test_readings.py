@@ -43,7 +43,7 @@ def test_a_port_is_asked_question_after_question(monkeypatch: pytest.MonkeyPatch
         "  one: no answer",
         "  two: answers",
         "use  --load '/dev/x?protocol=two'",
-        "note look",
+        "note: look",
     ]
     monkeypatch.setattr(identify.identify, "ask", lambda q: None)
     assert identify._ask_all("/dev/x", said.append) == 6 and said[-1].startswith("no answer; check cable")

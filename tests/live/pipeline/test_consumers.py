@@ -237,7 +237,7 @@ def test_each_kind_reaches_those_who_define_it() -> None:
     assert listener.seen["event"][0] == "5"
     assert len(listener.seen["event"]) == MAX_EVENTS
     line = out.reports[0].line()
-    assert line == "listener: 2 measurements; 1 frame, 2 dropped; 1 load sample; 1000 events, 5 dropped"
+    assert line == "listener: 2 measurements; 1 frame, 2 dropped; 1 load sample; 1\u202f000 events, 5 dropped"
 
 
 class MatchedConsumer(Consumer):

@@ -16,6 +16,7 @@ from acquire.load_sample import LoadFlag, LoadSample
 from acquire.text.message import from_json
 from live.config.loading import load_config
 from live.config.sections import AlarmConfig, SpecimenConfig
+from live.pipeline.consumer import Screen
 from live.pipeline.history import History
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
@@ -76,7 +77,7 @@ def page_of(state: RunState, *, paused: bool = False) -> dict[str, Any]:
 
 
 def line_of(state: RunState, *channels: str) -> dict[str, Any]:
-    values = ChannelValues(0.0, state.snapshot, clock=lambda: NOW)
+    values = ChannelValues(0.0, state, clock=lambda: NOW)
     found: dict[str, Any] = json.loads(LineFormat(values, channels, "json").of(None))
     return found
 
@@ -87,17 +88,12 @@ class Watched:
     def __init__(self, state: RunState, **config: Any) -> None:
         self.ended, self.events, self.state = list[str](), list[Event](), state
         self.config = AlarmConfig(**{"channel": "force_N", "above": 3000.0, "end": True} | config)
-        means = ActionMeans(lambda: None, self.ended.append)
+        means = ActionMeans(Screen(), self.ended.append)
         self.alarm = Alarm(self.config, actions_of(self.config, means))
-        values = ChannelValues(0.0, lambda t, step: self.state.snapshot(t, step), clock=lambda: NOW)
-        self.watch = AlarmWatch(
-            [self.alarm],
-            values,
-            lambda t: self.state.health.channels(t),
-            state.alarms,
-            self.events.append,
-            lambda: NOW,
-        )
+        values = ChannelValues(0.0, state, clock=lambda: NOW)
+        state.event_log.add_listener(self.events.append)
+        self.events.clear()  # those of before
+        self.watch = AlarmWatch([self.alarm], values, state, lambda: NOW)
         self.watch.idle()
 
     @property

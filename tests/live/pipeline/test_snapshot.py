@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -151,7 +152,9 @@ def values() -> ChannelValues:
     run_state = RunState.new(1.0, specimen=SpecimenConfig(axis="y", area_mm2=40.0))
     run_state.health.state = "REC"
     run_state.loads.append(LoadSample(START, 800.0))
-    return ChannelValues(START, run_state.snapshot, lambda: {"more": 7.0}, lambda: START + 0.3)
+    return ChannelValues(
+        START, run_state, SimpleNamespace(read=lambda start: {"more": 7.0}), lambda: START + 0.3
+    )
 
 
 def at(t: float, axial: float) -> Measurement:

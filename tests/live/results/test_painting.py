@@ -216,7 +216,7 @@ def test_the_size_of_a_painted_picture(
 
 
 def test_the_caption_has_time_and_force(strain: Strain) -> None:
-    assert caption(strain, 1) == "t = 0.100 s   F = 1400.0 N"
+    assert caption(strain, 1) == "t = 0.100 s   F = 1\u202f400.0 N"
     strain.values["force_N"][1] = np.nan
     assert caption(strain, 1) == "t = 0.100 s"
 

@@ -132,7 +132,7 @@ def test_the_command_writes_a_table(
     front, back = runs(tmp_path, monkeypatch, {**CONFIG, "gauges": GAUGES})
     assert main(["sides", str(front), str(back)]) == 0
     shown = capsys.readouterr().out
-    assert "both:  E = " in shown and "front: E = " in shown and "back:  E = " in shown
+    assert "both:   E = " in shown and "front:  E = " in shown and "back:   E = " in shown
     with (front / "sides.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(PULLED)

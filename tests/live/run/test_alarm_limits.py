@@ -47,12 +47,18 @@ def test_its_name_has_the_limit() -> None:
     assert Alarm(ABOVE).name == "force_N above 100" and Alarm(BELOW).name == "force_N below -100"
 
 
+def state_of(events: list[Event]) -> Any:
+    """A run whose machine has no channels."""
+    health = SimpleNamespace(channels=lambda now: {})
+    return SimpleNamespace(health=health, alarms=ActiveAlarms(), event_log=events.append)
+
+
 @pytest.mark.parametrize(("clock", "after_s"), [("device", 0.465), ("host", 0.465), ("nominal", None)])
 def test_an_alarm_says_how_long_after_the_last_frame_it_came(clock: Any, after_s: float | None) -> None:
     events: list[Event] = []
     values: Any = SimpleNamespace(read=lambda measurement: {"axial": 2e-3}, now=Snapshot(START))
     alarm = Alarm(AlarmConfig(channel="axial", above=1e-3))
-    watch = AlarmWatch([alarm], values, lambda now: {}, ActiveAlarms(), events.append, lambda: START + 0.5)
+    watch = AlarmWatch([alarm], values, state_of(events), lambda: START + 0.5)
     m = make_measurement(0)
     watch.measurement(replace(m, burst=replace(m.burst, clock=clock)))
     assert events[0].t == START + 0.5
@@ -62,10 +68,27 @@ def test_an_alarm_says_how_long_after_the_last_frame_it_came(clock: Any, after_s
 
 @pytest.mark.parametrize("channel", ["silent_s", "mean_axial", "axial"])
 def test_what_changes_by_itself_is_looked_at_five_times_a_second(channel: str) -> None:
-    nothing: Any = None
+    nothing: Any = SimpleNamespace(read=dict, now=Snapshot(0.0))
     alarm = Alarm(AlarmConfig(channel=channel, above=1.0))
-    watch = AlarmWatch([alarm], nothing, lambda now: {}, ActiveAlarms(), [].append, lambda: 0.0)
+    watch = AlarmWatch([alarm], nothing, state_of([]), lambda: 0.0)
     assert watch.idle() == 0.2 and watch.end() == "none came"
+
+
+def test_alarms_see_the_machine_and_both_sides() -> None:
+    """The channels of both sides come before those of the machine; why they are lost is told."""
+    events: list[Event] = []
+    values: Any = SimpleNamespace(read=dict, now=Snapshot(0.0), start=7.0)
+    state = state_of(events)
+    state.health.channels = lambda now: {"disk_min": now, "mean_axial": 0.0}
+    both: Any = SimpleNamespace(lost="", read=lambda start: {"mean_axial": start})
+    alarms = [Alarm(AlarmConfig(channel=name, above=1.0)) for name in ("disk_min", "mean_axial")]
+    watch = AlarmWatch(alarms, values, state, lambda: 5.0, both)
+    watch.idle()
+    assert [(event.data["on"], event.data["value"]) for event in events] == [(True, 5.0), (True, 7.0)]
+    both.lost = "why"
+    assert (
+        watch.end() == "2 came" and AlarmWatch(alarms, values, state_of([]), lambda: 5.0).end() == "none came"
+    )
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import math
 import socket
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -24,6 +25,7 @@ from live.config.loading import from_dict, load_config
 from live.config.sections import AlarmConfig
 from live.pipeline.consumer import Screen
 from live.pipeline.run_state import ActiveAlarms, Health
+from live.pipeline.snapshot import Snapshot
 from live.run.alarms import ACTIONS, ActionMeans, Alarm, AlarmWatch, actions_of, check_alarms
 from live.run.control import SOCKET_NAME, ControlPort, answer
 from live.run.live_run import run_live
@@ -31,6 +33,7 @@ from live.ui.terminal.screen import TerminalScreen
 from tests.live.made_up import in_ascii
 from tests.live.run.test_strain_output import Listener, free_port, read
 from tests.live.run.test_tcp_lines import Caller
+from tests.live.screens import RecordingScreen
 from tests.live.test_end_to_end import live_run
 from tests.live.ui.waiting import LONG_S
 
@@ -98,23 +101,17 @@ class WatchSetup:
     def __init__(self, *alarms: AlarmConfig) -> None:
         self.events: list[Event] = []
         self.active, self.values, self.now = ActiveAlarms(), dict[str, float](), 100.0
-        self.rung, self.ended, self.sent, self.lost = 0, list[str](), Kept(), ""
-        means = ActionMeans(self._ring, self.ended.append, [self.sent])  # type: ignore[list-item]
-        self.watch = AlarmWatch(
-            [Alarm(config, actions_of(config, means)) for config in alarms],
-            None,
-            self._machine,
-            self.active,
-            self.events.append,
-            lambda: self.now,  # type: ignore[arg-type]
-            lambda: self.lost,
-        )
+        self.screen, self.ended, self.sent, self.lost = RecordingScreen(), list[str](), Kept(), ""
+        means = ActionMeans(self.screen, self.ended.append, [self.sent])  # type: ignore[list-item]
+        channels: Any = SimpleNamespace(read=dict, now=Snapshot(0.0), start=0.0)
+        health = SimpleNamespace(channels=lambda now: self.values)
+        run_state: Any = SimpleNamespace(health=health, alarms=self.active, event_log=self.events.append)
+        made = [Alarm(config, actions_of(config, means)) for config in alarms]
+        self.watch = AlarmWatch(made, channels, run_state, lambda: self.now, self)
 
-    def _ring(self) -> None:
-        self.rung += 1
-
-    def _machine(self, now: float) -> Mapping[str, float]:
-        return self.values
+    def read(self, start: float) -> dict[str, float]:
+        """As channels of two cameras that have none."""
+        return {}
 
     def check(self, **values: float) -> list[dict[str, Any]]:
         self.values = values
@@ -135,7 +132,7 @@ def test_what_comes_is_told_stands_on_the_board_and_goes() -> None:
     assert bench.active.texts == ()
     assert [event.level for event in bench.events] == ["warning", "info"]
     assert bench.watch.end() == "1 came"
-    assert (bench.rung, bench.ended) == (1, ["ALARM camera: no frame for 2.5 s, limit 2"])
+    assert (bench.screen.rung, bench.ended) == (1, ["ALARM camera: no frame for 2.5 s, limit 2"])
     assert bench.sent.lines == ["HALT"]
 
 
@@ -160,7 +157,7 @@ def test_its_message_has_value_unit_and_limit(config: AlarmConfig, value: float,
 def test_an_alarm_does_only_what_it_is_asked_for() -> None:
     bench = WatchSetup(AlarmConfig(channel="silent_s", above=2.0))
     bench.check(silent_s=3.0)
-    assert (bench.rung, bench.ended, bench.sent.lines) == (1, [], [])
+    assert (bench.screen.rung, bench.ended, bench.sent.lines) == (1, [], [])
 
 
 def test_every_key_of_an_alarm_is_what_it_looks_at_or_an_action() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -43,12 +44,13 @@ def test_a_thousandth_of_the_capacity_is_no_load(force: float, at_once: bool) ->
 
 def test_an_answer_to_a_tare_waits_two_seconds() -> None:
     nothing: Any = None
-    assert TareControl(FakeCell(None), nothing, nothing, nothing, nothing)._wait_s == 2.0
+    assert TareControl(FakeCell(None), nothing, nothing)._wait_s == 2.0
 
 
 def test_before_the_first_sample_a_tare_risks_nothing() -> None:
     cell = FakeCell(None)
-    TareControl(cell, lambda: True, lambda: None, lambda *_: None, lambda: 0.0, wait_s=0).tare()
+    test: Any = SimpleNamespace(has_measured=True, latest_load=None, emit=lambda *_: None)
+    TareControl(cell, test, lambda: 0.0, wait_s=0).tare()
     assert cell.calls == ["tare"]
 
 

@@ -213,13 +213,11 @@ class TareSetup:
         self, force: float = 800.0, *, measured: bool = True, capacity_N: float | None = None
     ) -> None:
         self.now, self.cell, self.told = 10.0, FakeCell(capacity_N), list[tuple[EventKind, Level, str]]()
-        sample = LoadSample(10.0, force)
-        self.controls = TareControl(
-            self.cell, lambda: measured, lambda: sample, self._tell, lambda: self.now, wait_s=0
-        )
+        self.has_measured, self.latest_load = measured, LoadSample(10.0, force)
+        self.controls = TareControl(self.cell, self, lambda: self.now, wait_s=0)
         self.cell.listeners.append(self.controls.take_event)
 
-    def _tell(self, kind: EventKind, source: str, text: str, level: Level) -> None:
+    def emit(self, kind: EventKind, source: str, text: str, level: Level) -> None:
         self.told.append((kind, level, text))
 
     def refused(self) -> str:
@@ -298,7 +296,7 @@ def test_a_load_that_is_not_known_is_not_none() -> None:
 def test_without_a_load_cell_there_is_nothing_to_tare() -> None:
     bench = TareSetup()
     bench.cell = FakeCell(None, "none")
-    bench.controls = TareControl(bench.cell, lambda: False, lambda: None, bench._tell, lambda: bench.now)
+    bench.controls = TareControl(bench.cell, bench, lambda: bench.now)
     assert "no load cell" in bench.refused()
 
 

@@ -169,7 +169,7 @@ def test_a_timed_run_ends_where_a_live_camera_has_gone_silent(
     bench.one.source.begun_t, bench.state.health.frame_t = 100.0 - begun_s, 100.0 - silent_s
     bench.stream.publish(Waiting(""))
     assert bench.prepared.rig.camera.stopped.is_set() is ends
-    assert not bench.stop.requested, "other cameras go on"
+    assert not bench.stop.is_set(), "other cameras go on"
     bench.one.close()
     (ended,) = bench.state.event_log.events()
     assert ended.text == f"the test ends: {TIME_IS_OVER if ends else 'camera ended'}"
@@ -272,10 +272,10 @@ def test_a_run_that_is_armed_says_so_when_it_begins(tmp_path: Path, monkeypatch:
 def test_the_first_reason_to_stop_counts_and_whoever_asks_late_is_told_at_once() -> None:
     stop, told = StopSignal(), list[str]()
     stop.on_request(lambda: told.append("early"))
-    assert not stop.requested and stop.reason == "" and told == []
+    assert not stop.is_set() and stop.reason == "" and told == []
     stop.request("an alarm")
     stop.request("the time is over")
-    assert stop.requested and stop.reason == "an alarm" and told == ["early", "early"]
+    assert stop.is_set() and stop.reason == "an alarm" and told == ["early", "early"]
     stop.on_request(lambda: told.append("late"))
     assert told[2:] == ["late"]
 

@@ -84,8 +84,7 @@ def test_a_recording_that_fails_ends_the_run_where_it_was_asked_to(
     monkeypatch: pytest.MonkeyPatch, when_full: str, stops: bool
 ) -> None:
     bench = Opened(monkeypatch, when_full=when_full)
-    bench.given["on_failure"]()
-    assert (bench.stop.requested, bench.stop.reason) == (stops, "recording failed" if stops else "")
+    assert bench.given["stop"] is (bench.stop if stops else None)
 
 
 @pytest.mark.parametrize(
@@ -201,16 +200,15 @@ def test_bursts_that_do_not_fit_are_a_gap_of_their_frames() -> None:
 
 
 def test_nothing_is_written_after_a_failure_and_the_file_is_closed() -> None:
-    failed: list[str] = []
+    failed, stop = list[str](), StopSignal()
+    stop.on_request(lambda: failed.append(stop.reason))
     writer = FakeWriter(fails_at=1)
     counts = FrameCounts()
-    one = Recorder(
-        writer, counts, EventLog(), 10**6, on_failure=lambda: failed.append("once")  # type: ignore[arg-type]
-    )  # fmt: skip
+    one = Recorder(writer, counts, EventLog(), 10**6, stop=stop)  # type: ignore[arg-type]
     for k in range(4):
         one.frame(frame(k))
     one.close({})
-    assert (failed, writer.closed, writer.frame_counts) == (["once"], True, None)
+    assert (failed, writer.closed, writer.frame_counts) == (["recording failed"], True, None)
     assert one.failed == "session.h5: the disk is full"
     assert (counts.recorded, counts.unrecorded) == (0, 4), "the first was not flushed"
 

@@ -187,7 +187,7 @@ class Clocked:
         self.state = RunState.new(1.0, specimen=SpecimenConfig(axis="y"))
         self.state.health.state = "REC"
         self.sent: list[tuple[float, dict[str, Any]]] = []
-        values = ChannelValues(START, self.state.snapshot, clock=lambda: self.now)
+        values = ChannelValues(START, self.state, clock=lambda: self.now)
         channels = ("time_s", "frame", "axial", "age_s", "state", "force_N", "lost_share", "eyy")
         monkeypatch.setattr(strain_output, "time", SimpleNamespace(monotonic=lambda: self.now))
         self.out = UdpOut("127.0.0.1", 9, LineFormat(values, channels, "json"))

@@ -41,7 +41,7 @@ def readings(force: float = 800.0) -> ChannelValues:
     run_state = RunState.new(1.0, specimen=SpecimenConfig(axis="y", area_mm2=40.0))
     run_state.health.state = "REC"
     run_state.loads.append(LoadSample(START, force))
-    return ChannelValues(START, run_state.snapshot, clock=lambda: START + 0.5)
+    return ChannelValues(START, run_state, clock=lambda: START + 0.5)
 
 
 def test_a_measurement_as_json_and_as_csv() -> None:

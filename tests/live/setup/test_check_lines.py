@@ -165,7 +165,10 @@ def test_the_weakest_gradients_give_the_noise_of_a_place() -> None:
     """sqrt(2) times 2 GL over the square root of 400 GL^2/px^2 are 0.141 px."""
     values = np.r_[np.full(10, 400.0), np.full(90, 1e4)].reshape(10, 10)
     line = _sssig(made(zois__sssig=values, noise=2.0))
-    assert line.value == "median 10000, weakest 5 % 400 GL^2/px^2 (0.1414 px in one frame)" and not line.good
+    assert (
+        line.value == "median 10\u202f000, weakest 5 % 400 GL^2/px^2 (0.1414 px in one frame)"
+        and not line.good
+    )
 
 
 @pytest.mark.parametrize(

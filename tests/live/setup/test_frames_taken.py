@@ -11,6 +11,7 @@ import pytest
 from acquire.errors import DataError
 from analysis import Roi, StrainField, ZoiGrid
 from live.config.loading import load_config
+from live.pipeline.consumer import Screen
 from live.setup import prepared as prepared_module
 from live.setup.check import sample as module
 from live.setup.check.sample import FrameStack, _inner_halves, around, moved, take, temporal_noise
@@ -88,7 +89,7 @@ def test_the_loops_of_the_phase_estimator_are_compiled_where_it_is_used(
     )
     camera: Any = SimpleNamespace(bits=12)
     plan: Any = SimpleNamespace(settings=SimpleNamespace(estimator=estimator))
-    assert MeasurePlan.compile(plan, camera, lambda text: None, lambda: False) == 1.5
+    assert MeasurePlan.compile(plan, camera, Screen(), None) == 1.5
     assert given == [(("uint16", "float32"), phase)]
 
 

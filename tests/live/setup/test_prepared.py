@@ -13,7 +13,7 @@ import pytest
 
 from acquire.errors import ConfigError, DataError
 from acquire.frame import CameraInfo
-from acquire.load_cell.zeroed import ZeroedLoadCell
+from acquire.load_cell.contract import ZeroedLoadCell
 from analysis import StrainField
 from analysis.optics import Readout
 from live.config.loading import load_config

@@ -15,6 +15,7 @@ import pytest
 
 from analysis.quality.specimen import find_specimen
 from live.config.loading import load_config
+from live.pipeline.consumer import Screen
 from live.setup.region import Region, first_look, region_of
 
 pytestmark = pytest.mark.data
@@ -34,7 +35,7 @@ HALF = ZOI / 2
 
 def region_in(path: Path) -> Region:
     config = load_config(None, {"camera.address": f"files:{path}", "measure.zoi": ZOI})
-    first = first_look(config, print)
+    first = first_look(config, Screen())
     return region_of(config, first.picture, first.noise)
 
 

@@ -21,6 +21,7 @@ from analysis.quality.specimen import Specimen
 from live.cli import main
 from live.config.gauges import gauges_for
 from live.config.loading import Config, load_config
+from live.pipeline.consumer import Screen
 from live.results import Strain
 from live.setup.check.sample import take
 from live.setup.devices import open_rig
@@ -28,6 +29,7 @@ from live.setup.placement import auto_gauges, with_auto_gauges
 from live.setup.region import FirstLook, Region, _mean_and_noise, _within, first_look, located_on, region_of
 from live.setup.rig_proposal import _axis, _size
 from tests.live.made_up import CAMERA, make_field
+from tests.live.screens import RecordingScreen
 
 SIM = "sim:hole?seconds=2&fps=20&width=320&height=320&hole=40&lockstep=yes"
 QUICK = ["--zoi", "32", "--step", "16", "--no-view", "--no-rrd"]
@@ -110,13 +112,11 @@ def test_a_picture_without_specimen() -> None:
 
     picture = np.random.default_rng(0).normal(100, 2, (200, 200)).astype(np.float32)
     camera = CameraInfo("none", "none", 200, 200, 8, False, "nominal")
-    messages: list[str] = []
-    config, mask = located_on(
-        load_config(None, {"measure.zoi": 32}), FirstLook(picture, 2.0, camera), messages.append
-    )
+    screen = RecordingScreen()
+    config, mask = located_on(load_config(None, {"measure.zoi": 32}), FirstLook(picture, 2.0, camera), screen)
     assert mask is None
     assert config.measure.roi == "all"
-    assert messages[0].startswith("no specimen was found that stands out")
+    assert screen.lines[0].startswith("no specimen was found that stands out")
 
 
 def test_warnings_of_the_camera_are_printed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,14 +129,14 @@ def test_warnings_of_the_camera_are_printed(monkeypatch: pytest.MonkeyPatch) -> 
         return open_rig(address, load, on_event, **how)
 
     monkeypatch.setattr("live.setup.frames.open_rig", troubled)
-    messages: list[str] = []
-    first = first_look(load_config(None, {"camera.address": SIM}), messages.append)
-    assert messages == ["no picture for 2.0 s; still waiting"]
+    screen = RecordingScreen()
+    first = first_look(load_config(None, {"camera.address": SIM}), screen)
+    assert screen.lines == ["no picture for 2.0 s; still waiting"]
     assert first.size == (320, 320)
 
 
 @pytest.mark.parametrize("fault", ["disconnect@0*600", "damage@0*600"])
-@pytest.mark.parametrize("look", [lambda config: first_look(config, [].append), take])
+@pytest.mark.parametrize("look", [lambda config: first_look(config, Screen()), take])
 def test_a_camera_without_whole_pictures_is_given_up(
     monkeypatch: pytest.MonkeyPatch, look: Callable[[Config], object], fault: str
 ) -> None:
@@ -162,7 +162,7 @@ def test_simulated_specimens(address: str) -> None:
     rig.close()
     assert rig.specimen is not None
     truth = rig.specimen.mask()
-    first = first_look(config, print)
+    first = first_look(config, Screen())
     inside = region_of(config, first.picture, first.noise).inside(*first.size, 32)
     distance = [cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5) for part in (truth, ~truth)]
     assert not inside[distance[1] > 16].any()
@@ -267,7 +267,7 @@ def test_too_short_a_specimen_is_refused() -> None:
 def test_the_noise_of_a_first_look_is_that_of_the_mean_of_its_frames() -> None:
     """2 % of 255 GL in each of four frames: rounding adds next to nothing."""
     config = load_config(None, {"camera.address": "sim:uniform?bits=8&noise=2&fps=100&hold=10&seconds=20"})
-    found = first_look(config, lambda text: None)
+    found = first_look(config, Screen())
     assert found.camera.live and found.noise == pytest.approx(0.02 * 255 / 2, rel=0.1)
 
 

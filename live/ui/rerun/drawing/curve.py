@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -91,58 +90,53 @@ class CurveDrawing:
 
     Parameters
     ----------
-    log : callable
-        Takes an entity path and the archetype to show there.
-    log_change : callable
-        The same for what is drawn only where it changes.
     setup : ViewSetup
     """
 
-    def __init__(
-        self, log: Callable[[str, Any], None], log_change: Callable[[str, Any], None], setup: ViewSetup
-    ) -> None:
-        self._log, self._log_change, self._setup = log, log_change, setup
+    def __init__(self, setup: ViewSetup) -> None:
+        self._setup = setup
         self._axes: tuple[Axis, Axis] | None = None
 
     def reset(self) -> None:
         """Draw the axes again with the next points."""
         self._axes = None
 
-    def draw(self, points: NDArray[np.float64]) -> None:
-        """Draw (N, 2) pairs of strain and force (N); pairs with NaN are left out."""
+    def draw(self, points: NDArray[np.float64]) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What shows (N, 2) pairs of strain and force (N), by entity paths: the axes where they change, and the line.
+
+        Pairs with NaN are left out.
+        """
         import rerun as rr
 
         points = points[np.isfinite(points).all(axis=1)]
         if not len(points):
-            return
+            return {}, {}
         area = self._setup.area_m2
         vertical = points[:, 1] / area if area else points[:, 1]
         axes = strain_axis(points[:, 0]), (stress_axis if area else force_axis)(vertical)
-        if axes != self._axes:
-            self._axes = axes
-            self._draw_axes(*axes)
+        changed = {} if axes == self._axes else self._drawn_axes(*axes)
+        self._axes = axes
         across, up = axes
         line = np.stack([across.position(points[:, 0]) * CURVE_WIDTH, 1.0 - up.position(vertical)], axis=1)
-        self._log(
-            "curve/line",
-            rr.LineStrips2D([line], colors=ORANGE, radii=rr.Radius.ui_points(1.25), draw_order=10),
-        )
-        tip = rr.Points2D([line[-1]], colors=ORANGE, radii=rr.Radius.ui_points(4.0), draw_order=20)
-        self._log("curve/tip", tip)
         right = line[-1, 0] > 0.7 * CURVE_WIDTH
         beside = line[-1] + [-0.3 if right else 0.3, 0.17 if line[-1, 1] < 0.7 else -0.25]
         label = f"{rounded(points[-1, 0], across)}, {rounded(vertical[-1], up)}"
-        self._log("curve/value", text_labels([beside], [label], ORANGE))
+        return changed, {
+            "curve/line": rr.LineStrips2D(
+                [line], colors=ORANGE, radii=rr.Radius.ui_points(1.25), draw_order=10
+            ),
+            "curve/tip": rr.Points2D(
+                [line[-1]], colors=ORANGE, radii=rr.Radius.ui_points(4.0), draw_order=20
+            ),
+            "curve/value": text_labels([beside], [label], ORANGE),
+        }
 
-    def _draw_axes(self, across: Axis, up: Axis) -> None:
+    def _drawn_axes(self, across: Axis, up: Axis) -> dict[str, Any]:
         x = across.position(np.array(across.ticks)) * CURVE_WIDTH
         y = 1.0 - up.position(np.array(up.ticks))
         rules = [[[xk, 0.0], [xk, 1.0]] for xk in x] + [[[0.0, yk], [CURVE_WIDTH, yk]] for yk in y]
-        self._log_change("curve/grid", polylines(rules, DIM, 0.5))
         x0, y0 = float(across.position(np.array(0.0))) * CURVE_WIDTH, 1.0 - float(up.position(np.array(0.0)))
-        self._log_change(
-            "curve/axes", polylines([[[0.0, y0], [CURVE_WIDTH, y0]], [[x0, 0.0], [x0, 1.0]]], GREY, 0.75)
-        )
+        cross = [[[0.0, y0], [CURVE_WIDTH, y0]], [[x0, 0.0], [x0, 1.0]]]
         # rerun draws a label below its position: a little higher puts it on the line.
         positions = [*([xk, 1.03] for xk in x), *([-0.13, yk - 0.05] for yk in y)]
         labels = [number(v * across.factor) for v in across.ticks] + [number(v * up.factor) for v in up.ticks]
@@ -150,4 +144,8 @@ class CurveDrawing:
         upward = stress if self._setup.area_m2 else load
         names = [told(Message("axial strain ({unit})", across.unit)), told(upward)]
         titles = [[CURVE_WIDTH / 2, 1.15], [0.0, -0.2]]
-        self._log_change("curve/ticks", text_labels([*positions, *titles], [*labels, *names]))
+        return {
+            "curve/grid": polylines(rules, DIM, 0.5),
+            "curve/axes": polylines(cross, GREY, 0.75),
+            "curve/ticks": text_labels([*positions, *titles], [*labels, *names]),
+        }

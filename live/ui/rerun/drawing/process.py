@@ -13,6 +13,7 @@ import time
 from typing import Any
 
 from acquire.system import inherited_socket, kill_this_process, lowest_priority, memory_MiB, wait_until_closed
+from acquire.text import Message
 from live.ui.rerun.drawing.scene import ViewScene
 from live.ui.rerun.drawing.sinks import FINISHED_MIB, RerunSink, serve, write
 from live.ui.rerun.messages import (
@@ -46,6 +47,7 @@ class ReplyChannel:
 
     def send(self, kind: Kind, **meta: Any) -> None:
         """Send a message; ignored where the test has ended."""
+        meta = {key: one.to_json() if isinstance(one, Message) else one for key, one in meta.items()}
         with self._lock, contextlib.suppress(OSError):
             self._pipe.send(Parcel(kind, meta))
 
@@ -72,7 +74,7 @@ def main() -> int:
         return 1
     except Exception as error:
         log.exception("the view's process stopped")
-        channel.notify(f"the view's process stopped by a defect: {error!r}")
+        channel.notify(Message("the view's process stopped by a defect: {error}", repr(error)))
         return 1
     return 0
 
@@ -84,19 +86,22 @@ def _open(setup: ViewSetup, target: ViewTarget, channel: ReplyChannel) -> list[R
             sink, port = serve(setup, target, channel.notify)
             sinks.append(sink)
     except Exception as error:
-        troubles.append(f"the view's server did not start: {error}")
+        troubles.append(Message("the view's server did not start: {error}", error))
     try:
         if target.rrd is not None:
             sinks.append(write(setup, target))
             rrd = target.rrd
     except FileExistsError:
-        troubles.append(f"the view's file did not start: {target.rrd} exists already and is not overwritten")
+        troubles.append(
+            Message("the view's file did not start: {path} exists already and is not overwritten", target.rrd)
+        )
     except Exception as error:
-        troubles.append(f"the view's file did not start: {error}")
+        troubles.append(Message("the view's file did not start: {error}", error))
     if not sinks and not troubles:
-        troubles.append("the view has nowhere to draw to")
-    for text in troubles:
-        channel.send(Kind.TROUBLE, text=f"{text}; all else goes on", lasting=not sinks)
+        troubles.append(Message("the view has nowhere to draw to"))
+    for trouble in troubles:
+        text = Message("{what}; all else goes on", trouble)
+        channel.send(Kind.TROUBLE, text=text, lasting=not sinks)
     if sinks:
         channel.send(Kind.SERVING, port=port, rrd=rrd)
     return sinks
@@ -114,7 +119,7 @@ def _draw(pipe: MessagePipe, scene: ViewScene, channel: ReplyChannel, max_MiB: f
                     channel.send(Kind.FULL, memory_MiB=round(grown))
                     return
         if trouble := scene.end():
-            channel.notify(f"the view's file lacks its end, is the disk full? ({trouble})")
+            channel.notify(Message("the view's file lacks its end, is the disk full? ({trouble})", trouble))
         channel.send(Kind.ENDED)
     finally:
         scene.end()

@@ -22,6 +22,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from acquire.text import Message
 from live.config.listen_address import listening_socket
 
 HOST, TRIES = "127.0.0.1", 50
@@ -117,7 +118,7 @@ class ViewerProxy:
             if connection.has_stopped(self._drawn):
                 connection.writer.transport.abort()
                 self._notify(
-                    f"a viewer received nothing for {STOPPED_S:.0f} s (stopped?) and was disconnected"
+                    Message("a viewer received nothing for {s:.0f} s and was disconnected", STOPPED_S)
                 )
 
 

@@ -82,7 +82,7 @@ class ViewScene:
         self._maps = FieldMaps(setup.axis, setup.strain_range, is_symmetric=is_symmetric, alpha=_ALPHA)
         self._drawn: dict[str, object] = {}
         self._curve: Thinned[Row] = Thinned(MAX_POINTS)
-        self._drawn_curve = CurveDrawing(self._log_due, self._log, setup)
+        self._drawn_curve = CurveDrawing(setup)
         self._arrows = ArrowScale()
         self._strains: Thinned[Row] = Thinned(_MAX_STRAINS)
         self._forces: Thinned[Row] = Thinned(_MAX_FORCES)
@@ -144,7 +144,11 @@ class ViewScene:
         if self._setup.finished:
             self._values(field)
         points = np.array(self._curve.items(), np.float64).reshape(-1, 2)
-        self._drawn_curve.draw(points)
+        changed, line = self._drawn_curve.draw(points)
+        for path, archetype in changed.items():
+            self._log(path, archetype)
+        for path, archetype in line.items():
+            self._log_due(path, archetype)
         self._due = [sink for sink in self._due if sink.takes("more", t)]
         if self._due:
             self._draw_maps(field, _OTHER_MAPS)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from acquire.text import Message
 from acquire.text.printable import printable
 from live.results.maps.colours import MICROSTRAIN
 from live.ui.rerun.drawing.layout import blueprint
@@ -67,8 +68,8 @@ class RerunSink:
     ----------
     stream : rerun.RecordingStream
     rates : Rates
-    drawn : callable
-        Called with the total of bytes of pictures and maps.
+    proxy : ViewerProxy, optional
+        Told the total of bytes of pictures and maps.
 
     Attributes
     ----------
@@ -76,8 +77,8 @@ class RerunSink:
         Of pictures and maps.
     """
 
-    def __init__(self, stream: Any, rates: Rates, drawn: Callable[[int], None] = lambda count: None) -> None:
-        self.stream, self._rates, self._drawn = stream, rates, drawn
+    def __init__(self, stream: Any, rates: Rates, proxy: ViewerProxy | None = None) -> None:
+        self.stream, self._rates, self._proxy = stream, rates, proxy
         self._hz = {
             "picture": rates.picture_hz,
             "map": rates.map_hz,
@@ -92,7 +93,8 @@ class RerunSink:
     def count(self, data: bytes) -> None:
         """Count the bytes of a picture or map."""
         self.drawn_bytes += len(data)
-        self._drawn(self.drawn_bytes)
+        if self._proxy is not None:
+            self._proxy.drawn(self.drawn_bytes)
 
     def takes(self, kind: str, t: float) -> bool:
         """Whether a "picture", "map", "more" (maps), "figures" or "rows" at ``t`` (s) is due; if so, it is drawn."""
@@ -165,13 +167,13 @@ def serve(setup: ViewSetup, target: ViewTarget, notify: Callable[[str], None]) -
     wanted = target.port or 0
     proxy = ViewerProxy(wanted, notify)
     if wanted and proxy.port != wanted:
-        notify(f"port {wanted} is taken; the view is on {proxy.port}")
+        notify(Message("port {wanted} is taken; the view is on {port}", wanted, proxy.port))
     host, port = hidden_address()
     memory = FINISHED_MIB if setup.finished else SERVER_MIB
     live = Rates(setup.picture_hz, 1.0 if setup.light else 10.0, repeat_bytes=SERVER_MIB * 2**20 / 4)
     rates = ALL if setup.finished else live
     server = rr.GrpcServerSink(host, port, server_memory_limit=f"{memory}MiB")
-    sink = _sink(server, setup, target.recording, rates, proxy.drawn)
+    sink = _sink(server, setup, target.recording, rates, proxy)
     wait_for(host, port)
     proxy.open(host, port)
     return sink, proxy.port
@@ -206,7 +208,7 @@ def _sink(
     setup: ViewSetup,
     recording: str,
     rates: Rates,
-    drawn: Callable[[int], None] = lambda count: None,
+    proxy: ViewerProxy | None = None,
 ) -> RerunSink:
     import rerun as rr
 
@@ -215,4 +217,4 @@ def _sink(
     stream.set_sinks(rerun_sink)
     stream.send_recording_name(printable(setup.title))
     stream.send_blueprint(blueprint(setup))
-    return RerunSink(stream, rates, drawn)
+    return RerunSink(stream, rates, proxy)

@@ -7,7 +7,7 @@ import queue
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from typing import Protocol
 
 from acquire.camera import Camera
 from acquire.errors import DataError, DeviceError, PhasedicError
@@ -33,6 +33,19 @@ REDRAW_S = 0.2  # between pictures of a recording that stands still
 Answers = queue.SimpleQueue[PhasedicError | None]
 
 
+class CameraViewer(Protocol):
+    """Whom the frames are for."""
+
+    def opened(self, info: CameraInfo) -> None:
+        """A camera is open; before its first frame."""
+
+    def show(self, frame: Frame) -> float:
+        """Show the newest frame; returns when to be called again, s, monotonic."""
+
+    def frames_needed(self, info: CameraInfo) -> int:
+        """Frames of a whole check."""
+
+
 class CameraPreview:
     """Reads the camera of ``draft``, and opens it again where it fails.
 
@@ -41,12 +54,7 @@ class CameraPreview:
     Parameters
     ----------
     draft : ConfigDraft
-    on_open : callable taking a CameraInfo
-        Called before the first frame of a camera.
-    on_frame : callable taking a Frame, giving monotonic s
-        Called with the newest frame; returns when to be called again.
-    needed : callable taking a CameraInfo, giving an int
-        Frames of a whole check.
+    viewer : CameraViewer
 
     Attributes
     ----------
@@ -55,14 +63,8 @@ class CameraPreview:
         The fault of the camera; empty while it delivers frames.
     """
 
-    def __init__(
-        self,
-        draft: ConfigDraft,
-        on_open: Callable[[CameraInfo], None],
-        on_frame: Callable[[Frame], float],
-        needed: Callable[[CameraInfo], int],
-    ) -> None:
-        self._draft, self._on_open, self._on_frame, self._needed = draft, on_open, on_frame, needed
+    def __init__(self, draft: ConfigDraft, viewer: CameraViewer) -> None:
+        self._draft, self._viewer = draft, viewer
         self.info: CameraInfo | None = None
         self.trouble = ""
         self._camera: Camera | None = None
@@ -118,12 +120,12 @@ class CameraPreview:
         if info is None:
             raise DataError("the camera has given no picture yet")
         with self._lock:
-            self._collected = deque(maxlen=max(self._needed(info), 1))
+            self._collected = deque(maxlen=max(self._viewer.frames_needed(info), 1))
             if self._whole:
                 self._collect_first()
 
     def _collect_first(self) -> None:
-        """Of a recording: its first frames are those of the check."""
+        """Collect the first frames of a recording for the check."""
         self._collected = deque(self._first, maxlen=len(self._first))
 
     @property
@@ -184,21 +186,21 @@ class CameraPreview:
             self._camera, self.info = camera, camera.info
             self._recent.clear()
             self._first, self._whole, self._collected = [], False, None
-        self._on_open(camera.info)
+        self._viewer.opened(camera.info)
 
     @property
     def _over(self) -> bool:
         return self._closing.is_set() or self._reopen.is_set()
 
     def _drain(self, camera: Camera) -> None:
-        due, most = 0.0, 0 if camera.info.live else self._needed(camera.info)
+        due, most = 0.0, 0 if camera.info.live else self._viewer.frames_needed(camera.info)
         for frame in camera:
             if self._over:
                 return
             if not frame.damaged:
                 self._keep(frame, most)
             if time.monotonic() >= due:
-                due = self._on_frame(frame)
+                due = self._viewer.show(frame)
             if most and len(self._first) >= most:
                 break
         if most:
@@ -224,7 +226,7 @@ class CameraPreview:
         due = 0.0
         while not self._over:
             if time.monotonic() >= due:
-                due = self._on_frame(self._first[-1])
+                due = self._viewer.show(self._first[-1])
             self._closing.wait(REDRAW_S)
 
     def _on_event(self, event: Event) -> None:

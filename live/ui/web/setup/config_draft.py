@@ -148,7 +148,7 @@ def drafts_of(first: ConfigDraft) -> dict[str, ConfigDraft]:
 
 
 def _draft(first: ConfigDraft, name: str, own: Config, given: str) -> ConfigDraft:
-    """That of a further camera, ``given`` by its rig file or its address."""
+    """Draft of a further camera, ``given`` by its rig file or its address."""
     if given.lower().endswith(".toml"):
         return ConfigDraft(own, Path(given), {})
     values, usual = own.as_dict(), Config().as_dict()

@@ -16,7 +16,8 @@ from acquire.serial_line.ports import LineSettings, PortInfo, list_serial_ports
 from acquire.settings import settings_of
 from acquire.text import Message
 from acquire.text.printable import brief, printable
-from live.setup.devices import camera_settings
+from live.setup.devices import camera_settings, load_settings
+from live.ui.web.setup.config_draft import ConfigDraft
 
 log = logging.getLogger(__name__)
 
@@ -30,16 +31,16 @@ class DeviceLists:
 
     Parameters
     ----------
-    runs : callable giving a Path
-        The folder of the recorded sessions.
+    draft : ConfigDraft
+        Its folder of results has the recorded sessions.
     cameras, ports : callable
         Give what there is; for tests.
     """
 
     def __init__(
-        self, runs: Callable[[], Path], cameras: Cameras = list_cameras, ports: Ports = list_serial_ports
+        self, draft: ConfigDraft, cameras: Cameras = list_cameras, ports: Ports = list_serial_ports
     ) -> None:
-        self._runs, self._list_cameras, self._list_ports = runs, cameras, ports
+        self._draft, self._list_cameras, self._list_ports = draft, cameras, ports
         self._cameras: list[CameraListing] = []
         self._loads: list[dict[str, str]] = []
         self._finding = ""
@@ -47,11 +48,11 @@ class DeviceLists:
 
     def search(self) -> None:
         """Search again, unless a search is under way."""
-        self._begin(self._search)
+        self._begin()
 
     def identify(self, port: str) -> None:
         """Listen on a serial port for a load cell; nothing is sent."""
-        self._begin(lambda: self._identify(port))
+        self._begin(port)
 
     def state(self) -> dict[str, Any]:
         """The lists as the page shows them."""
@@ -61,13 +62,16 @@ class DeviceLists:
             "finding": self._finding,
         }
 
-    def _begin(self, work: Callable[[], None]) -> None:
+    def _begin(self, port: str | None = None) -> None:
         if self._busy.acquire(blocking=False):
-            threading.Thread(target=self._guarded, args=(work,), name="page-devices", daemon=True).start()
+            threading.Thread(target=self._work, args=(port,), name="page-devices", daemon=True).start()
 
-    def _guarded(self, work: Callable[[], None]) -> None:
+    def _work(self, port: str | None) -> None:
         try:
-            work()
+            if port is None:
+                self._search()
+            else:
+                self._identify(port)
         except PhasedicError as error:
             self._finding = printable(brief(error))
         except Exception as error:
@@ -93,7 +97,8 @@ class DeviceLists:
         self._finding = ""
 
     def _sessions(self) -> Iterator[str]:
-        files = sorted(self._runs().glob("*/session*.h5"), key=lambda path: path.stat().st_mtime)
+        runs = Path(self._draft.config.output.dir or "runs")
+        files = sorted(runs.glob("*/session*.h5"), key=lambda path: path.stat().st_mtime)
         return (f"session:{path}" for path in files[-MAX_SESSIONS:])
 
     def _identify(self, port: str) -> None:
@@ -123,14 +128,17 @@ class DeviceLists:
         self._loads = [{"address": finding.address, "name": finding.protocol}, *known]
 
 
-def camera_kinds() -> dict[str, list[dict[str, str]]]:
-    """The settings of an address of each kind of camera, by scheme, as the page shows them."""
+def kinds_of_devices() -> dict[str, dict[str, list[dict[str, str]]]]:
+    """The settings of an address of each kind of camera and load cell, by scheme, as the page shows them."""
     return {
-        scheme: [
-            {"key": one.key, "default": one.plain_default, "unit": one.unit, "words": one.words}
-            for one in settings_of(kind)
-        ]
-        for scheme, kind in camera_settings().items()
+        what: {
+            scheme: [
+                {"key": one.key, "default": one.plain_default, "unit": one.unit, "words": one.words}
+                for one in settings_of(kind)
+            ]
+            for scheme, kind in kinds.items()
+        }
+        for what, kinds in (("camera", camera_settings()), ("load", load_settings()))
     }
 
 

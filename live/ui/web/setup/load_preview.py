@@ -99,7 +99,7 @@ class LoadPreview:
 
     @property
     def address(self) -> str:
-        """Of the load cell; ``NONE`` for a test without one."""
+        """Address of the load cell; ``NONE`` for a test without one."""
         return self._draft.config.load.address
 
     @property

@@ -82,12 +82,10 @@ class SetupSession:
         self._shown = 0
         self._folder = TemporaryDirectory(prefix="phasedic-")
         self._lock = threading.Lock()
-        known = DeviceLists(lambda: Path(draft.config.output.dir or "runs"))
+        known = DeviceLists(draft)
         self.devices: DeviceLists = known if first is None else first.devices
         self.load: LoadPreview = LoadPreview(draft) if first is None else first.load
-        self.preview = CameraPreview(
-            draft, self._opened, self._show, lambda info: self.check.frames_needed(info)
-        )
+        self.preview = CameraPreview(draft, self)
         self.region = SpecimenRegion(draft, drawn, lambda: self.check.discard())
         load = self.load if first is None else None
         self.check: SpecimenCheck = SpecimenCheck(
@@ -189,12 +187,17 @@ class SetupSession:
             raise DataError("the camera has given no picture yet")
         return recent_stack(frames)
 
-    def _opened(self, info: CameraInfo) -> None:
+    def frames_needed(self, info: CameraInfo) -> int:
+        """Frames of a whole check."""
+        return self.check.frames_needed(info)
+
+    def opened(self, info: CameraInfo) -> None:
+        """Another camera: what was found of the one before does not hold."""
         self.check.values["checking"] = False
         self.check.discard()
         self.region.opened(info)
 
-    def _show(self, frame: Frame) -> float:
+    def show(self, frame: Frame) -> float:
         """Draw the picture while a page is open; when to draw again."""
         began = time.monotonic()
         if self._broadcaster.open_pages:

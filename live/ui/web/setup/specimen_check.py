@@ -21,6 +21,7 @@ from acquire.system import lower_priority
 from acquire.text import Message
 from acquire.text.printable import brief, printable
 from live.config.sections import DEFAULT_REFERENCE_BURST
+from live.pipeline.consumer import Screen
 from live.pipeline.latency import OUTPUT
 from live.setup.check.check_line import CheckLine, disk_lines, write_rate
 from live.setup.check.check_list import CheckFigures, examine
@@ -120,7 +121,7 @@ def recent_stack(frames: list[Frame]) -> NDArray[np.float32]:
     return np.stack([frame.image for frame in frames]).astype(np.float32)
 
 
-class SpecimenCheck:
+class SpecimenCheck(Screen):
     """Checks the specimen until it is closed.
 
     Parameters
@@ -201,6 +202,11 @@ class SpecimenCheck:
             self._refresh()
             self._closing.wait(EVALUATE_S)
 
+    def status(self, text: str) -> None:
+        """Show what is being done, as the status line of a terminal does."""
+        self.values["busy"] = text
+        self._refresh()
+
     def _failed(self, why: str) -> None:
         """A whole check that fails gives a verdict too: NO-GO, with the reason."""
         if self.values["checking"]:
@@ -223,13 +229,8 @@ class SpecimenCheck:
 
     def _compile(self, info: CameraInfo) -> None:
         """Compile in separate processes: the test that follows must load the kernel from its cache."""
-
-        def report(text: str) -> None:
-            self.values["busy"] = text
-            self._refresh()
-
         phase = self._draft.config.measure.estimator == "phase"
-        compile_ahead(picture_kinds(info), phase=phase, show=report, stopped=self._closing.is_set)
+        compile_ahead(picture_kinds(info), phase=phase, screen=self, stopping=self._closing)
         self.values["busy"] = ""
 
     def _quick_check(self, frames: list[Frame], info: CameraInfo) -> None:

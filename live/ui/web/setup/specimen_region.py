@@ -106,20 +106,20 @@ class SpecimenRegion:
         """Undo the last edit of the mask or of the gauges; raises ConfigError without one."""
         if not self._edits:
             raise ConfigError("there is nothing to undo")
-        self._undone.append(self._turned(self._edits.pop(), DrawnRegion.undo))
+        self._undone.append(self._turned(self._edits.pop()))
 
     def redo(self) -> None:
         """Make the edit that was undone last again; raises ConfigError without one."""
         if not self._undone:
             raise ConfigError("there is nothing to make again")
-        self._edits.append(self._turned(self._undone.pop(), DrawnRegion.redo))
+        self._edits.append(self._turned(self._undone.pop(), again=True))
 
     def _turned(
-        self, gauges: Mapping[str, GaugeTable] | None, turn: Callable[[DrawnRegion], None]
+        self, gauges: Mapping[str, GaugeTable] | None, *, again: bool = False
     ) -> Mapping[str, GaugeTable] | None:
-        """Take these gauges, or turn the mask; what was there before, in the same form."""
+        """Take these gauges, or the mask before or after its last edit; what was there, in the same form."""
         if gauges is None:
-            turn(self.known)
+            self.known.redo() if again else self.known.undo()
             self.changed()
             return None
         before = self._draft.config.gauges

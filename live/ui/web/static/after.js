@@ -54,10 +54,10 @@ function parts(one) {
 }
 
 function tile(one) {
-  const isKnown = one.text != null, { value, sigma, unit } = isKnown ? parts(one) : { value: "–", sigma: "", unit: "" }, says = isKnown ? one.remark : one.why;
-  const reason = says ? [el("p", { class: `says ${isKnown ? "look" : ""}` }, icon(isKnown ? "warn" : "info"), el("span", { text: told(says), title: told(says) }))] : [];
+  const isKnown = one.text != null, { value, sigma, unit } = isKnown ? parts(one) : { value: "–", sigma: "", unit: "" }, says = isKnown ? one.remark : one.why, isDoubtful = isKnown && says && !one.bound;
+  const reason = says ? [el("p", { class: `says ${isDoubtful ? "look" : ""}` }, icon(isDoubtful ? "warn" : "info"), el("span", { text: told(says), title: told(says) }))] : [];
   const interval = sigma ? [el("span", { text: "95 %" }), el("span", { class: "num" }, "± ", el("b", { text: sigma }))] : [];
-  return el("section", { class: `tile ${isKnown ? (says ? "look" : "") : "stale"}`.trim() }, el("h3", { text: nameOf(one) }), el("span", { class: "age" }),
+  return el("section", { class: `tile ${isKnown ? (isDoubtful ? "look" : "") : "stale"}`.trim() }, el("h3", { text: nameOf(one) }), el("span", { class: "age" }),
     el("p", { class: "value" }, el("span", { class: "figure num", text: value }), el("span", { text: unit })), el("p", { class: "sigma" }, ...interval), ...reason);
 }
 

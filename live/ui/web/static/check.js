@@ -32,8 +32,10 @@ function verdictOf(part, value) {
   return { part, line, figure };
 }
 
+const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
 function verdict({ part, line: { what, value, good, advice }, figure }) {
-  const words = `${t(what)}: ${told(value)}${good || !advice ? "" : `. ${t(advice)}`}`;
+  const words = `${sentence(t(what))}: ${told(value)}${good || !advice ? "" : `. ${sentence(t(advice))}`}`;
   return el("section", { class: `verdict ${good ? "good" : "bad"}` }, icon(ICONS[part]), el("h3", { text: t(LABELS[part]) }), el("span", { class: "big num", text: figure }), el("p", { text: words }));
 }
 
@@ -50,7 +52,7 @@ export function showStart(values) {
   const side = values.find((one) => one.lines.some((line) => !line.good)), worst = side?.lines.find((one) => !one.good);
   const whose = side?.side ? `${t(side.side)}: ` : "";
   put($("reason"), worst ? `${whose}${t(worst.what)}: ${told(worst.value)}` : "");
-  if (!button.classList.contains("armed")) put(button.querySelector("span"), t(isReady ? "Start the test" : "Start without GO"));
+  if (!button.classList.contains("armed")) put(button.querySelector("span"), t(isReady ? "Start the test" : go === false ? "Start without GO" : "Start without a check"));
   button.classList.toggle("doubtful", !isReady);
   button.classList.toggle("main", isReady);
   if (isReady) { delete button.dataset.ask; return; }

@@ -26,31 +26,42 @@ onChoice($("format"), (value) => change({ do: "option", key: "format", value }))
 const rate = numberField($("rate"), { unit: "1/s", onvalue: (value) => change({ do: "option", key: "fps", value: value ?? "" }) });
 $("identify").addEventListener("click", () => change({ do: "identify", port: $("loadaddress").value.split("?")[0] }));
 
-// The settings of each kind of camera, as the program declares them. A changed one is written into the address.
-let kinds = {}, addressNow = "";
-const kindOf = (address) => /^([A-Za-z][\w+.-]+):/.exec(address)?.[1] ?? "";
-fetch("/settings.json").then((answer) => answer.json()).then((found) => { kinds = found; showKind(addressNow); }).catch(() => {});
+// The settings of each kind of device, as the program declares them. A changed one is written into the address.
+let kinds = {};
+const now = { camera: "", load: "" }, order = { camera: "address", load: "load" };
+fetch("/settings.json").then((answer) => answer.json()).then((found) => { kinds = found; for (const what in now) showKind(what, now[what]); }).catch(() => {});
+
+// The address and its settings; as in acquire/addresses.py, the values of some have question marks.
+const PAIR = "(?:(?:pattern|unstable|overload|underload|error|poll)=[^&]*|[A-Za-z_]\\w*=[^&?]*)";
+const PARTS = new RegExp(`^(.*?)(?:\\?(${PAIR}(?:&${PAIR})*))?$`);
 
 function withSetting(address, key, value) {
-  const [, body, query = ""] = /^(.*?)(?:\?([A-Za-z_]\w*=[^?]*))?$/.exec(address);
+  const [, body, query = ""] = PARTS.exec(address);
   const others = query.split("&").filter((pair) => pair && pair.split("=")[0] !== key);
   if (value) others.push(`${key}=${encodeURIComponent(value)}`);
   return others.length ? `${body}?${others.join("&")}` : body;
 }
 
-function showKind(address) {
-  addressNow = address;
-  const given = new URLSearchParams(address.slice(address.lastIndexOf("?") + 1)), settings = kinds[kindOf(address)] ?? [];
-  $("kind").hidden = !settings.length;
-  if ($("kindsettings").contains(document.activeElement)) return;
-  fill($("kindsettings"), settings.map((one) => ({ ...one, value: given.get(one.key) ?? "" })), settingRow);
+// A load cell on a line has the settings of its protocol too.
+function settingsOf(what, address, given) {
+  const found = kinds[what] ?? {}, scheme = /^([A-Za-z][\w+.-]+):/.exec(address)?.[1] ?? "";
+  if (what === "load" && (!scheme || address.includes("://"))) return [...found[""] ?? [], ...found[`protocol=${given.get("protocol") ?? "ascii"}`] ?? []];
+  return found[scheme] ?? [];
 }
 
-function settingRow({ key, value, words, unit, default: preset }) {
+function showKind(what, address) {
+  now[what] = address;
+  const given = new URLSearchParams((PARTS.exec(address)[2] ?? "").replaceAll("+", "%2B")), settings = settingsOf(what, address, given);
+  $(`${what}kind`).hidden = !settings.length;
+  if ($(`${what}settings`).contains(document.activeElement)) return;
+  fill($(`${what}settings`), settings.map((one) => ({ ...one, what, value: given.get(one.key) ?? "" })), settingRow);
+}
+
+function settingRow({ what, key, value, words, unit, default: preset }) {
   const input = el("input", { type: "text", maxLength: 80, value, placeholder: preset, autocomplete: "off", "aria-label": `${key} ${t(words)}` });
   input.addEventListener("change", async () => {
     input.blur();
-    const answer = await change({ do: "address", value: withSetting(addressNow, key, input.value.trim()) });
+    const answer = await change({ do: order[what], value: withSetting(now[what], key, input.value.trim()) });
     if (answer.refused) input.value = value;
   });
   onEscape(input, () => { input.value = value; input.blur(); });
@@ -64,7 +75,8 @@ export function showDevices(value) {
   offer($("cameras"), devices.cameras, value.address);
   offer($("loads"), devices.loads, load.address);
   keep($("cameraaddress"), value.address);
-  showKind(value.address);
+  showKind("camera", value.address);
+  showKind("load", load.address);
   keep($("loadaddress"), load.address);
   const query = new URLSearchParams(value.address.split("?")[1] ?? "");
   offerFormats(value.camera?.formats ?? [], value.camera?.format ?? "", query.get("format") ?? "");

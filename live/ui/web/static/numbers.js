@@ -1,6 +1,7 @@
 // Numbers for a person, by the rules of acquire/text/quantity.py; one table of cases holds both. The operator chooses
 // the unit of the strains of a test; what has none is told in the one for its size.
-const DASH = "–", GAP = "\u202f", MINUS = "−", LIVE_DIGITS = 5, MOST_DECIMALS = 6, WHOLE = 1e15, COMMA = ["de", "fr"];
+export const MINUS = "−";
+const DASH = "–", GAP = "\u202f", LIVE_DIGITS = 5, MOST_DECIMALS = 6, WHOLE = 1e15, COMMA = ["de", "fr"];
 // Name, size in SI, magnitude from which on it is taken, decimals of a value without an uncertainty.
 const UNITS = {
   "": [["", 1, 0, 3]],

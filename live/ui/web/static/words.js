@@ -1,7 +1,7 @@
 // The texts of the page and the messages of the program in the language of the operator. The entries of a language come
 // from live/words: English text or template -> its own. A message has a template (say) and values (with); the page fills
 // them in, as acquire/text/message.py does it in English. Names of files, devices and settings stay as they are.
-import { decimalMark, quantityText } from "./numbers.js";
+import { decimalMark, fixed, MINUS, quantityText } from "./numbers.js";
 
 const FIELD = /\{\{|\}\}|\{(\w+)(?::([^{}]*))?\}/g;
 const tables = { en: {} };
@@ -74,12 +74,14 @@ function shown(value, format) {
 export function number(value, format) {
   const [, sign, zero, width, digits, kind] = /^(\+?)(0?)(\d*)(?:\.(\d+))?([fgedx%]?)$/.exec(format) ?? [];
   let text = exponent(String(value));
+  if (kind === "f" && /^\./.test(format)) return fixed(value, Number(digits));
   if (kind === "f") text = value.toFixed(digits ?? 6);
   else if (kind === "%") text = `${(100 * value).toFixed(digits ?? 6)}%`;
   else if (kind === "e") text = exponent(value.toExponential(digits ?? 6));
   else if (kind === "x") text = value.toString(16);
   else if (kind === "g") text = general(value, Number(digits ?? 6) || 1);
   if (sign && value >= 0) text = `+${text}`;
+  if (format.length > 1 && value < 0) text = text.replace("-", MINUS);
   return width ? text.padStart(Number(width), zero ? "0" : " ") : text;
 }
 
@@ -87,7 +89,7 @@ function general(value, digits) {
   if (value === 0) return "0";
   const power = Number(value.toExponential(digits - 1).split("e")[1]);
   if (power < -4 || power > 9) return exponent(value.toExponential(digits - 1).replace(/\.?0+e/, "e"));
-  if (power >= digits) return Number(value.toPrecision(digits)).toFixed(0);
+  if (power >= digits) return fixed(Number(value.toPrecision(digits)));
   const text = value.toFixed(Math.max(digits - 1 - power, 0));
   return text.includes(".") ? text.replace(/\.?0+$/, "") : text;
 }

@@ -237,7 +237,7 @@ def test_where_nothing_ends_and_there_are_no_workers_a_note_comes_every_fifteen_
         bench.cluster.wait(5.0)
     assert bench.screen.lines == [], "counted anew since a task has ended"
     bench.cluster.wait(0.1)
-    note = "note: tcp://here:1 has no workers any more; waiting for some"
+    note = "tcp://here:1 has no workers; waiting for some"
     assert bench.screen.lines == [note]
     for _ in range(4):
         bench.cluster.wait(5.0)

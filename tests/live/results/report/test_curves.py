@@ -73,7 +73,7 @@ def test_strains_for_a_part_of_their_area_are_told() -> None:
 
     whole = [1.0, 1.0, 1.0, 1.0]
     assert told(area_share=whole) == told(eyy=whole) == ""
-    words = told(area_share=[1.0, 0.9, 1.0, 1.0], share_gauge_a=[1.0, 1.0, 0.625, 1.0])
+    words = told(area_share=[1.0, 0.9, 1.0, 1.0], share_gauge_a=[1.0, 1.0, 0.62, 1.0])
     assert words.startswith("A block of ZOIs had no value at 2 of 4 instants, from 1.5 to 2.5 s:")
     assert words.endswith("at least 62 %.")
 

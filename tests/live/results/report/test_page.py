@@ -295,9 +295,9 @@ def test_the_reporting_table_has_the_camera_in_the_units_it_names(run_dir: Path)
 @pytest.mark.parametrize(
     ("language", "belief", "head"),
     [
-        ("en", "E, nu, Rp0.2, Rm can be believed.", "Figures of the test"),
-        ("de", "E, nu, Rp0.2, Rm sind glaubhaft.", "Werte des Versuchs"),
-        ("fr", "E, nu, Rp0.2, Rm sont fiables.", "Valeurs de l’essai"),
+        ("en", "E, nu, Rp0.2 can be believed.", "Figures of the test"),
+        ("de", "E, nu, Rp0.2 sind glaubhaft.", "Werte des Versuchs"),
+        ("fr", "E, nu, Rp0.2 sont fiables.", "Valeurs de l’essai"),
     ],
 )
 def test_the_report_is_in_the_language_of_the_terminal(

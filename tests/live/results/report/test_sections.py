@@ -90,7 +90,7 @@ def test_repeated_events_are_one_line_with_their_number_and_the_time_of_the_last
     ]
     found = plain(events(run))
     assert found.count("alarm high") == 4
-    assert "|1493.000|warning|alarm|alarm|alarm high: force is 1493 N (1 494 times)|" in found
+    assert "|1\u202f493.000|warning|alarm|alarm|alarm high: force is 1493 N (1 494 times)|" in found
 
 
 def test_versions_then_and_now(run: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -240,7 +240,7 @@ def test_each_map_lies_beside_the_picture_of_its_instant(run: RunFolder) -> None
         "eyy, last",
     ]
     shown = plain(text)
-    assert "first: t = 0.000 s   F = 0.0 N" in shown and "last: t = 9.500 s   F = 4210.0 N" in shown
+    assert "first: t = 0.000 s   F = 0.0 N" in shown and "last: t = 9.500 s   F = 4\u202f210.0 N" in shown
     run.__dict__["pictures"] = None
     without = map_pictures(run, [3])
     assert (without.images, without.levels, without.size) == ({3: None}, None, (128, 96))

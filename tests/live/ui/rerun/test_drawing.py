@@ -365,10 +365,7 @@ def test_a_row_of_means_has_each_strain_with_its_own_sigma() -> None:
 
 def test_the_curve_rises_with_the_force() -> None:
     """The rectangle is drawn from the top down."""
-    drawn: dict[str, Any] = {}
-    CurveDrawing(drawn.__setitem__, drawn.__setitem__, make_setup()).draw(
-        np.array([[0.0, 0.0], [1e-3, 2000.0]])
-    )
+    _, drawn = CurveDrawing(make_setup()).draw(np.array([[0.0, 0.0], [1e-3, 2000.0]]))
     first, last = np.asarray(drawn["curve/line"].strips.as_arrow_array().to_pylist()[0])
     assert first[1] == pytest.approx(1) and last[1] < 0.3 and last[0] > first[0]
 

@@ -264,9 +264,10 @@ def test_the_curve_is_stress_over_strain_with_its_last_value() -> None:
 
 def test_the_value_of_the_curve_stands_where_there_is_room() -> None:
     drawn: dict[str, Any] = {}
-    curve = CurveDrawing(drawn.__setitem__, drawn.__setitem__, made()[2])
+    curve = CurveDrawing(made()[2])
     for x, y, beside in ((0.2, 9.0, (0.3, 0.17)), (0.2, -0.5, (0.3, -0.25)), (1.0, 9.0, (-0.3, 0.17))):
-        curve.draw(np.array([[1e-3, 10.0], [1e-3 * x, y]]))
+        for part in curve.draw(np.array([[1e-3, 10.0], [1e-3 * x, y]])):
+            drawn |= part
         tip = np.array(drawn["curve/tip"].positions.as_arrow_array().to_pylist()[0])
         at = np.array(drawn["curve/value"].positions.as_arrow_array().to_pylist()[0])
         assert at - tip == pytest.approx(beside, abs=1e-6)

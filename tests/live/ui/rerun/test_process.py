@@ -6,12 +6,15 @@ import socket
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from acquire.events import Event, EventKind
+from acquire.text import Message
+from acquire.text.message import from_json
 from live.pipeline.snapshot import Snapshot
 from live.ui.rerun.drawing import process
 from live.ui.rerun.drawing.sinks import ALL, Rates, RerunSink, serve, write
@@ -206,7 +209,7 @@ def test_the_exit_code_of_the_process(
     assert process.main() == code
     assert drawn == ([640 + 768] if sinks else [])
     if told:
-        assert [there.next().meta["text"]] == told
+        assert [from_json(there.next().meta["text"])] == told
     for one in (ours, theirs, there):
         one.close()
 
@@ -215,9 +218,10 @@ def test_answers_arrive_and_a_test_that_has_ended_is_ignored() -> None:
     ours, theirs = socket.socketpair()
     here, there = MessagePipe(ours), MessagePipe(theirs)
     channel = process.ReplyChannel(here)
-    channel.notify("a word")
+    channel.notify(Message("{n} words", 2))
     answer = there.next()
-    assert (answer.kind, dict(answer.meta)) == (Kind.TROUBLE, {"text": "a word", "lasting": False})
+    text = {"say": "{n} words", "with": {"n": 2}}
+    assert (answer.kind, dict(answer.meta)) == (Kind.TROUBLE, {"text": text, "lasting": False})
     theirs.close()
     there.close()
     for _ in range(3):
@@ -242,7 +246,7 @@ def test_a_sink_takes_each_kind_at_its_rate() -> None:
 
 def test_curves_are_sent_again_each_time_so_much_was_drawn() -> None:
     drawn: list[int] = []
-    sink, found = RerunSink(None, Rates(1.0, 1.0, repeat_bytes=100), drawn.append), []
+    sink, found = RerunSink(None, Rates(1.0, 1.0, repeat_bytes=100), SimpleNamespace(drawn=drawn.append)), []
     for _ in range(7):
         sink.count(b"x" * 40)
         found.append(sink.needs_curves_again())

@@ -74,7 +74,8 @@ class Watched:
         self.clock.now_s += seconds
         if answers:
             self.processes[-1].answers += answers
-        self.one._guarded(self.one._step)
+        with self.one._guarded():
+            self.one._step()
 
     def lose(self, seconds: float = 0.0) -> None:
         self.processes[-1].gone = True

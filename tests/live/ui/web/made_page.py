@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from live.ui.web.map_view import as_jpeg
-from live.ui.web.setup.device_lists import camera_kinds
+from live.ui.web.setup.device_lists import kinds_of_devices
 from live.words.language import entries
 from tests.live.ui.web.browser import Page
 from tests.live.ui.web.page_texts import STATIC
@@ -82,7 +82,7 @@ class MadePage(Page):
         elif path.startswith("words/"):
             route.fulfill(body=json.dumps(dict(entries(path[6:8]))), content_type="application/json")
         elif path == "settings.json":
-            route.fulfill(body=json.dumps(camera_kinds()), content_type="application/json")
+            route.fulfill(body=json.dumps(kinds_of_devices()), content_type="application/json")
         else:
             grey = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
             route.fulfill(body=as_jpeg(grey), content_type="image/jpeg")

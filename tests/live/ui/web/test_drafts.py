@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from unittest.mock import Mock
 
@@ -73,7 +74,10 @@ def slow_camera(tmp_path: Path) -> Iterator[CameraPreview]:
     rig = tmp_path / "slow.toml"
     rig.write_text(f'[camera]\naddress = "files:{tmp_path}/shots?fps=0.03"\n')
     draft = ConfigDraft(load_config(rig, {}), rig, {})
-    preview = CameraPreview(draft, lambda info: None, lambda frame: 0.0, lambda info: RECENT)
+    preview = CameraPreview(
+        draft,
+        SimpleNamespace(opened=lambda info: None, show=lambda frame: 0.0, frames_needed=lambda info: RECENT),
+    )
     preview.start()
     yield preview
     preview.close()

@@ -185,8 +185,8 @@ def test_the_forms_of_scale_and_board_read_numbers_and_can_be_left(page: MadePag
 def test_a_setting_of_the_kind_of_camera_is_written_into_its_address(page: MadePage) -> None:
     page.set_up(address="sim:woven?fps=20&hole=30")
     page.step("camera")
-    page.page.click("#kind > summary")
-    field = page.page.locator("#kindsettings input[aria-label^='hole ']")
+    page.page.click("#camerakind > summary")
+    field = page.page.locator("#camerasettings input[aria-label^='hole ']")
     assert (field.input_value(), field.get_attribute("placeholder")) == ("30", "60.0")
     page.sent()
     for text, address in (("45", "sim:woven?fps=20&hole=45"), ("", "sim:woven?fps=20")):
@@ -200,4 +200,27 @@ def test_a_setting_of_the_kind_of_camera_is_written_into_its_address(page: MadeP
     field.blur()
     page.until(lambda: field.input_value() == "30", "what is refused is not kept")
     page.set_up(address="session:run.h5")
-    assert page.page.is_hidden("#kind"), "it has none"
+    assert page.page.is_hidden("#camerakind"), "it has none"
+
+
+LOAD = {"name": "a cell", "trouble": "", "force_N": 1.0, "noise_N": 0.5, "rate": 80.0, "zero_N": 0.0}
+
+
+def test_a_setting_of_the_load_cell_and_of_its_protocol_is_written_into_its_address(page: MadePage) -> None:
+    address = "/dev/ttyUSB0?protocol=lines&pattern=(?P<value>\\d+)&sign=+1"
+    page.set_up(load=LOAD | {"address": address})
+    page.step("camera")
+    page.page.click("#loadkind > summary")
+    settings = page.page.locator("#loadsettings")
+    assert settings.locator("input[aria-label^='sign ']").input_value() == "+1"
+    assert settings.locator("input[aria-label^='pattern ']").input_value() == "(?P<value>\\d+)"
+    assert not settings.locator("input[aria-label^='column ']").count(), "that is of another protocol"
+    page.sent()
+    field = settings.locator("input[aria-label^='capacity ']")
+    field.fill("500")
+    field.blur()
+    sent: list[dict[str, Any]] = []
+    page.until(lambda: bool(sent.extend(page.sent()) or sent), "it is sent")  # type: ignore[func-returns-value]
+    assert [(one["do"], one["value"]) for one in sent] == [("load", f"{address}&capacity=500")]
+    page.set_up(load=LOAD | {"address": "none:"})
+    assert page.page.is_hidden("#loadkind"), "it has none"

@@ -122,7 +122,7 @@ def test_the_curve_kept_for_the_next_specimen() -> None:
 
 
 def row(name: str, value: float = 1.0, why: str = "") -> TensileRow:
-    return TensileRow(name, "MPa", Figure(value, value, value, why), remarked=bool(why))
+    return TensileRow(name, "MPa", Figure(value, value, value, why))
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import json
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -285,9 +286,9 @@ def test_a_check_begun_before_the_first_frame_of_a_recording_gets_its_frames(tmp
     rig.write_text(f'[camera]\naddress = "files:{recorded(tmp_path, 5)}"\n')
     preview = CameraPreview(
         ConfigDraft(load_config(rig, {}), rig, {}),
-        on_open=lambda info: preview.collect(),
-        on_frame=lambda frame: 0.0,
-        needed=lambda info: 4,
+        SimpleNamespace(
+            opened=lambda info: preview.collect(), show=lambda frame: 0.0, frames_needed=lambda info: 4
+        ),
     )
     preview.start()
     try:

@@ -310,12 +310,15 @@ def test_the_map_lies_over_its_points(browser: Any) -> None:
     box = """id => { const q = document.getElementById(id).getBoundingClientRect();
         return [q.x, q.y, q.width, q.height]; }"""
     with opened(browser) as page:
-        show_run(page, picture=MAP | {"cells": [32, 48, 128, 96]})
-        x, y, width, height = page.page.evaluate(box, "gaugemap")
-        wanted = [x + width / 8, y + height / 4, width / 2, height / 2]
-        page.until(
-            lambda: page.page.evaluate(box, "map") == pytest.approx(wanted, abs=0.5), "where the server says"
-        )
+
+        def placed() -> bool:
+            """Shown again and again, as states come: none is loaded while the picture before is under way."""
+            show_run(page, picture=MAP | {"cells": [32, 48, 128, 96]})
+            x, y, width, height = page.page.evaluate(box, "gaugemap")
+            wanted = [x + width / 8, y + height / 4, width / 2, height / 2]
+            return bool(page.page.evaluate(box, "map") == pytest.approx(wanted, abs=0.5))
+
+        page.until(placed, "where the server says")
 
 
 def test_the_opacity_of_the_map_stays_with_the_browser(browser: Any) -> None:
@@ -442,7 +445,7 @@ def test_what_fails_stays_to_be_seen(browser: Any) -> None:
             "#start", "class"
         )
         page.page.click("#step-check > summary")
-        assert page.page.inner_text("#verdicts .verdict.bad p") == "load cell: silent. look at its cable"
+        assert page.page.inner_text("#verdicts .verdict.bad p") == "Load cell: silent. Look at its cable"
         assert page.page.inner_text("#step-camera .chip") == "look"
 
 

@@ -188,14 +188,14 @@ def test_the_picture_shows_what_is_saturated_and_how_noisy_the_zois_are(session:
     image[80:, :20] = 4095
     frame = Frame(frozen(image), 0, 0.0, "nominal", 0, 12, 0.0)
     session.preview.info = None
-    session._show(frame)
+    session.show(frame)
     assert session.picture == b"" and session.state()["picture"] == 0, "no page is open"
     session._broadcaster.open()
     session.check.figures = figures()
 
     def shown(**overlays: bool) -> np.ndarray:
         session.overlays.update(overlays)
-        session._show(frame)
+        session.show(frame)
         return cv2.imdecode(np.frombuffer(session.picture, np.uint8), cv2.IMREAD_COLOR).astype(int)
 
     plain = shown(saturated=False, quality=False)
@@ -217,7 +217,7 @@ def test_drawing_takes_at_most_a_third_of_the_time(
         monkeypatch.setattr("live.ui.web.setup.setup_session.time.monotonic", lambda times=times: next(times))
         monkeypatch.setattr(session, "refresh", lambda: None)
         frame = Frame(frozen(np.zeros((4, 4), np.uint8)), 0, 0.0, "nominal", 0, 8, 0.0)
-        assert session._show(frame) == pytest.approx(due)
+        assert session.show(frame) == pytest.approx(due)
 
 
 # -- the region -----------------------------------------------------------------------------------

@@ -118,6 +118,11 @@ def test_samples_are_kept_for_five_seconds_and_end_a_fault(tmp_path: Path) -> No
 # -- devices --------------------------------------------------------------------------------------
 
 
+def drafted(folder: Path) -> Any:
+    """A draft with this folder of results."""
+    return SimpleNamespace(config=SimpleNamespace(output=SimpleNamespace(dir=str(folder))))
+
+
 def test_the_devices_that_can_be_chosen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for k in range(22):
         path = tmp_path / f"run{k:02}" / "session.h5"
@@ -126,7 +131,7 @@ def test_the_devices_that_can_be_chosen(tmp_path: Path, monkeypatch: pytest.Monk
         os.utime(path, (1000 - k, 1000 - k))  # the first is the newest
     ports = [PortInfo("/dev/ttyUSB0", "a cell", "", True), PortInfo("/dev/ttyS1", "another", "", False)]
     lists = DeviceLists(
-        lambda: tmp_path,
+        drafted(tmp_path),
         lambda: [CameraListing("v4l2:/dev/video0", "a camera\x1b", "is busy")],
         lambda: ports,
     )
@@ -157,7 +162,7 @@ def test_the_devices_that_can_be_chosen(tmp_path: Path, monkeypatch: pytest.Monk
 def test_a_port_that_talks_and_is_not_understood_offers_a_pattern(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lists = DeviceLists(lambda: tmp_path, cameras=list, ports=list)
+    lists = DeviceLists(drafted(tmp_path), cameras=list, ports=list)
     lines = b"".join(b"#%d;x=%.2f;ok\r\n" % (k % 7, 12.5 + k) for k in range(40))
     heard = [(9600, b"\x80\x13garbage", None), (19200, lines, None)]
     monkeypatch.setattr(device_lists.identify, "listen", lambda port: iter(heard))
@@ -183,10 +188,10 @@ def test_a_search_that_fails_says_why_and_another_may_begin(
     def failing() -> Any:
         raise error
 
-    lists = DeviceLists(lambda: tmp_path, failing, list)
+    lists = DeviceLists(drafted(tmp_path), failing, list)
     for _ in range(2):
         assert lists._busy.acquire(blocking=False)
-        lists._guarded(lists._search)
+        lists._work(None)
         assert lists.state()["finding"].startswith(words)
 
 
