@@ -12,7 +12,7 @@ import pytest
 from acquire.load_sample import LoadSample
 from acquire.text.quantity import Amount
 from analysis.evaluate import Figure
-from analysis.evaluate.seen import leap_alike
+from analysis.evaluate.seen import leap, leap_alike
 from live.config.sections import SpecimenConfig
 from live.pipeline.run_state import RunState
 from live.results.finished.findings import SHOWN, doubts, findings
@@ -118,6 +118,13 @@ def test_a_zero_that_moves_in_the_test_is_named_and_is_no_lag() -> None:
         "the force leaps by 399 N at 6 s and the strain does"
     )
     assert found["lag"].outcome == "not checked"
+
+
+def test_an_elastic_part_of_few_pictures_is_no_leap_of_the_force() -> None:
+    strains = 0.06 * np.maximum(np.linspace(-0.4, 1, 100), 0)
+    test = test_of(strains, force=np.interp(strains, (0, 2.5e-3, 0.06), (0, 3500, 6000)))
+    assert leap(test.curve) and not test.figures.E.known, "seen from outside it looks like one"
+    assert outcomes(test)["leaps of the force"] == "not checked"
 
 
 def test_a_force_that_falls_out_is_no_lag() -> None:
