@@ -38,6 +38,8 @@ def formatted(value: Any, spec: str) -> str:
     if isinstance(value, Real) and re.fullmatch(r"\.\d+f", spec):
         return number(float(value), int(spec[1:-1]))
     text = format(value, spec)
+    if "e+0" in text and spec == "g":
+        return f"{float(text):.0f}"
     if "e+0" in text and spec.endswith("g"):
         return "+" * (spec.startswith("+") and value > 0) + number(float(text))
     return text.replace("-", MINUS, 1) if len(spec) > 1 and isinstance(value, Real) and value < 0 else text

@@ -38,6 +38,7 @@ def test_values_stand_in_the_order_of_the_fields() -> None:
     [
         (6350.4, ".3g", "6\u202f350"), (-12345.67, ".1f", "−12\u202f345.7"), (-0.04, ".1f", "0.0"),
         (np.float32(-1.5), ".3g", "−1.5"), (float("nan"), ".1f", "–"), (-1.5, "g", "-1.5"), (54321, "", "54321"),
+        (-1e6, "g", "-1000000"),
     ],
 )  # fmt: skip
 def test_numbers_are_printed_as_quantities_but_for_what_may_be_typed_again(

@@ -8,19 +8,19 @@ from bisect import bisect_left, bisect_right
 import numpy as np
 import pytest
 
-from acquire.load_cell import LoadLog, load_log, readings
+from acquire.load_cell import LoadLog, load_log
 from acquire.load_sample import LoadSample
 
 
 @pytest.fixture(autouse=True)
 def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(readings, "ROWS", 4)
+    monkeypatch.setattr(load_log, "ROWS", 4)
     monkeypatch.setattr(load_log, "PIECE", 3)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_part_and_a_place_are_those_of_a_list(seed: int) -> None:
-    rng, stored, times = random.Random(seed), readings.StoredReadings(), list[float]()
+    rng, stored, times = random.Random(seed), load_log.StoredReadings(), list[float]()
     for k in range(rng.randrange(40)):
         times.append((times[-1] if times else 0.0) + rng.choice([0.0, 0.0, 1.0, 2.0]))
         stored.append(times[-1], float(k))

@@ -96,7 +96,7 @@ def test_the_table_of_both_sides() -> None:
 
 def test_the_last_strains_of_both_sides() -> None:
     shown = re.sub(r"\|+", "|", re.sub("<[^>]*>", "|", str(_strains(sides_of(2e-3)))))
-    assert "|axial|2000.0|200.0|2.0|" in shown and "|wide|3000.0|300.0|2.0|" in shown
+    assert "|axial|2\u202f000.0|200.0|2.0|" in shown and "|wide|3\u202f000.0|300.0|2.0|" in shown
     assert "|lost|0.0|0.0|1.0|" in shown, "the last that is known"
 
 

@@ -38,7 +38,7 @@ def test_a_thousandth_of_the_capacity_is_no_load(force: float, at_once: bool) ->
     if at_once:
         bench.controls.tare()
     else:
-        assert f"{force:g} N in mid-test" in bench.refused()
+        assert f"{force:g}".replace("-", "−") + " N in mid-test" in bench.refused()
     assert bench.cell.calls == ["tare"] * at_once
 
 

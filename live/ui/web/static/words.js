@@ -79,17 +79,18 @@ export function number(value, format) {
   else if (kind === "%") text = `${(100 * value).toFixed(digits ?? 6)}%`;
   else if (kind === "e") text = exponent(value.toExponential(digits ?? 6));
   else if (kind === "x") text = value.toString(16);
-  else if (kind === "g") text = general(value, Number(digits ?? 6) || 1);
+  else if (kind === "g") text = general(value, Number(digits ?? 6) || 1, format !== "g");
   if (sign && value >= 0) text = `+${text}`;
   if (format.length > 1 && value < 0) text = text.replace("-", MINUS);
   return width ? text.padStart(Number(width), zero ? "0" : " ") : text;
 }
 
-function general(value, digits) {
+function general(value, digits, grouped) {
   if (value === 0) return "0";
   const power = Number(value.toExponential(digits - 1).split("e")[1]);
   if (power < -4 || power > 9) return exponent(value.toExponential(digits - 1).replace(/\.?0+e/, "e"));
-  if (power >= digits) return fixed(Number(value.toPrecision(digits)));
+  const whole = Number(value.toPrecision(digits));
+  if (power >= digits) return grouped ? fixed(whole) : whole.toFixed(0);
   const text = value.toFixed(Math.max(digits - 1 - power, 0));
   return text.includes(".") ? text.replace(/\.?0+$/, "") : text;
 }

@@ -276,6 +276,7 @@ def test_two_cameras_are_put_together_at_the_end(
     )
     side: Any = SimpleNamespace(run_state=None, test=None, outputs=SimpleNamespace(reports=()), folder=tmp_path,
                                 config=SimpleNamespace(specimen=None, output=SimpleNamespace(report=True)))  # fmt: skip
+    (tmp_path / "figures.json").touch()
     outcome: Any = SimpleNamespace(folder=tmp_path, exit_code=code, cameras={"front": side, "back": side})
     assert finish(outcome, screen) == found
     assert joined == [(tmp_path / "front", tmp_path / "back", tmp_path / "strain.csv")]
