@@ -39,6 +39,8 @@ def command(arguments: argparse.Namespace) -> int:
         meant = Message(" (did you mean {near}?)", near[0]) if near else ""
         raise ConfigError("there is no page {name}{meant}; phasedic docs lists all", repr(name), meant)
     text = _section(pages[name].read_text(encoding="utf-8"), anchor)
+    if not text:
+        raise ConfigError("{name} has no section {anchor}; phasedic docs {name} shows all", name, anchor)
     if sys.stdout.isatty() and sys.stdin.isatty():
         pydoc.pager(text)
     else:
@@ -65,7 +67,9 @@ def _heading(path: Path) -> str:
 
 
 def _section(text: str, anchor: str) -> str:
-    """The section of a page under the heading that a link names; the whole page where there is none."""
+    """The section of a page under the heading that a link names, empty where there is none; the whole without a name."""
+    if not anchor:
+        return text
     start = level = 0
     for one in _HEADING.finditer(text):
         slug = re.sub(r"\s+", "-", re.sub(r"[^\w\s-]", "", one["title"].lower()).strip())
@@ -73,4 +77,4 @@ def _section(text: str, anchor: str) -> str:
             return text[start : one.start()].rstrip()
         if not level and slug == anchor:
             start, level = one.start(), len(one["level"])
-    return text[start:].rstrip() if level else text
+    return text[start:].rstrip() if level else ""

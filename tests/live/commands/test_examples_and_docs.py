@@ -61,7 +61,7 @@ def test_the_pictures_of_the_tensile_test_give_what_the_readme_says(
 
 
 def test_each_page_is_shown_under_the_names_of_messages(capsys: pytest.CaptureFixture[str]) -> None:
-    for name in ("optics", "optics.md", "docs/optics.md", "docs/optics.md#lens"):
+    for name in ("optics", "optics.md", "docs/optics.md"):
         assert phasedic(["docs", name]) == 0
         assert capsys.readouterr().out == (ROOT / "docs" / "optics.md").read_text() + "\n"
 
@@ -80,6 +80,8 @@ def test_a_section_is_shown_up_to_the_next_heading(capsys: pytest.CaptureFixture
 def test_pages_are_listed_and_an_unknown_one_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert phasedic(["docs"]) == 0
     assert "troubleshooting            Troubleshooting\n" in capsys.readouterr().out
+    assert phasedic(["docs", "optics#lens"]) == 2
+    assert "optics has no section lens; phasedic docs optics shows all" in capsys.readouterr().err
     assert phasedic(["docs", "optcs"]) == 2
     assert "did you mean optics?" in capsys.readouterr().err
 
