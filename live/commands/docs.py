@@ -67,7 +67,7 @@ def _heading(path: Path) -> str:
 
 
 def _section(text: str, anchor: str) -> str:
-    """The section of a page under the heading that a link names, empty where there is none; the whole without a name."""
+    """The section under the heading that a link names, empty where there is none; the whole page without a name."""
     if not anchor:
         return text
     start = level = 0
