@@ -47,23 +47,24 @@ function showBelief({ belief, words, troubles }) {
 const nameOf = (one) => `${typeof one.name === "string" && !one.name.includes(" ") ? one.name : t(one.name)}${one.side ? `, ${t(one.side)}` : ""}`;
 
 // Value, uncertainty and unit of a figure: a quantity, or a text as it is.
-function parts(one) {
+function parts(one, bound) {
   if (typeof one.text === "string" || one.text?.say != null) return { value: told(one.text), sigma: "", unit: "" };
   const found = quantity(one.text);
-  return one.bound ? { ...found, value: `${t("at least")} ${found.value}` } : found;
+  return one.bound ? { ...found, value: `${bound} ${found.value}` } : found;
 }
 
 function tile(one) {
-  const isKnown = one.text != null, { value, sigma, unit } = isKnown ? parts(one) : { value: "–", sigma: "", unit: "" }, says = isKnown ? one.remark : one.why, isDoubtful = isKnown && says && !one.bound;
+  const isKnown = one.text != null, isBound = isKnown && one.bound, { value, sigma, unit } = isKnown ? parts(one, "≥") : { value: "–", sigma: "", unit: "" };
+  const says = isKnown ? one.remark : one.why, isDoubtful = isKnown && says && !isBound;
   const reason = says ? [el("p", { class: `says ${isDoubtful ? "look" : ""}` }, icon(isDoubtful ? "warn" : "info"), el("span", { text: told(says), title: told(says) }))] : [];
-  const interval = sigma ? [el("span", { text: "95 %" }), el("span", { class: "num" }, "± ", el("b", { text: sigma }))] : [];
+  const interval = sigma ? [el("span", { text: "95 %" }), el("span", { class: "num" }, "± ", el("b", { text: sigma }))] : isBound ? [el("span", { text: t("at least") })] : [];
   return el("section", { class: `tile ${isKnown ? (isDoubtful ? "look" : "") : "stale"}`.trim() }, el("h3", { text: nameOf(one) }), el("span", { class: "age" }),
     el("p", { class: "value" }, el("span", { class: "figure num", text: value }), el("span", { text: unit })), el("p", { class: "sigma" }, ...interval), ...reason);
 }
 
 function row(one) {
   if (one.words) return el("li", { class: "row words" }, el("span", { text: nameOf(one) }), el("span", { class: "small", text: told(one.text) }));
-  const remark = one.remark ? [el("span", { class: "small", text: told(one.remark) })] : [], { value, sigma, unit } = parts(one);
+  const remark = one.remark ? [el("span", { class: "small", text: told(one.remark) })] : [], { value, sigma, unit } = parts(one, t("at least"));
   return el("li", { class: "row" }, el("span", { text: nameOf(one) }), el("b", { class: "num" }, `${value} ${unit} `, el("small", { text: sigma && `± ${sigma}` })), ...remark);
 }
 

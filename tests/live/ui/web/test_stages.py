@@ -244,7 +244,7 @@ def test_after_a_test(start: Start) -> None:
     tiles = page.page.locator("#tiles .tile")
     words = [str(tiles.nth(k).text_content()) for k in range(tiles.count())]
     assert len(words) == 4 and any(
-        re.match(r"Rmat least [\d.]+MPathe test ended before", text) for text in words
+        re.match(r"Rm≥ [\d.]+MPaat leastthe test ended before", text) for text in words
     ), words
     rows = page.page.locator("#results .row:not(.words):not(:has(.small))")
     heights = [rows.nth(k).bounding_box()["height"] for k in range(rows.count())]
