@@ -33,8 +33,8 @@ WATCH_LAYOUT = """() => { window.moved = [];
     const element = (one) => one.node?.nodeType === 1 ? one.node : one.node?.parentElement;
     const told = (one) => [element(one)?.id || element(one)?.className,
         ...[one.previousRect, one.currentRect].map(r => `${r.x} ${r.y} ${r.height}`)].join(" ");
-    let pressed = -1e9; // what a key does may come later than the browser's half a second on a busy machine
-    addEventListener("keydown", () => { pressed = performance.now(); }, true);
+    let pressed = -1e9; // what is pressed may act later than the browser's half a second on a busy machine
+    for (const kind of ["keydown", "pointerdown"]) addEventListener(kind, () => { pressed = performance.now(); }, true);
     new PerformanceObserver(list => window.moved.push(...list.getEntries().filter(e => e.startTime > pressed + 3000
         && e.sources.some(one => !element(one)?.closest("#state, .top"))).map(e => [e.value, ...e.sources.map(told)])))
     .observe({ type: "layout-shift" }); }"""
