@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from acquire.load_cell.contract import LoadCell
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.text import Message
+from acquire.text.quantity import MINUS
 
 MIN_VALUES = 3  # fewer give no noise
 ROBUST_VALUES = 12  # values from which a few odd ones do not count
@@ -327,7 +328,7 @@ def report_lines(found: LoadReport) -> list[str]:
             ),
             Message(
                 "force    mean {mean_text} N, from {lowest_N:.6g} to {highest_N:.6g} N",
-                found.mean_text,
+                found.mean_text.replace(MINUS, "-"),  # as the device sends it, to be compared and typed again
                 found.lowest_N,
                 found.highest_N,
             )
