@@ -1,7 +1,7 @@
 """The decorator of compiled loops that numba keeps for the next process, each file with a checksum behind it.
 
 A power cut leaves files that are empty, cut, or of zeros. Numba would raise an error on them, or run what they hold;
-here they are compiled anew. It reads the files of this module too, since it ignores what follows.
+here they are compiled anew. Without this module numba reads its files too, since it ignores what follows.
 """
 
 from __future__ import annotations

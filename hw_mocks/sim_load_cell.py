@@ -44,7 +44,7 @@ WARNING = Message("simulated: no load cell and no specimen")
 # fmt: off
 @dataclass(frozen=True, slots=True)
 class SimLoadSettings:
-    """Of ``sim:``: how the simulated cell measures.
+    """Settings of ``sim:``: how the simulated cell measures.
 
     Attributes
     ----------

@@ -17,7 +17,7 @@ RATES = (2, 5, 10, 25, 50, 125, 250)
 
 
 class Mark10Settings(ParserSettings):
-    """None."""
+    """No settings of its own."""
 
     def parser(self, address: str) -> Parser:
         """Lines of one pattern."""

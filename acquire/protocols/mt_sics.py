@@ -45,7 +45,7 @@ class MtSicsParser(LineParser):
 
 
 class MtSicsSettings(ParserSettings):
-    """None."""
+    """No settings of its own."""
 
     def parser(self, address: str) -> Parser:
         """The one there is."""

@@ -51,7 +51,7 @@ class SauterParser(Parser):
 
 
 class SauterSettings(ParserSettings):
-    """None."""
+    """No settings of its own."""
 
     def parser(self, address: str) -> Parser:
         """The one there is."""

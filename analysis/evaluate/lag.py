@@ -35,11 +35,8 @@ _CURVED = 3.5  # standard deviations of a curvature that ends the elastic part
 _APART_S, _SEPARATION = 0.2, 20.0  # a lag this far away must fit worse by this many variances
 _BENT = 5.0  # times the noise: second differences of the force that are no bend
 _BACK = 0.1  # of the highest force: a fall by more ends the first rise
-_GAP_S, _GAP, _GAP_MOVED = (
-    0.5,
-    10.0,
-    0.02,
-)  # without a reading: s, median intervals; of the highest force, meanwhile
+# Without a reading: s, and median intervals; of the highest force, meanwhile
+_GAP_S, _GAP, _GAP_MOVED = 0.5, 10.0, 0.02
 _KNOWN = 0.95  # of the information that must come from the force itself and not from its noise
 
 

@@ -204,10 +204,12 @@ class _Fits:
         free = n - np.count_nonzero(told, axis=1)
         self._scatter = np.sqrt(np.add.reduceat(rest**2, start) / free) * stdtrit(free, _ONE_SIGMA)
         held = (waves.held[of] > _HELD)[each] & (np.abs(u) < waves.held[of][each] / 2)
-        self._hidden, sigma = np.zeros(len(of)), noise(bursts.strain, 4)
-        for k in np.unique(each[held]):
-            part, whole = bursts.strain[held & (each == k)], bursts.strain[each == k]
-            self._hidden[k] = np.ptp(part) / np.ptp(whole) if np.ptp(part) > 2 * _CLEAR * sigma else 0.0
+        part, whole = (
+            np.fmax.reduceat(strain, start) - np.fmin.reduceat(strain, start)
+            for strain in (np.where(held, bursts.strain, math.nan), bursts.strain)
+        )
+        moved = part > 2 * _CLEAR * noise(bursts.strain, 4)
+        self._hidden = np.divide(part, whole, out=np.zeros(len(of)), where=moved)
         self._tips = np.zeros((len(of), 6))
         self._tips[:, 2], self._tips[:, 5] = 1, self._curved
 

@@ -88,7 +88,7 @@ class MeasuredAgain:
 
     @classmethod
     def of(cls, folder: Path, n_frames: float, skipped: int) -> MeasuredAgain:
-        """What a run or replay in ``folder`` answers."""
+        """How a run or replay in ``folder`` can be."""
         if not (folder / SESSION).exists():
             return cls(Message("the same command with"), n_frames)
         return cls(f"phasedic replay {shlex.quote(str(folder))}", n_frames, skipped)
