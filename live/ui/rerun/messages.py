@@ -1,6 +1,7 @@
 """The data of a test as messages to the process of its view, and back.
 
-The first message has the settings of the view (``ViewSetup``) and where it is shown (``ViewTarget``).
+The first message has the settings of the view (``ViewSetup``) and where it is shown (``ViewTarget``). Both ends are
+this program: what has the form of a message (``wire.py``) is taken as it is.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +20,11 @@ from acquire.text import Message
 from acquire.text.message import joined, word
 from acquire.text.printable import share_text
 from acquire.text.quantity import PLUS_MINUS, Amount
-from analysis.field import Measure, StrainField, ZoiGrid
+from analysis.field import StrainField, ZoiGrid
 from live.pipeline.measurement import Measurement
 from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
 from live.pipeline.timed.figure import BEYOND, LACKING, FigureState, TimedFigure
-from live.ui.rerun.wire import Kind, Parcel, WireError
+from live.ui.rerun.wire import Kind, Parcel
 from live.words.language import of_terminal, told
 
 STRAINS = ("exx", "eyy", "exy")
@@ -210,13 +211,9 @@ def setup_message(setup: ViewSetup, target: ViewTarget) -> Parcel:
 def setup_of(message: Parcel) -> tuple[ViewSetup, ViewTarget]:
     """The content of ``setup_message``."""
     meta = dict(message.meta)
-    try:
-        target = ViewTarget(*(meta.pop(name) for name in ("port", "rrd", "recording")))
-        return ViewSetup(grid=_grid(meta.pop("grid"), message), **meta), target
-    except (KeyError, TypeError) as error:
-        raise WireError(
-            "the first message to the view has missing or unknown entries: {why}", error
-        ) from error
+    target = ViewTarget(*(meta.pop(name) for name in ("port", "rrd", "recording")))
+    grid = ZoiGrid.from_dict(meta.pop("grid"), message.arrays["active"])
+    return ViewSetup(grid=grid, **meta), target
 
 
 def row_of(measurement: Measurement) -> Row:
@@ -236,10 +233,7 @@ def rows_message(kind: Kind, rows: Iterable[Row], name: str = "") -> Parcel:
 
 def rows_of(message: Parcel) -> list[Row]:
     """The content of ``rows_message``."""
-    rows = _array(message, "rows")
-    if rows.ndim != 2 or rows.shape[1] != COLUMNS[message.kind]:
-        raise WireError("a message {kind} to the view has rows {shape}", message.kind.name, rows.shape)
-    return [tuple(row) for row in rows.tolist()]
+    return [tuple(row) for row in message.arrays["rows"].tolist()]
 
 
 def field_message(t: float, field: StrainField) -> Parcel:
@@ -253,28 +247,15 @@ def field_message(t: float, field: StrainField) -> Parcel:
 
 def field_of(message: Parcel) -> tuple[float, StrainField]:
     """Time and field of ``field_message``; what the view does not draw is 0."""
-    grid = _grid(message.meta.get("grid"), message)
-    parameters, covariance, status = (_array(message, n) for n in ("parameters", "covariance", "status"))
-    residual = _array(message, "residual")
-    halves = parameters.shape[:1] in ((6,), (12,))
-    if not halves or {parameters.shape[1:], covariance.shape[1:], status.shape, residual.shape} != {
-        grid.shape
-    }:
-        raise WireError(
-            "a field to the view has shapes {first}, {second}, {third}",
-            parameters.shape,
-            covariance.shape,
-            status.shape,
-        )
-    if covariance.shape[0] != 21:
-        raise WireError("a field to the view has {n} covariances", covariance.shape[0])
+    meta, arrays = message.meta, message.arrays
+    grid, covariance = ZoiGrid.from_dict(meta["grid"], arrays["active"]), arrays["covariance"]
     nothing = np.zeros(grid.shape, np.float32)
     none = np.broadcast_to(nothing, covariance.shape)
     field = StrainField(
-        grid, parameters, covariance, none, residual, status, np.zeros(grid.shape, np.uint8), nothing,
-        measure=_measure(message),
+        grid, arrays["parameters"], covariance, none, arrays["residual"], arrays["status"],
+        np.zeros(grid.shape, np.uint8), nothing, measure=meta["measure"],
     )  # fmt: skip
-    return _number(message, "t"), field
+    return meta["t"], field
 
 
 def picture_message(frame: Frame) -> Parcel:
@@ -286,11 +267,7 @@ def picture_message(frame: Frame) -> Parcel:
 
 def picture_of(message: Parcel) -> PictureMessage:
     """The content of ``picture_message``."""
-    image = _array(message, "image")
-    if image.ndim != 2 or not image.size or image.dtype.kind != "u":
-        raise WireError("a picture to the view is {shape} of {type}", image.shape, image.dtype)
-    bits, step = (int(_number(message, name)) for name in ("bits", "step"))
-    return PictureMessage(image, bits, _number(message, "t"), step)
+    return PictureMessage(message.arrays["image"], **message.meta)
 
 
 def events_message(events: Sequence[Event]) -> Parcel:
@@ -300,13 +277,8 @@ def events_message(events: Sequence[Event]) -> Parcel:
 
 def events_of(message: Parcel) -> list[Event]:
     """The content of ``events_message``."""
-    try:
-        return [
-            Event(float(t), EventKind(kind), str(source), str(text), level)
-            for t, kind, source, text, level in message.meta["events"]
-        ]
-    except (KeyError, TypeError, ValueError) as error:
-        raise WireError("events to the view are damaged: {why}", error) from error
+    rows = message.meta["events"]
+    return [Event(t, EventKind(kind), source, text, level) for t, kind, source, text, level in rows]
 
 
 def figures_message(snapshot: Snapshot) -> Parcel:
@@ -318,44 +290,4 @@ def figures_message(snapshot: Snapshot) -> Parcel:
 def figures_of(message: Parcel) -> LargeFigures:
     """The content of ``figures_message``."""
     meta = message.meta
-    try:
-        cells = [(str(label), str(value), str(tone)) for label, value, tone in meta["cells"]]
-        return LargeFigures(float(meta["t"]), cells, str(meta["line"]), bool(meta["alarmed"]))
-    except (KeyError, TypeError, ValueError) as error:
-        raise WireError("figures to the view are damaged: {why}", error) from error
-
-
-def _measure(message: Parcel) -> Measure:
-    name = message.meta.get("measure")
-    measures: tuple[Measure, ...] = get_args(Measure)
-    for measure in measures:
-        if name == measure:
-            return measure
-    raise WireError("a field to the view has an unknown measure of strain {name}", repr(name))
-
-
-def _grid(description: Any, message: Parcel) -> ZoiGrid:
-    try:
-        return ZoiGrid.from_dict(description, _array(message, "active"))
-    except (KeyError, TypeError, ValueError) as error:
-        raise WireError(
-            "a message {kind} to the view has no grid: {why}", message.kind.name, error
-        ) from error
-
-
-def _array(message: Parcel, name: str) -> NDArray[Any]:
-    try:
-        return message.arrays[name]
-    except KeyError:
-        raise WireError(
-            "a message {kind} to the view has no array {name}", message.kind.name, repr(name)
-        ) from None
-
-
-def _number(message: Parcel, name: str) -> float:
-    try:
-        return float(message.meta[name])
-    except (KeyError, TypeError, ValueError):
-        raise WireError(
-            "a message {kind} to the view has no number {name}", message.kind.name, repr(name)
-        ) from None
+    return LargeFigures(**{**meta, "cells": [tuple(cell) for cell in meta["cells"]]})

@@ -10,6 +10,7 @@ import logging
 import socket
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 from acquire.system import inherited_socket, kill_this_process, lowest_priority, memory_MiB, wait_until_closed
@@ -37,6 +38,20 @@ GRACE_S = 5.0
 """To draw what waits and to close the file after the test has ended."""
 
 _POLL_S = 2.0
+
+
+SHOW: dict[Kind, Callable[[ViewScene, Parcel], object]] = {
+    Kind.MEANS: lambda scene, message: scene.means(rows_of(message)),
+    Kind.FIELD: lambda scene, message: scene.field(*field_of(message)),
+    Kind.PICTURE: lambda scene, message: scene.picture(picture_of(message)),
+    Kind.LOADS: lambda scene, message: scene.loads(rows_of(message)),
+    Kind.POINTS: lambda scene, message: scene.points(rows_of(message)),
+    Kind.GAUGE: lambda scene, message: scene.gauge(message.meta["name"], rows_of(message)),
+    Kind.EVENTS: lambda scene, message: scene.events(events_of(message)),
+    Kind.STATUS: lambda scene, message: scene.status(message.meta["markdown"]),
+    Kind.WHOLE: lambda scene, message: scene.whole(message.arrays),
+    Kind.FIGURES: lambda scene, message: scene.figures(figures_of(message)),
+}
 
 
 class ReplyChannel:
@@ -112,7 +127,7 @@ def _draw(pipe: MessagePipe, scene: ViewScene, channel: ReplyChannel, max_MiB: f
     checked_t = time.monotonic()
     try:
         while (message := pipe.next()).kind is not Kind.END:
-            _show(scene, message)
+            SHOW[message.kind](scene, message)
             if time.monotonic() - checked_t > _POLL_S:
                 checked_t = time.monotonic()
                 if (grown := memory_MiB()) > max_MiB:
@@ -123,31 +138,6 @@ def _draw(pipe: MessagePipe, scene: ViewScene, channel: ReplyChannel, max_MiB: f
         channel.send(Kind.ENDED)
     finally:
         scene.end()
-
-
-def _show(scene: ViewScene, message: Parcel) -> None:
-    kind = message.kind
-    if kind is Kind.MEANS:
-        scene.means(rows_of(message))
-    elif kind is Kind.FIELD:
-        scene.field(*field_of(message))
-    elif kind is Kind.PICTURE:
-        scene.picture(picture_of(message))
-    elif kind is Kind.LOADS:
-        scene.loads(rows_of(message))
-    elif kind is Kind.POINTS:
-        scene.points(rows_of(message))
-    elif kind is Kind.GAUGE:
-        scene.gauge(str(message.meta.get("name")), rows_of(message))
-    elif kind is Kind.EVENTS:
-        for event in events_of(message):
-            scene.event(event)
-    elif kind is Kind.STATUS:
-        scene.status(str(message.meta.get("markdown", "")))
-    elif kind is Kind.WHOLE:
-        scene.whole(message.arrays)
-    elif kind is Kind.FIGURES:
-        scene.figures(figures_of(message))
 
 
 def end_with(parent: socket.socket) -> None:

@@ -343,16 +343,17 @@ class ViewScene:
 
     # -- texts --------------------------------------------------------------------------------
 
-    def event(self, event: Event) -> None:
-        """Add a line to the list of events, except for measurements."""
+    def events(self, events: Iterable[Event]) -> None:
+        """Add a line to the list of events for each, except for measurements."""
         import rerun as rr
 
-        if event.kind is EventKind.MEASURED:
-            return
-        self._at(event.t)
-        source = event.source.partition("?")[0]
-        text = f"{self._since_start(event.t):.1f} s  {source}: {event.text}"
-        self._log("events", rr.TextLog(text, level=_LEVELS[event.level]))
+        for event in events:
+            if event.kind is EventKind.MEASURED:
+                continue
+            self._at(event.t)
+            source = event.source.partition("?")[0]
+            text = f"{self._since_start(event.t):.1f} s  {source}: {event.text}"
+            self._log("events", rr.TextLog(text, level=_LEVELS[event.level]))
 
     def figures(self, shown: LargeFigures) -> None:
         """Draw the large figures where a sink is due, and the last of all at the end."""

@@ -102,7 +102,7 @@ def scene_into(
 
 
 def draw_a_test(scene: ViewScene, seconds: float = 3.0) -> None:
-    scene.event(Event(START, EventKind.START, "phasedic", "test started"))
+    scene.events([Event(START, EventKind.START, "phasedic", "test started")])
     scene.status("**all is well**")
     for k in range(round(10 * seconds)):
         frame, measurement = make_frame(k, START + 0.1 * k), make_measurement(k, 1e-4 * k)

@@ -219,9 +219,9 @@ def test_a_picture_keeps_its_size_and_its_grey_levels(light: bool, side: int, sc
 @pytest.mark.parametrize(("level", "shown"), [("info", "INFO"), ("warning", "WARN"), ("error", "ERROR")])
 def test_an_event_is_a_line_with_its_time_and_its_level(level: Any, shown: str) -> None:
     scene, sink, _ = made()
-    scene.event(Event(START + 12.34, EventKind.MEASURED, "measurement", "a burst"))
+    scene.events([Event(START + 12.34, EventKind.MEASURED, "measurement", "a burst")])
     assert "events" not in sink.logged
-    scene.event(Event(START + 12.34, EventKind.DEVICE, "v4l2:/dev/video0?fps=5", "a fault", level))
+    scene.events([Event(START + 12.34, EventKind.DEVICE, "v4l2:/dev/video0?fps=5", "a fault", level)])
     assert sink.last("events", "text") == ["12.3 s  v4l2:/dev/video0: a fault"]
     assert sink.last("events", "level") == [shown]
     assert sink.times == [pytest.approx(12.34)]

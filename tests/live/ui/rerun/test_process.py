@@ -80,13 +80,13 @@ EVENT = Event(START, EventKind.DEVICE, "camera", "a fault", "error")
         (rows_message(Kind.LOADS, [(START, 5.0)]), [("loads", ([(START, 5.0)],))]),
         (rows_message(Kind.POINTS, [(1e-3, 5.0)]), [("points", ([(1e-3, 5.0)],))]),
         (rows_message(Kind.GAUGE, [(START, 1e-3, 1e-5)], "axial"), [("gauge", ("axial", [(START, 1e-3, 1e-5)]))]),
-        (events_message([EVENT, EVENT]), [("event", (EVENT,))] * 2),
+        (events_message([EVENT, EVENT]), [("events", ([EVENT, EVENT],))]),
         (Parcel(Kind.STATUS, {"markdown": "**well**"}), [("status", ("**well**",))]),
     ],
 )  # fmt: skip
 def test_a_message_is_drawn(message: Parcel, drawn: list[Any]) -> None:
     scene = Scene()
-    process._show(scene, message)  # type: ignore[arg-type]
+    process.SHOW[message.kind](scene, message)  # type: ignore[arg-type]
     assert scene.told == drawn
 
 
@@ -97,7 +97,7 @@ def test_pictures_fields_and_figures_are_drawn() -> None:
         field_message(m.t, m.field),
         figures_message(Snapshot(START, "REC", valid=3, zois=4, figures=live_figures(force=7.0))),
     ):
-        process._show(scene, message)  # type: ignore[arg-type]
+        process.SHOW[message.kind](scene, message)  # type: ignore[arg-type]
     (_, (picture,)), (_, (t, field)), (_, (figures,)) = scene.told
     assert [name for name, _ in scene.told] == ["picture", "field", "figures"]
     assert isinstance(picture, PictureMessage) and (picture.t, picture.bits) == (START + 1.0, 12)
@@ -122,7 +122,7 @@ def test_it_ends_where_it_has_grown_too_large(
     monkeypatch.setattr(process.time, "monotonic", lambda: next(times))
     monkeypatch.setattr(process, "memory_MiB", lambda: grown)
     scene, channel = Scene(), Channel()
-    reader = Messages(*[Parcel(Kind.STATUS)] * 3, Parcel(Kind.END))
+    reader = Messages(*[Parcel(Kind.STATUS, {"markdown": ""})] * 3, Parcel(Kind.END))
     process._draw(reader, scene, channel, 641.0)  # type: ignore[arg-type]
     assert channel.sent == ([(Kind.FULL, {"memory_MiB": 642})] if full else [(Kind.ENDED, {})])
     assert len([name for name, _ in scene.told if name == "status"]) == (2 if full else 3)

@@ -149,23 +149,6 @@ def test_a_message_that_ends_in_the_middle_is_an_end() -> None:
             pipe.next()
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (rows_of, Parcel(Kind.LOADS, {}, {"rows": np.zeros((2, 3))})),
-        (rows_of, Parcel(Kind.LOADS)),
-        (picture_of, Parcel(Kind.PICTURE, {"t": 0.0, "bits": 8, "step": 1}, {"image": np.zeros((2, 2, 2), np.uint8)})),
-        (picture_of, Parcel(Kind.PICTURE, {"t": 0.0}, {"image": np.zeros((2, 2), np.uint8)})),
-        (events_of, Parcel(Kind.EVENTS, {"events": [[1.0, "no such kind", "", "", "info"]]})),
-        (setup_of, Parcel(Kind.SETUP, {"grid": {}}, {"active": np.ones((2, 2), bool)})),
-        (field_of, Parcel(Kind.FIELD, {"t": 0.0, "grid": None}, {"active": np.ones((2, 2), bool)})),
-    ],
-)  # fmt: skip
-def test_a_message_with_something_else_in_it_is_refused(make: Any, message: Parcel) -> None:
-    with pytest.raises(WireError):
-        make(sent_and_received(message))
-
-
 def test_arrays_of_other_types_are_not_sent() -> None:
     with pipes() as (ours, _), pytest.raises(WireError, match="<i8"):
         ours.send(Parcel(Kind.LOADS, {}, {"rows": np.zeros(3, np.int64)}))
