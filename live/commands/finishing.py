@@ -4,39 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from acquire.errors import EXIT_WORDS, LOSS, PhasedicError
 from acquire.text import Message
 from live.commands.sides import TABLE, put_together
 from live.config.cameras import BACK, FRONT
-from live.config.loading import Config
 from live.pipeline.consumer import Screen
-from live.pipeline.run_state import RunState
 from live.results.finished.figures_file import FILE
-from live.results.finished.finished_test import FinishedTest
 from live.ui.terminal.screen import CamerasScreen
 from live.ui.terminal.summary import print_summary
 
-
-class EndedCamera(Protocol):
-    """What is printed of a camera: of its run or of its replay."""
-
-    @property
-    def run_state(self) -> RunState: ...
-
-    @property
-    def test(self) -> FinishedTest: ...
-
-    @property
-    def folder(self) -> Path: ...
-
-    @property
-    def config(self) -> Config: ...
+if TYPE_CHECKING:
+    from live.replay.replay import Replayed
+    from live.run.outcome import Outcome
 
 
 def finish_test(
-    cameras: Mapping[str, EndedCamera],
+    cameras: Mapping[str, Outcome | Replayed],
     lines: Mapping[str, Sequence[str]],
     folder: Path,
     code: int,

@@ -10,12 +10,13 @@ from collections import deque
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from acquire.frame import Burst
+from acquire.load_cell.load_log import LoadLog
 from acquire.text import Message
 from acquire.text.message import joined
 from analysis.evaluate import COME_APART, REGION, AreaStrain, GaugeSet, GaugeValue
@@ -325,18 +326,6 @@ class Measurement:
         return replace(self, time_step=replace(self.time_step, force=force, force_raw=raw, zero=zero))
 
 
-class Loads(Protocol):
-    """What ``ForceMatching`` uses of a load log (``acquire.load_cell.LoadLog``)."""
-
-    def force_at(self, t: float) -> float: ...
-
-    def raw_force_at(self, t: float) -> float: ...
-
-    def zero_at(self, t: float) -> float: ...
-
-    def covers(self, t: float) -> bool: ...
-
-
 class ForceMatching:
     """Holds measurements until their force is final, so that files and curves agree with a replay.
 
@@ -348,7 +337,7 @@ class ForceMatching:
     hold_s : float, s
     """
 
-    def __init__(self, loads: Loads, hold_s: float = HOLD_S) -> None:
+    def __init__(self, loads: LoadLog, hold_s: float = HOLD_S) -> None:
         self._loads, self._hold_s = loads, hold_s
         self._held: deque[Measurement] = deque()
 

@@ -27,7 +27,8 @@ from typing import NamedTuple, Protocol
 
 from acquire.errors import Spoken
 from acquire.events import Event, EventKind, Level
-from acquire.load_sample import LoadCellInfo, LoadSample
+from acquire.load_cell import LoadCell
+from acquire.load_sample import LoadSample
 from acquire.text import Message
 from acquire.text.printable import printable
 from live.config.listen_address import SOCKET, ListenAddress, private_socket, read_token
@@ -101,17 +102,6 @@ def refusal(text: str, *values: object) -> Answer:
     return Answer(Message(text, *values) if values else text, refused=True)
 
 
-class TareableCell(Protocol):
-    """What ``TareControl`` uses of a load cell."""
-
-    @property
-    def info(self) -> LoadCellInfo: ...
-
-    def tare(self, *, force: bool = False) -> None: ...
-
-    def undo_tare(self) -> None: ...
-
-
 class TareableTest(Protocol):
     """The test in whose middle a cell may be tared."""
 
@@ -146,7 +136,7 @@ class TareControl:
 
     def __init__(
         self,
-        cell: TareableCell,
+        cell: LoadCell,
         test: TareableTest,
         clock: Callable[[], float],
         wait_s: float = TARED_S,

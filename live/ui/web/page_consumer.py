@@ -10,9 +10,8 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from acquire.errors import DataError
 from acquire.events import Event, EventKind
@@ -37,38 +36,13 @@ from live.ui.web.curve_history import CurveHistory
 from live.ui.web.limits import FigureLimits
 from live.ui.web.map_view import MapView, as_jpeg, gauge_shapes, plate_shapes, shrunk
 
+if TYPE_CHECKING:
+    from live.run.camera_run import CameraRun
+    from live.run.live_run import LiveRun
+
 MAX_EVENTS = 30
 STATE_S, PICTURE_S = 0.1, 0.25
 """Between states and between pictures."""
-
-
-class Running(Protocol):
-    """What the page reads of a run."""
-
-    @property
-    def paused(self) -> bool: ...
-
-    @property
-    def recording(self) -> bool: ...
-
-    @property
-    def live(self) -> bool: ...
-
-    @property
-    def run_state(self) -> RunState: ...
-
-    @property
-    def folder(self) -> Path: ...
-
-
-class RunningTest(Running, Protocol):
-    """What the page reads of a test."""
-
-    @property
-    def cameras(self) -> Mapping[str, Running]: ...
-
-    @property
-    def states(self) -> Mapping[str, RunState]: ...
 
 
 class PageConsumer(Consumer):
@@ -121,7 +95,7 @@ class PageConsumer(Consumer):
         self._limits = FigureLimits(config.alarm)
         self._shown = 0
         self._scale: dict[str, Any] = {}
-        self._running: Running | None = None
+        self._running: LiveRun | CameraRun | None = None
         self._cameras: CamerasPanel | None = None
         self._newest: Measurement | None = None
         self._matched: Measurement | None = None
@@ -137,7 +111,9 @@ class PageConsumer(Consumer):
         self._elongation_gauge, self._length_mm = elongation_length(config)
         self._due = {"state": 0.0, "picture": 0.0}
 
-    def attach(self, running: Running, states: Mapping[str, RunState] = MappingProxyType({})) -> None:
+    def attach(
+        self, running: LiveRun | CameraRun, states: Mapping[str, RunState] = MappingProxyType({})
+    ) -> None:
         """Use ``running``, which has begun; ``states`` are those of the cameras of a test with several."""
         if len(states) > 1:
             self._cameras = CamerasPanel(states, self._config.specimen, self._now)
@@ -287,7 +263,7 @@ class PageConsumer(Consumer):
         }
         return values | _measured(s, self._colours)
 
-    def _snapshot(self, running: Running, now: float) -> Snapshot:
+    def _snapshot(self, running: LiveRun | CameraRun, now: float) -> Snapshot:
         """The state of the test; of a recording all figures are of one instant, and nothing is late."""
         if running.live or self._matched is None or running.run_state.health.ended:
             return running.run_state.snapshot(now)

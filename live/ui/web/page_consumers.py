@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from live.config.loading import Config
 from live.run.control import Answer, refusal
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.page_consumer import PageConsumer, RunningTest
+from live.ui.web.page_consumer import PageConsumer
 from live.ui.web.server import Response, json_response
+
+if TYPE_CHECKING:
+    from live.run.live_run import LiveRun
 
 
 class PageConsumers:
@@ -44,7 +47,7 @@ class PageConsumers:
         """The consumer of the first camera."""
         return next(iter(self.by_name.values()), None)
 
-    def attach(self, live: RunningTest) -> None:
+    def attach(self, live: LiveRun) -> None:
         """Show the state of ``live``, and of each of its cameras, from now on."""
         for name, consumer in self.by_name.items():
             leads = consumer is self.first

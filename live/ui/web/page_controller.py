@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,11 +24,11 @@ from acquire.text.printable import brief, printable
 from analysis.evaluate import GAUGE_KINDS
 from live.config.loading import Config
 from live.config.new_files import free_name
-from live.run.control import ONCE, Answer, Controls, carry_out, refusal
+from live.run.control import ONCE, Answer, carry_out, refusal
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.map_view import as_png, map_choices
-from live.ui.web.page_consumer import PageConsumer, RunningTest
+from live.ui.web.page_consumer import PageConsumer
 from live.ui.web.page_consumers import PageConsumers
 from live.ui.web.run_result import peaks
 from live.ui.web.server import DEFAULT_PORT, REPORT_POLICY, PageServer, Response, jpeg_response
@@ -37,15 +37,14 @@ from live.ui.web.setup.draft_changes import CHANGES
 from live.ui.web.setup.drawn_region import DrawnRegion
 from live.ui.web.setup.setup_session import SetupSession, SetupSessions
 
+if TYPE_CHECKING:
+    from live.run.live_run import LiveRun
+
 SET_UP, RUN, AFTER = "setup", "run", "after"
 START, NEXT, AGAIN, QUIT = "start", "next", "again", "quit"
 FIRST = "specimen-1"
 GOODBYE_S = 0.5
 OUTLINE = 500  # points of the specimen before
-
-
-class ControlledRun(Controls, RunningTest, Protocol):
-    """A run that accepts commands."""
 
 
 class PageController:
@@ -78,7 +77,7 @@ class PageController:
         self._drawn: Mapping[str, DrawnRegion] = {}
         self._broadcaster = Broadcaster()
         self._consumers = PageConsumers(self._broadcaster, {}, {})
-        self._live: ControlledRun | None = None
+        self._live: LiveRun | None = None
         self._report: Path | None = None
         self._result: dict[str, Any] = {}
         self._stages, self._last_pictures = 0, dict[str, bytes]()
@@ -184,7 +183,7 @@ class PageController:
             return None
         return before.curve.outline(OUTLINE) | {"specimen": self._what["specimen"]}
 
-    def attach(self, live: ControlledRun) -> None:
+    def attach(self, live: LiveRun) -> None:
         """Pass commands to ``live`` from now on, and show it."""
         self._live = live
         self._consumers.attach(live)
