@@ -1,4 +1,4 @@
-"""The changes that a page can request during the set-up of a camera, one function each; a refusal is an exception."""
+"""The changes that a page can request during the set-up of a camera; a refusal is an exception."""
 
 from __future__ import annotations
 
@@ -35,26 +35,6 @@ def draw(session: SetupSession, request: Request) -> None:
     session.region.draw(strokes)
 
 
-def undo(session: SetupSession, request: Request) -> None:
-    """Undo the last edit of the region or of the gauges."""
-    session.region.undo()
-
-
-def redo(session: SetupSession, request: Request) -> None:
-    """Make the edit that was undone last again."""
-    session.region.redo()
-
-
-def find(session: SetupSession, request: Request) -> None:
-    """Find the specimen in the picture."""
-    session.find()
-
-
-def whole_picture(session: SetupSession, request: Request) -> None:
-    """Measure the whole picture."""
-    session.region.replace(np.ones_like(session.region.known.mask), Message("the whole picture"))
-
-
 def overlay(session: SetupSession, request: Request) -> None:
     """Show or hide an overlay of the picture."""
     if request.get("name") not in OVERLAYS:
@@ -83,41 +63,11 @@ def option(session: SetupSession, request: Request) -> None:
     session.preview.reopen(with_setting(session.draft.config.camera.address, key, str(value).strip()))
 
 
-def address(session: SetupSession, request: Request) -> None:
-    """Open another camera."""
-    session.preview.reopen(_address(request.get("value")))
-
-
-def load(session: SetupSession, request: Request) -> None:
-    """Read another load cell."""
-    session.open_load(_address(request.get("value")))
-
-
 def _address(value: object) -> str:
     """The address of a device from a page: a text in one line."""
     if not isinstance(value, str) or not value or len(value) > MAX_ADDRESS or not value.isprintable():
         raise ConfigError("an address is a text of 1 to {MAX_ADDRESS} letters in one line", MAX_ADDRESS)
     return value
-
-
-def devices(session: SetupSession, request: Request) -> None:
-    """Search for cameras, serial ports and sessions."""
-    session.devices.search()
-
-
-def identify(session: SetupSession, request: Request) -> None:
-    """Listen on a serial port for a load cell."""
-    session.devices.identify(_address(request.get("port")))
-
-
-def tare(session: SetupSession, request: Request) -> None:
-    """Make the present force zero, for the test too."""
-    session.load.tare()
-
-
-def undo_tare(session: SetupSession, request: Request) -> None:
-    """Restore the zero before."""
-    session.load.undo_tare()
 
 
 def set_key(session: SetupSession, request: Request) -> None:
@@ -168,11 +118,6 @@ def _parameters_at(kind: object, points: object) -> dict[str, Any]:
     return GAUGE_KINDS[kind].from_handles([(float(x), float(y)) for x, y in points])
 
 
-def place(session: SetupSession, request: Request) -> None:
-    """Place the automatic gauges on the region; others stay."""
-    session.region.place_gauges()
-
-
 def scale(session: SetupSession, request: Request) -> None:
     """Take the scale from two points and their distance."""
     points = request.get("points")
@@ -212,30 +157,30 @@ def _number(what: str, value: object, low: float = -math.inf, high: float = math
         raise ConfigError("{what} is {allowed}", what, allowed) from None
 
 
-def reset_peak(session: SetupSession, request: Request) -> None:
-    """Reset the peak of the sharpness."""
-    session.check.reset_peak()
+def whole_picture(session: SetupSession, request: Request) -> None:
+    """Measure the whole picture."""
+    session.region.replace(np.ones_like(session.region.known.mask), Message("the whole picture"))
 
 
 CHANGES: dict[str, Callable[[SetupSession, Request], None]] = {
     "draw": draw,
-    "undo": undo,
-    "redo": redo,
-    "find": find,
+    "undo": lambda session, _: session.region.undo(),
+    "redo": lambda session, _: session.region.redo(),
+    "find": lambda session, _: session.find(),
     "all": whole_picture,
     "overlay": overlay,
     "camera": camera,
     "option": option,
-    "address": address,
-    "load": load,
-    "devices": devices,
-    "identify": identify,
-    "tare": tare,
-    "untare": undo_tare,
+    "address": lambda session, request: session.preview.reopen(_address(request.get("value"))),
+    "load": lambda session, request: session.open_load(_address(request.get("value"))),
+    "devices": lambda session, _: session.devices.search(),
+    "identify": lambda session, request: session.devices.identify(_address(request.get("port"))),
+    "tare": lambda session, _: session.load.tare(),
+    "untare": lambda session, _: session.load.undo_tare(),
     "set": set_key,
     "gauge": gauge,
-    "place": place,
+    "place": lambda session, _: session.region.place_gauges(),
     "scale": scale,
     "board": board,
-    "forget": reset_peak,
+    "forget": lambda session, _: session.check.reset_peak(),
 }
