@@ -58,6 +58,16 @@ class Figure:
         """Whether the value may be any above."""
         return self.qualifier == AT_LEAST
 
+    @property
+    def half(self) -> float:
+        """Half the interval; where it is not even, the longer half."""
+        return max(self.high - self.value, self.value - self.low)
+
+    @property
+    def sigma(self) -> float:
+        """The standard uncertainty that gives this interval."""
+        return self.half / quantile()
+
     def remarked(self, words: str) -> Figure:
         """The figure with a remark, where it is known."""
         return replace(self, why=words) if self.known and words else self

@@ -344,7 +344,7 @@ def _print_modulus(
     true = Message("true {value}", Amount("stress", specimen.E, digits=2))
     true_nu = Message("true {value}", Amount("", specimen.nu, digits=2))
     if figures.E.known:
-        off = abs(rows["E"].figure.value - there[0] / 1e9) / rows["E"].half
+        off = abs(rows["E"].figure.value - there[0] / 1e9) / rows["E"].figure.half
         held = word("within its interval") if off <= 1 else Message("off by {n:.1f} times its interval", off)
         here, here_nu = Amount.rough("stress", there[0], 5), Amount.rough("", there[1], 4)
         true = Message(

@@ -60,8 +60,7 @@ def value_text(value: float, sigma: float, unit: str) -> str:
 
 def figure_text(figure: Figure, unit_is: float = 1.0, unit: str = "") -> str:
     """A figure with the larger half of its interval, or as a bound, in ``unit``, which is ``unit_is`` in SI units."""
-    half = max(figure.high - figure.value, figure.value - figure.low)
-    text = value_text(figure.value / unit_is, half / unit_is, unit)
+    text = value_text(figure.value / unit_is, figure.half / unit_is, unit)
     return joined(" ", (AT_LEAST, text)) if figure.is_bound else text
 
 
@@ -88,11 +87,6 @@ class TensileRow:
         return f"{self.name}_{self.unit}" if self.unit else self.name
 
     @property
-    def half(self) -> float:
-        """The larger half of the interval; NaN where the figure is not known."""
-        return max(self.figure.high - self.figure.value, self.figure.value - self.figure.low)
-
-    @property
     def remark(self) -> str:
         """What must be shown with the figure; mostly nothing."""
         return self.figure.why if self.figure.known else ""
@@ -109,7 +103,7 @@ class TensileRow:
         """The number and the larger half of its interval, in SI units."""
         kind = _KINDS[self.unit]
         one = unit_of(kind, 0.0, self.unit).one
-        return Amount(kind, self.figure.value * one, self.half * one, 2)
+        return Amount(kind, self.figure.value * one, self.figure.half * one, 2)
 
     @property
     def text(self) -> str:
@@ -196,7 +190,7 @@ def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list
     how = Message("too small to matter")
     if loads.lag_s:
         how = Message("{lag:g} ms corrected", loads.lag_s * 1e3)
-    elif abs(lag.value) > max(LAG_MATTERS_S, lag.high - lag.value, lag.value - lag.low):
+    elif abs(lag.value) > max(LAG_MATTERS_S, lag.half):
         how = Message("not applied; --lag {lag} does", f"{lag.value:.3f}")
     text = figure_text(lag, 1e-3, "ms")
     return [

@@ -18,7 +18,6 @@ from acquire.text import Message
 from acquire.text.quantity import Amount
 from analysis.evaluate import CONFIDENCE, Figure
 from analysis.evaluate.curve import noise
-from analysis.evaluate.figure import quantile
 from analysis.evaluate.seen import LEAPS_NEED, leap, leap_alike, without_stopped
 from live.results.figures import LAG_MATTERS_S, figure_text
 from live.results.finished.finished_test import FinishedTest
@@ -196,12 +195,12 @@ def _lag(test: FinishedTest) -> str | None:
     lag = test.lag
     if not lag.known or _leaps(test) or without_stopped(test.curve)[1]:
         return None
-    if abs(lag.value) < max(LAG_MATTERS_S, _SIGMAS * _sigma(lag)):
+    if abs(lag.value) < max(LAG_MATTERS_S, _SIGMAS * lag.sigma):
         return ""
     way = Message("behind") if lag.value > 0 else Message("ahead of")
     total = lag.value + test.corrected_s
     text = figure_text(
-        Figure(abs(lag.value), abs(lag.value) - _half(lag), abs(lag.value) + _half(lag)), 1e-3, "ms"
+        Figure(abs(lag.value), abs(lag.value) - lag.half, abs(lag.value) + lag.half), 1e-3, "ms"
     )
     return Message(
         "the force comes {text} ({CONFIDENCE:.0%}) {way} the pictures: --lag {total} corrects it",
@@ -230,7 +229,7 @@ def _alignment(test: FinishedTest) -> str | None:
             Message("the axis {axis}", test.axis.axis),
             Message("turn the camera, or draw a gauge axial along the load"),
         )
-    if abs(off) <= _OFF_AXIS + _SIGMAS * _sigma(angle):
+    if abs(off) <= _OFF_AXIS + _SIGMAS * angle.sigma:
         return ""
     return Message(
         "{what} is {size:.0f} degrees off the largest strain, and so are E and nu: {mend}",
@@ -245,7 +244,7 @@ def _out_of_plane(test: FinishedTest) -> str | None:
     nu = test.figures.nu
     if not nu.known:
         return None
-    margin = _SIGMAS * _sigma(nu)
+    margin = _SIGMAS * nu.sigma
     if -margin <= nu.value <= 0.5 + margin:
         return ""
     text = figure_text(nu)
@@ -292,11 +291,3 @@ def _both_known(test: FinishedTest) -> tuple[NDArray[np.float64], NDArray[np.flo
 def changes(values: NDArray[np.float64], least: float) -> bool:
     """Whether values leave their noise, and change by more than ``least``."""
     return len(values) > 3 and float(np.ptp(values)) > max(_CLEAR * noise(values), least)
-
-
-def _half(figure: Figure) -> float:
-    return max(figure.high - figure.value, figure.value - figure.low)
-
-
-def _sigma(figure: Figure) -> float:
-    return _half(figure) / quantile()

@@ -94,7 +94,7 @@ def write_table(tests: Sequence[ComparedTest], file: TextIO) -> None:
     heads = [f"{end}{row.column}" for row, *_ in figures for end in ("", "half_")]
     file.write(f"test,path,{','.join(heads)},strain of E and nu\n")
     for k, test in enumerate(tests):
-        values = ",".join(f"{rows[k].figure.value:.8g},{rows[k].half:.8g}" for rows in figures)
+        values = ",".join(f"{rows[k].figure.value:.8g},{rows[k].figure.half:.8g}" for rows in figures)
         file.write(
             f"{_quoted(test.title)},{_quoted(test.path)},{values},{_quoted(test.curve.figures.elastic_strain)}\n"
         )
