@@ -25,7 +25,7 @@ from live.pipeline.consumer import Screen
 from live.replay.batch.cluster import Cluster, check_scheduler
 from live.replay.batch.keys import key_of, longest_first
 from live.replay.batch.row import COLUMNS, BatchRow, Value, failed
-from live.replay.batch.scheduler import BatchProgress, ChunkPlan, Scheduler, cut, sweep_chunks
+from live.replay.batch.scheduler import BatchProgress, ChunkPlan, Scheduler, cut, perform_all, sweep_chunks
 from live.replay.batch.task import Task, row_done
 from live.replay.batch.test_list import BatchJob
 from live.replay.batch.workdir import sweep, sweep_done
@@ -260,18 +260,17 @@ def _work(
 ) -> None:
     progress = BatchProgress(len(tasks), time.monotonic)
     scheduler = Scheduler(tasks, _cuts(tasks, screen), rows, progress, screen)
-    first = scheduler.first()
     workers: Pool | Cluster
     if wanted.scheduler is None:
         _compile(processes, screen, stopping)
-        workers = Pool(first, wanted.workers, scheduler.on_progress, scheduler.on_done, processes)
+        workers = Pool(wanted.workers, scheduler.on_progress, processes)
     else:
-        workers = Cluster(first, wanted.scheduler, scheduler.on_progress, scheduler.on_done, screen)
-    try:
-        while not workers.wait(_POLL_S) and not stopping.is_set():
+        workers = Cluster(wanted.scheduler, wanted.out.absolute(), scheduler.on_progress, screen)
+    with closing(workers):
+        for _ in perform_all(scheduler, workers, _POLL_S):
+            if stopping.is_set():
+                break
             screen.status(progress.words())
-    finally:
-        workers.close()
     screen.print(progress.words())
 
 

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import queue
 import re
 import socket
 import uuid
-from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from live.pipeline.consumer import Screen
 from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress, row_done
-from live.replay.batch.worker import OnDone, OnProgress, compile_on_worker, describe_worker, perform_on_worker
+from live.replay.batch.worker import OnProgress, compile_on_worker, describe_worker, perform_on_worker
 
 log = logging.getLogger(__name__)
 RETRIES = 2  # of a task that raised; Dask itself gives one whose worker died to another, three times
@@ -39,16 +38,17 @@ _QUIET_S = 15.0  # without a task that ends
 
 
 class Cluster:
-    """Tasks on the cluster at ``address``; ``on_progress`` is called from a thread, ``on_done`` from ``wait``.
+    """Performs tasks on the cluster at ``address``; ``on_progress`` is called from a thread.
 
     Parameters
     ----------
-    tasks : sequence of Task
     address : str
         tcp://HOST:PORT, or tls://HOST:PORT with Dask's own configuration.
-    on_progress, on_done : callable
+    out : Path
+        Folder of the results, which all workers must have.
+    on_progress : callable
     screen : Screen
-        OnProgress what is odd about the workers.
+        Shows what is odd about the workers.
 
     Raises
     ------
@@ -57,62 +57,65 @@ class Cluster:
         or their versions are others.
     """
 
-    def __init__(
-        self, tasks: Sequence[Task], address: str, on_progress: OnProgress, on_done: OnDone, screen: Screen
-    ) -> None:
-        self._on_progress, self._on_done, self._address, self._screen = on_progress, on_done, address, screen
+    def __init__(self, address: str, out: Path, on_progress: OnProgress, screen: Screen) -> None:
+        self._on_progress, self._address, self._screen = on_progress, address, screen
         self._topic = f"phasedic-{uuid.uuid4().hex}"
         self._tasks: dict[str, Task] = {}
-        self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._waiting, self._left = deque(tasks), dict[str, Any]()
+        self._left: dict[str, Any] = {}
         self._gone_s = self._quiet_s = 0.0
         self._max_queued = _MIN_QUEUED
         self._client = _connected(address)
         try:
-            self._prepare(Path(tasks[0].out if not tasks[0].of else Path(tasks[0].out).parent))
+            self._prepare(out)
             self._client.subscribe_topic(self._topic, self._on_event)
-            self._feed()
         except BaseException:
             self._client.close()
             raise
 
-    def wait(self, seconds: float) -> bool:
-        """Whether all is done within ``seconds``; raises DataError where the connection to the scheduler is lost."""
-        ended: list[tuple[Task, Any]] = []
-        with contextlib.suppress(queue.Empty):
-            ended.append(self._ended.get(timeout=seconds))
-            while True:
-                ended.append(self._ended.get_nowait())
-        rows = self._fetched([future for _, future in ended if future.status == "finished"])
-        for task, future in ended:
-            self._take(task, rows.get(future.key) or _row_without_result(task, future))
-        self._feed()
-        self._check_workers(0.0 if ended else seconds)
-        self._gone_s = 0.0 if self._client.status == "running" else self._gone_s + seconds
+    @property
+    def at_once(self) -> int:
+        """Tasks that are worth submitting at once; none without the scheduler."""
+        return self._max_queued if self._client.status == "running" else 0
+
+    def submit(self, task: Task) -> Future[BatchRow | None]:
+        """Perform ``task``; Dask itself repeats one whose worker died."""
+        found: Future[BatchRow | None] = Future()
+        self._tasks[task.title] = task
+        self._left[task.title] = queued = self._client.submit(
+            perform_on_worker, task.to_json(), str(Path.cwd()), self._topic,
+            key=f"{task.folder}-{task.key}", retries=RETRIES, pure=False,
+        )  # fmt: skip
+        queued.add_done_callback(lambda ended: self._take(task, ended, found))
+        return found
+
+    def check(self, quiet_s: float) -> None:
+        """Note ``quiet_s`` without a task that ends: there may be no workers any more.
+
+        Raises
+        ------
+        DataError
+            The connection to the scheduler is lost.
+        """
+        running = self._client.status == "running"
+        self._quiet_s = self._quiet_s + quiet_s if quiet_s else 0.0
+        if self._quiet_s > _QUIET_S and running:
+            self._quiet_s = 0.0
+            if not self._client.nthreads():
+                self._screen.print(Message("{address} has no workers; waiting for some", self._address))
+        self._gone_s = 0.0 if running else self._gone_s + quiet_s
         if self._gone_s > _GONE_S:
             raise DataError(
                 "{address}: the scheduler has ended; complete tests are kept: start it, and call again",
                 self._address,
             )
-        return not self._left and not self._waiting
-
-    def _check_workers(self, quiet_s: float) -> None:
-        """Show a note where there are no workers any more."""
-        self._quiet_s = self._quiet_s + quiet_s if quiet_s else 0.0
-        if self._quiet_s > _QUIET_S and self._client.status == "running":
-            self._quiet_s = 0.0
-            if not self._client.nthreads():
-                self._screen.print(Message("{address} has no workers; waiting for some", self._address))
 
     def close(self) -> None:
-        """Cancel what has not begun, and close the connection; a worker completes a task that it has begun."""
-        with contextlib.suppress(Exception):  # the scheduler may have ended
+        """End all tasks, also those that run."""
+        with contextlib.suppress(Exception):
             if self._left and self._client.status == "running":
                 self._client.cancel(list(self._left.values()), force=True)
         with contextlib.suppress(Exception):
             self._client.close(timeout=_GONE_S)
-
-    # -- the workers ----------------------------------------------------------------------------
 
     def _prepare(self, out: Path) -> None:
         token = out / f".{self._topic}"
@@ -149,49 +152,17 @@ class Cluster:
 
     # -- the tasks ------------------------------------------------------------------------------
 
-    def _feed(self) -> None:
-        """Submit tasks, up to the limit of the queue."""
-        if self._client.status == "running" and len(self._left) <= self._max_queued // 2:
-            count = min(len(self._waiting), self._max_queued - len(self._left))
-            self._submit([self._waiting.popleft() for _ in range(count)])
-
-    def _submit(self, tasks: Sequence[Task]) -> None:
-        if not tasks:
-            return
-        names = [f"{task.folder}-{task.key}" for task in tasks]
-        self._tasks |= {task.title: task for task in tasks}
-        futures = self._client.map(
-            perform_on_worker,
-            [task.to_json() for task in tasks],
-            folder=str(Path.cwd()),
-            topic=self._topic,
-            key=names,
-            retries=RETRIES,
-            pure=False,
-        )
-        for task, future in zip(tasks, futures, strict=True):
-            self._left[task.title] = future
-            future.add_done_callback(lambda ended, task=task: self._ended.put((task, ended)))
-
     def _on_event(self, event: tuple[float, Any]) -> None:
         title, *values = event[1]
         if title in self._tasks:
             self._on_progress(self._tasks[title], TaskProgress(*values))
 
-    def _fetched(self, futures: Sequence[Any]) -> dict[str, BatchRow]:
-        """The rows of many tasks at once; none where the connection is lost, since they are on the disk as well."""
-        try:
-            values = self._client.gather(futures) if futures else []
-        except Exception as error:  # of the network, or of a worker that has just died
-            log.debug("rows did not come: %s", error)
-            return {}
-        return {future.key: BatchRow.of(value) for future, value in zip(futures, values, strict=True)}
-
-    def _take(self, task: Task, row: BatchRow) -> None:
-        if self._client.status != "running" and not row.is_done:
-            return  # the connection is lost, and ``wait`` reports it
-        if self._left.pop(task.title, None) is not None:
-            self._waiting.extendleft(self._on_done(task, row))
+    def _take(self, task: Task, ended: Any, found: Future[BatchRow | None]) -> None:
+        """Pass its row on, from a thread of Dask; what is lost with the connection is no failure of the task."""
+        row = _row(task, ended)
+        if self._client.status == "running" or row.is_done:
+            self._left.pop(task.title, None)
+            found.set_result(row)
 
 
 def check_scheduler(address: str) -> None:
@@ -296,11 +267,16 @@ def advice(found: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
         )
 
 
-def _row_without_result(task: Task, future: Any) -> BatchRow:
-    """The row of a task that failed on the cluster, or whose row did not arrive."""
+def _row(task: Task, ended: Any) -> BatchRow:
+    """The row of a task that has ended, also where only the results are there; a failed row where they are not."""
+    if ended.status == "finished":
+        try:
+            return BatchRow.of(ended.result())
+        except Exception as error:  # the connection was lost after it
+            log.debug("a row did not come: %s", error)
     if (row := row_done(task)) is not None:
         return row
-    error = future.exception() if future.status == "error" else None
-    why = f"{type(error).__name__}: {error}" if error else f"no result arrived ({future.status})"
+    error = ended.exception() if ended.status == "error" else None
+    why = f"{type(error).__name__}: {error}" if error else f"no result arrived ({ended.status})"
     words = Message("the cluster gave it up: {why}", printable(why)[:300])
     return failed(task.title, task.source, words, 1)

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-import threading
+import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,10 +24,12 @@ from acquire.text.message import Message, about, joined
 from acquire.text.printable import duration
 from acquire.text.quantity import Amount
 from live.pipeline.consumer import Screen
+from live.replay.batch.cluster import Cluster
 from live.replay.batch.keys import is_session, key_of_chunk
 from live.replay.batch.row import RENEWED, BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress
 from live.replay.batch.workdir import remove, staging_dirs
+from live.replay.batch.worker import Pool
 from live.replay.opening import open_source
 
 RUN_IN = 20  # time steps; after them 0.0004 sigma is left of a first difference of 0.011
@@ -99,7 +103,7 @@ def sweep_chunks(out: Path, done: set[str], missing: Mapping[str, Task]) -> None
 
 
 class BatchProgress:
-    """Joins the progress of all tasks, from any thread.
+    """Joins the progress of all tasks; ``update`` is called from any thread.
 
     Parameters
     ----------
@@ -114,35 +118,28 @@ class BatchProgress:
         self._shares: dict[str, float] = {}
         self._last: dict[str, TaskProgress] = {}
         self._done: set[str] = set()
-        self._lock = threading.Lock()
 
     def expect(self, title: str, share: float = 1.0) -> None:
         """Add the task ``title``, which is that share of a test."""
-        with self._lock:
-            self._shares[title] = share
+        self._shares[title] = share
 
     def update(self, title: str, progress: TaskProgress) -> None:
         """Note the progress of that task."""
-        with self._lock:
-            self._last[title] = progress
+        self._last[title] = progress
 
     def done(self, title: str) -> None:
         """Note the end of that task."""
-        with self._lock:
-            self._done.add(title)
+        self._done.add(title)
 
     def ended(self) -> None:
         """Note the end of a test."""
-        with self._lock:
-            self._ended += 1
+        self._ended += 1
 
     def words(self) -> str:
         """Tests, time steps, ZOIs per second and the remaining time, in a line."""
-        with self._lock:
-            took = self._now() - self._began
-            time_steps = sum(progress.done for progress in self._last.values())
-            zois = sum(progress.zois for progress in self._last.values())
-            share = sum(share * self._part(title) for title, share in self._shares.items()) / self._tests
+        took, last = self._now() - self._began, list(self._last.values())
+        time_steps, zois = sum(progress.done for progress in last), sum(progress.zois for progress in last)
+        share = sum(share * self._part(title) for title, share in self._shares.items()) / self._tests
         left = Message("{time} left", duration(took * (1 - share) / share)) if 0 < share < 1 else ""
         rate = Message("{rate} ZOI/s", Amount("count", zois / took)) if took > 0 else ""
         tests = Message("{done} of {tests} tests", self._ended, self._tests)
@@ -157,7 +154,7 @@ class BatchProgress:
 
 
 class Scheduler:
-    """Gives the tasks that can be done next; its methods are called from any thread.
+    """Gives the tasks that can be done next; ``on_progress`` is called from any thread.
 
     Parameters
     ----------
@@ -183,7 +180,6 @@ class Scheduler:
         self._cuts = {name: found for name, found in cuts.items() if found.chunks}
         self._left = {name: {chunk.name for chunk in found.chunks} for name, found in self._cuts.items()}
         self._rows, self._progress, self._screen = rows, progress, screen
-        self._lock = threading.Lock()
 
     def first(self) -> list[Task]:
         """The tasks to begin with."""
@@ -204,8 +200,7 @@ class Scheduler:
         """Note the end of a task; the tasks that can be done now."""
         self._progress.done(task.title)
         if task.of:
-            with self._lock:
-                return self._chunk_done(task, row)
+            return self._chunk_done(task, row)
         self._end(task.name, row)
         return ()
 
@@ -237,3 +232,31 @@ class Scheduler:
             self._progress.expect(chunk.title, 0)
         self._progress.expect(name)
         return [self._tests[name]]
+
+
+def perform_all(scheduler: Scheduler, workers: Pool | Cluster, poll_s: float) -> Iterator[None]:
+    """Perform all tasks with ``workers``; yields each ``poll_s``, and where a task has ended.
+
+    What follows a task comes before all that waits, a task whose worker died after it.
+
+    Raises
+    ------
+    DataError
+        The workers are out of reach.
+    """
+    waiting, running = deque(scheduler.first()), dict[Future[BatchRow | None], Task]()
+    while waiting or running:
+        while waiting and len(running) < workers.at_once:
+            task = waiting.popleft()
+            running[workers.submit(task)] = task
+        ended, _ = wait(running, poll_s, FIRST_COMPLETED)
+        if not running:  # the scheduler of the cluster is away
+            time.sleep(poll_s)
+        for future in ended:
+            task, row = running.pop(future), future.result()
+            if row is None:
+                waiting.append(task)
+            else:
+                waiting.extendleft(scheduler.on_done(task, row))
+        workers.check(0.0 if ended else poll_s)
+        yield

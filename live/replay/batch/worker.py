@@ -23,8 +23,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Sequence
+from collections import Counter, deque
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -138,8 +139,6 @@ MAX_DEATHS = 3
 log = logging.getLogger(__name__)
 
 OnProgress = Callable[[Task, TaskProgress], object]
-OnDone = Callable[[Task, BatchRow], Sequence[Task]]
-"""Called with a task that is done and its row; gives the tasks that can be done now."""
 
 
 class WorkerProcesses:
@@ -172,6 +171,10 @@ class WorkerProcesses:
             return self._idle.popleft()
         except IndexError:
             return WorkerProcess()
+
+    def give_back(self, worker: WorkerProcess) -> None:
+        """Keep a process that has performed its task."""
+        self._idle.append(worker)
 
     def close(self) -> None:
         """End the idle processes."""
@@ -256,107 +259,70 @@ class WorkerProcess:
 
 
 class Pool:
-    """Performs ``tasks`` with ``workers`` processes; ``on_progress`` and ``on_done`` are called from threads.
+    """Performs tasks with ``workers`` processes; ``on_progress`` is called from threads.
 
     A task whose worker died three times gives a failed row; other tasks are not affected. Where the first three workers
     die before one has measured anything, all tasks fail. The processes come from ``processes``, closed by the caller.
+
+    Attributes
+    ----------
+    at_once : int
+        Tasks that are worth submitting at once.
     """
 
-    def __init__(
-        self,
-        tasks: Sequence[Task],
-        workers: int,
-        on_progress: OnProgress,
-        on_done: OnDone,
-        processes: WorkerProcesses,
-    ) -> None:
-        self._processes = processes
-        self._waiting, self._deaths = deque(tasks), dict.fromkeys((task.title for task in tasks), 0)
-        self._on_progress, self._on_done = on_progress, on_done
-        self._stopped = threading.Event()
+    def __init__(self, workers: int, on_progress: OnProgress, processes: WorkerProcesses) -> None:
+        self.at_once, self._on_progress, self._processes = workers, on_progress, processes
+        self._threads = ThreadPoolExecutor(workers, "worker")
+        self._deaths: Counter[str] = Counter()
         self._first_deaths: int | None = 0  # None once a worker has measured something
         self._hopeless = ""
-        self._workers: set[WorkerProcess] = set()
+        self._busy: set[WorkerProcess] = set()
+        self._closed = False
         self._lock = threading.Lock()
-        n = min(workers, len(tasks))
-        self._threads = [threading.Thread(target=self._serve, name="worker", daemon=True) for _ in range(n)]
-        for thread in self._threads:
-            thread.start()
 
-    def wait(self, seconds: float) -> bool:
-        """Whether all is done within ``seconds``."""
-        for thread in self._threads:
-            thread.join(seconds / len(self._threads))
-        return not any(thread.is_alive() for thread in self._threads)
+    def submit(self, task: Task) -> Future[BatchRow | None]:
+        """Perform ``task``; no row where its worker died, and it may be submitted again."""
+        return self._threads.submit(self._perform, task)
+
+    def check(self, quiet_s: float) -> None:
+        """Processes of this machine are there or not: ``submit`` finds out."""
 
     def close(self) -> None:
         """End all workers, also during a task."""
-        self._stopped.set()
         with self._lock:
-            for worker in self._workers:
+            self._closed = True
+            for worker in self._busy:
                 worker.kill()
-        for thread in self._threads:
-            thread.join()
+        self._threads.shutdown(cancel_futures=True)
 
-    def _serve(self) -> None:
-        worker: WorkerProcess | None = None
+    def _perform(self, task: Task) -> BatchRow | None:
+        if self._hopeless:
+            return failed(task.title, task.source, self._hopeless, 1)
         try:
-            while (task := self._next()) is not None:
-                if self._hopeless:
-                    self._on_done(task, failed(task.title, task.source, self._hopeless, 1))
-                    continue
-                worker = worker or self._new()
-                row = worker.perform(task, self._progressed) if worker is not None else None
-                if row is None:
-                    self._end(worker)
-                    row, worker = (
-                        self._after_death(task, worker.why() if worker else "it cannot be started"),
-                        None,
-                    )
-                else:
-                    self._first_deaths = None
-                if row is not None:
-                    self._add(self._on_done(task, row))
-        finally:
-            self._end(worker)
+            worker = self._processes.take()
+        except OSError as error:
+            log.error(Message("no worker could be started: {error}", error))
+            return self._after_death(task, "it cannot be started")
+        with self._lock:
+            self._busy.add(worker)
+            if self._closed:
+                worker.kill()
+        row = worker.perform(task, self._progressed)
+        with self._lock:
+            self._busy.discard(worker)
+        if row is None:
+            worker.end()
+            return self._after_death(task, worker.why())
+        self._first_deaths = None
+        self._processes.give_back(worker)
+        return row
 
     def _progressed(self, task: Task, progress: TaskProgress) -> None:
         self._first_deaths = None
         self._on_progress(task, progress)
 
-    def _next(self) -> Task | None:
-        with self._lock:
-            return self._waiting.popleft() if self._waiting and not self._stopped.is_set() else None
-
-    def _add(self, tasks: Sequence[Task]) -> None:
-        with self._lock:
-            self._deaths |= dict.fromkeys((task.title for task in tasks), 0)
-            self._waiting.extendleft(tasks)
-
-    def _new(self) -> WorkerProcess | None:
-        """A worker; None where no process can be started."""
-        try:
-            worker = self._processes.take()
-        except OSError as error:
-            log.error(Message("no worker could be started: {error}", error))
-            return None
-        with self._lock:
-            self._workers.add(worker)
-        if self._stopped.is_set():
-            worker.kill()
-        return worker
-
-    def _end(self, worker: WorkerProcess | None) -> None:
-        if worker is None:
-            return
-        worker.end()
-        with self._lock:
-            self._workers.discard(worker)
-
     def _after_death(self, task: Task, why: str) -> BatchRow | None:
-        """Queue the task again, last of all, and return None; a failed row after ``MAX_DEATHS``."""
-        if self._stopped.is_set():
-            return None
+        """None where the task may be tried again; a failed row after ``MAX_DEATHS``."""
         with self._lock:
             self._deaths[task.title] += 1
             if self._first_deaths is not None:
@@ -364,7 +330,6 @@ class Pool:
                 if self._first_deaths >= MAX_DEATHS:
                     self._hopeless = f"no worker can work here, {MAX_DEATHS} died at once: {why[:80]}"
             if self._deaths[task.title] < MAX_DEATHS:
-                self._waiting.append(task)
                 return None
         words = f"its worker died {MAX_DEATHS} times ({why[:80]}); is there memory enough for --workers?"
         return failed(task.title, task.source, words, 1)
