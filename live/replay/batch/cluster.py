@@ -290,9 +290,10 @@ def advice(found: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
     wrong = {worker: names for worker, names in wrong.items() if names}
     if wrong:
         worker, names = next(iter(wrong.items()))
-        yield (
-            f"note: {len(wrong)} of {len(found)} workers, such as {printable(worker)}, were started without"
-            f" {' '.join(f'{name}=1' for name in names)}; workers of one machine then hold one another up"
+        yield Message(
+            "note: {n} of {all} workers, such as {worker}, were started without {names}; workers of one machine"
+            " then hold one another up",
+            *(len(wrong), len(found), printable(worker), " ".join(f"{name}=1" for name in names)),
         )
 
 
