@@ -27,6 +27,7 @@ from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling
 from acquire.serial_line.settings import SerialSettings, describe, read_settings
 from acquire.text import Message
+from acquire.text.quantity import counts
 
 log = logging.getLogger(__name__)
 
@@ -190,7 +191,8 @@ class SerialCell(Closing):
             self._report(
                 "warning",
                 Message(
-                    "{skipped} bytes were skipped, since lines came faster than they are read", self._skipped
+                    "{skipped} bytes were skipped, since lines came faster than they are read",
+                    *counts(self._skipped),
                 ),
             )
 

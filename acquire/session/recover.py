@@ -19,6 +19,7 @@ from acquire.session.part import SessionPart
 from acquire.session.writer import SessionWriter
 from acquire.text import Message
 from acquire.text.printable import counted
+from acquire.text.quantity import counts
 
 Item = TypeVar("Item")
 
@@ -48,7 +49,8 @@ class Recovered:
         """One line for a person."""
         saved = Message(
             "{path}: {frames} frames, {bursts} bursts, {load_samples} load samples, {events} events",
-            *(self.path, self.frames, self.bursts, self.load_samples, self.events),
+            self.path,
+            *counts(self.frames, self.bursts, self.load_samples, self.events),
         )
         if not self.unreadable:
             return saved

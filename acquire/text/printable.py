@@ -22,16 +22,17 @@ def printable(text: object) -> str:
 
     Bytes of a file name that are no UTF-8 are shown as those bytes. A message stays one: its values are changed.
     """
-    return _changed(text, lambda words: _HARMFUL.sub(_escaped, words))
+    return changed(text, lambda words: _HARMFUL.sub(_escaped, words))
 
 
-def _changed(text: object, change: Callable[[str], str]) -> str:
+def changed(text: object, change: Callable[[str], str]) -> str:
+    """What ``change`` makes of a text; of a message, of the values in it."""
     text = getattr(text, "text", text) if isinstance(text, Exception) else text
     if not isinstance(text, Message) or not text.values:
         words = change(str(text))
         return text if words == text else words
     values = {
-        key: one if isinstance(one, Number | Amount) else _changed(one, change)
+        key: one if isinstance(one, Number | Amount) else changed(one, change)
         for key, one in text.values.items()
     }
     return Message(text.template, **values)
@@ -43,7 +44,7 @@ _ADDRESS = re.compile(r"^([^\s?]+)\?[A-Za-z_]\w*=[^\s/]*(?=: |$)")
 
 def brief(text: object) -> str:
     """A sentence that begins with an address, without the settings of that address."""
-    return _changed(text, lambda words: _ADDRESS.sub(r"\1", words))
+    return changed(text, lambda words: _ADDRESS.sub(r"\1", words))
 
 
 def counted(n: int, noun: str) -> str:

@@ -8,6 +8,7 @@ the uncertainty. Files have points and SI units, and do not come here.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
 from typing import Any, NamedTuple
@@ -120,6 +121,11 @@ class Amount:
 
     def __str__(self) -> str:
         return str(self.printed())
+
+
+def counts(*numbers: int) -> Iterator[Amount]:
+    """Numbers of things, which are shown in groups of three."""
+    return (Amount("count", n) for n in numbers)
 
 
 def unit_of(kind: str, size: float, name: str = "") -> ShownUnit:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from acquire.events import Event, EventKind
 from acquire.load_cell import LoadLog
 from acquire.text import Message
+from acquire.text.quantity import counts
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import EventLog, sentence
 from live.pipeline.history import History
@@ -87,32 +88,23 @@ class FrameCounts:
 
     def line(self) -> str:
         """One line for a person."""
-        on_purpose = Message(" and {thinned} on purpose", self.thinned) * (self.thinned > 0)
-        share = f" ({self.skipped_share:.1%})" * (self.skipped > 0)
-        load = Message(" / load samples lost {load_lost}", self.load_lost) * (self.load_lost > 0)
-        load += Message(" / bursts without a force {without_force}", self.without_force) * (
-            self.without_force > 0
-        )
-        failed = Message(" / failed {failed}", self.failed) * (self.failed > 0)
+        n = dict(zip(self.as_dict(), counts(*self.as_dict().values()), strict=True))
+        load = Message(" / load samples lost {load_lost}", **n) * (self.load_lost > 0)
+        load += Message(" / bursts without a force {without_force}", **n) * (self.without_force > 0)
+        parts = {
+            "share": f" ({self.skipped_share:.1%})" * (self.skipped > 0),
+            "failed": Message(" / failed {failed}", **n) * (self.failed > 0),
+            "load": load,
+            "on_purpose": Message(" and {thinned} on purpose", **n) * (self.thinned > 0),
+            "value": Message("every frame is accounted for")
+            if self.adds_up
+            else Message("NOT EVERY FRAME IS ACCOUNTED FOR"),
+        }
         return Message(
             "grabbed {grabbed} / recorded {recorded} / measured {measured} / skipped {skipped}{share}{failed} / "
             "lost {lost}{load}  (reference {reference}, left over {left_out}, not recorded "
             "{unrecorded}{on_purpose}; {value})",
-            self.grabbed,
-            self.recorded,
-            self.measured,
-            self.skipped,
-            share,
-            failed,
-            self.lost,
-            load,
-            self.reference,
-            self.left_out,
-            self.unrecorded,
-            on_purpose,
-            Message("every frame is accounted for")
-            if self.adds_up
-            else Message("NOT EVERY FRAME IS ACCOUNTED FOR"),
+            **n | parts,
         )
 
 

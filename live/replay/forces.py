@@ -24,7 +24,7 @@ from acquire.load_sample import LoadSample
 from acquire.text import Message
 from acquire.text.message import about
 from acquire.text.printable import counted
-from acquire.text.quantity import Amount
+from acquire.text.quantity import Amount, counts
 from live.config.sections import LoadConfig
 from live.replay.export_file import Export, read_export
 
@@ -88,7 +88,7 @@ class PlacedForces:
             return self
         log = self.log(load)
         known = sum(math.isfinite(log.force_at(t)) for t in times.tolist())
-        words = Message("{n} of {all} pictures have a force", known, len(times))
+        words = Message("{n} of {all} pictures have a force", *counts(known, len(times)))
         if not known:
             start = float(times[0])
             own, theirs = (

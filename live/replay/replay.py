@@ -28,7 +28,7 @@ from acquire.opencv.images import picture_times
 from acquire.text import Message
 from acquire.text.message import about, joined
 from acquire.text.printable import counted
-from acquire.text.quantity import Amount
+from acquire.text.quantity import Amount, counts
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
 from live.pipeline.consumer import Compose, RunInfo, Screen
@@ -339,10 +339,10 @@ def _account(source: ReplaySource, run_state: RunState) -> list[str]:
     measured = run_state.frame_counts.measured
     words = Message(
         "{pictures} pictures: reference {reference}, measured {measured}, left out {left_out}",
-        count.pictures, count.reference, measured, count.left_out,
+        *counts(count.pictures, count.reference, measured, count.left_out),
     )  # fmt: skip
     rest = count.pictures - count.reference - measured - count.left_out
-    words += Message(", of no whole burst {rest}", rest) * (rest > 0)
+    words += Message(", of no whole burst {rest}", *counts(rest)) * (rest > 0)
     return [words, *(Message("  {text}", text) for text in [*why[:_MOST_TOLD], *more])]
 
 
@@ -352,7 +352,7 @@ def speed_line(history: History, seconds: float) -> str:
     share = history.column("measure_s").sum() / seconds
     return Message(
         "{n} bursts in {seconds:.3g} s: {rate:.3g} bursts/s, {zois} ZOI/s, of that time {share:.0%} in the kernel",
-        n, seconds, n / seconds, Amount("count", zois / seconds), share,
+        *counts(n), seconds, n / seconds, Amount("count", zois / seconds), share,
     )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from acquire.frame import Burst, CameraInfo, Frame
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from acquire.text import Message
+from acquire.text.quantity import counts
 from live.pipeline.measure import NewReference
 
 
@@ -97,8 +98,8 @@ class PictureCount:
         words = Message(
             "{n} of {all} pictures equal the one before in every bit, the first is number {first}: the camera or its"
             " program repeats them, and their strain is that of before",
-            self.repeated,
-            self.pictures,
+            *counts(self.repeated),
+            *counts(self.pictures),
             self.first_repeated,
         )
         return [words] * (self.repeated > 0)

@@ -12,7 +12,7 @@ from acquire.load_cell import LoadLog
 from acquire.text import Message
 from acquire.text.message import joined
 from acquire.text.printable import brief, share_text
-from acquire.text.quantity import Amount
+from acquire.text.quantity import Amount, counts
 from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
@@ -40,10 +40,9 @@ def valid_line(history: History) -> str:
     """How many bursts were measured, and how many ZOIs have a value in the last of them."""
     last = history.time_steps[-1]
     refused = Message(" ({refused})", last.refused) if last.refused else ""
-    bursts, valid, zois = (Amount("count", n) for n in (len(history.time_steps), last.n_valid, last.n_zoi))
     return Message(
         "measured {bursts} bursts, {valid} of {zois} ZOIs valid in the last{refused}",
-        bursts, valid, zois, refused,
+        *counts(len(history.time_steps), last.n_valid, last.n_zoi), refused,
     )  # fmt: skip
 
 
@@ -162,7 +161,7 @@ class StatusCard:
         one, mean = Amount.rough("strain", i.zoi_sigma), Amount.rough("strain", i.sigma_eyy, 2)
         refused = Message(" ({refused})", i.refused) if i.refused else ""
         lines: list[str] = [
-            Message("**{valid} of {zois}** ZOIs valid{refused}", i.n_valid, i.n_zoi, refused),
+            Message("**{valid} of {zois}** ZOIs valid{refused}", *counts(i.n_valid, i.n_zoi), refused),
             Message("one ZOI **{one}**, region **{mean}** (1 σ)", one, mean),
         ]
         lines += film_line(self._specimen)
@@ -174,16 +173,11 @@ class StatusCard:
             lines.append(Message("axis of the load **{axis}**, assumed", snapshot.axis))
         figures = evaluate(history, self._loads, self._specimen)
         lines += [told(line).replace("  ", ", ") for line in elastic_lines(figures, self._specimen)]
-        recorded, measured, skipped = (
-            Amount("count", frames[name]) for name in ("recorded", "measured", "skipped")
-        )
         lost_text = Message("**{lost}**", lost) if lost else 0
         lines.append(
             Message(
                 "recorded {recorded}, measured {measured}, skipped {skipped}, lost {lost}",
-                recorded,
-                measured,
-                skipped,
+                *counts(*(frames[name] for name in ("recorded", "measured", "skipped"))),
                 lost_text,
             )
         )

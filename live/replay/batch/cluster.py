@@ -261,9 +261,10 @@ def advice(found: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
     wrong = {worker: names for worker, names in wrong.items() if names}
     if wrong:
         worker, names = next(iter(wrong.items()))
-        yield (
-            f"note: {len(wrong)} of {len(found)} workers, such as {printable(worker)}, were started without"
-            f" {' '.join(f'{name}=1' for name in names)}; workers of one machine then hold one another up"
+        yield Message(
+            "note: {n} of {all} workers, such as {worker}, were started without {names}; workers of one machine"
+            " then hold one another up",
+            *(len(wrong), len(found), printable(worker), " ".join(f"{name}=1" for name in names)),
         )
 
 
@@ -276,7 +277,7 @@ def _row(task: Task, ended: Any) -> BatchRow:
             log.debug("a row did not come: %s", error)
     if (row := row_done(task)) is not None:
         return row
-    error = ended.exception() if ended.status == "error" else None
-    why = f"{type(error).__name__}: {error}" if error else f"no result arrived ({ended.status})"
+    raised = ended.exception() if ended.status == "error" else None
+    why = f"{type(raised).__name__}: {raised}" if raised else f"no result arrived ({ended.status})"
     words = Message("the cluster gave it up: {why}", printable(why)[:300])
     return failed(task.title, task.source, words, 1)

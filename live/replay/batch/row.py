@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from acquire.text import Message
+from acquire.text.message import from_json
 from acquire.text.printable import printable
 from analysis.evaluate import TensileFigures
 from live.config.loading import Config
@@ -58,10 +60,15 @@ class BatchRow:
     @property
     def words(self) -> str:
         """Name, outcome and error, in a line."""
-        return f"{self.values['test']}: {self.values['outcome']}: {self.values['error']}"
+        outcome = Message("with loss") if self.is_done else Message("failed")
+        return Message("{test}: {outcome}: {error}", self.values["test"], outcome, self.values["error"])
+
+    def to_json(self) -> dict[str, Any]:
+        """The values, messages as such, for ``of`` in another process."""
+        return {key: one.to_json() if isinstance(one, Message) else one for key, one in self.values.items()}
 
 
-def failed(name: str, source: str, error: str, exit_code: int) -> BatchRow:
+def failed(name: str, source: str, error: object, exit_code: int) -> BatchRow:
     """The row of a test without results."""
     found = {"test": name, "source": source, "outcome": "failed", "exit_code": exit_code, "error": error}
     return BatchRow.of(found)
@@ -77,14 +84,14 @@ def row_of_chunk(name: str, source: str, as_the_whole: bool, seconds: float) -> 
 def row_of(name: str, source: str, done: Replayed, seconds: float) -> BatchRow:
     """The row of a test that was replayed."""
     history, code = done.run_state.history, done.exit_code
-    error = "" if code == 0 else "; ".join(done.lines[:1]) if history.has_values else "nothing was measured"
+    first = next(iter(done.lines), "") if history.has_values else Message("nothing was measured")
     return BatchRow.of(
         {
             "test": name,
             "source": source,
             "outcome": "done" if code == 0 else "with loss",
             "exit_code": code,
-            "error": error,
+            "error": "" if code == 0 else first,
             **_settings(done.config),
             "burst": done.config.measure.burst or _burst(done),
             **_counts(history),
@@ -152,7 +159,7 @@ def _median(history: History, column: str) -> float:
 
 def _fitting(value: Any, kind: type) -> Value:
     if kind is str:
-        return "" if value is None else printable(value)
+        return "" if value is None else printable(from_json(value))
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return None
     return int(value) if kind is int else float(value)

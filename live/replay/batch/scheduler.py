@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from acquire.errors import DEFECT, PhasedicError
 from acquire.text.message import Message, about, joined
 from acquire.text.printable import duration
-from acquire.text.quantity import Amount
+from acquire.text.quantity import Amount, counts
 from live.pipeline.consumer import Screen
 from live.replay.batch.cluster import Cluster
 from live.replay.batch.keys import is_session, key_of_chunk
@@ -142,8 +142,8 @@ class BatchProgress:
         share = sum(share * self._part(title) for title, share in self._shares.items()) / self._tests
         left = Message("{time} left", duration(took * (1 - share) / share)) if 0 < share < 1 else ""
         rate = Message("{rate} ZOI/s", Amount("count", zois / took)) if took > 0 else ""
-        tests = Message("{done} of {tests} tests", self._ended, self._tests)
-        return joined("  ", (tests, Message("{n} instants", time_steps), rate, left))
+        tests = Message("{done} of {tests} tests", *counts(self._ended, self._tests))
+        return joined("  ", (tests, Message("{n} instants", *counts(time_steps)), rate, left))
 
     def _part(self, title: str) -> float:
         """The share of a task that is done."""
@@ -219,7 +219,7 @@ class Scheduler:
         if not row.is_done:
             del self._left[name]
             code = int(row.values["exit_code"] or DEFECT)
-            self._end(name, failed(name, task.source, str(row.values["error"]), code))
+            self._end(name, failed(name, task.source, row.values["error"], code))
             return ()
         self._left[name].discard(task.name)
         return () if self._left[name] else [join_task(self._tests[name], self._cuts[name])]

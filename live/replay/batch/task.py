@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from acquire.errors import PhasedicError
-from acquire.text.printable import printable
+from acquire.text import Message
+from acquire.text.printable import changed, printable
 from live.pipeline.consumer import Screen
 from live.replay.batch.row import BatchRow, failed, row_of, row_of_chunk
 from live.replay.batch.workdir import make, publish, remove, staging_dir, sweep
@@ -170,22 +171,21 @@ def perform(task: Task, on_progress: OnProgress = _no_progress) -> BatchRow:
     try:
         make(staging)
         row = _measured(task, staging, on_progress) if task.numbers else _replayed(task, staging, on_progress)
-        row = BatchRow.of(
-            {**row.values, "error": _as_published(task, staging, str(row.values["error"] or ""))}
-        )
+        row = BatchRow.of({**row.values, "error": _as_published(task, staging, row.values["error"])})
         (staging / ROW_FILE).write_text(
-            json.dumps({"key": task.key, "row": row.values}, indent=1), encoding="utf-8"
+            json.dumps({"key": task.key, "row": row.to_json()}, indent=1), encoding="utf-8"
         )
         publish(staging, task.folder)
         return row
     except PhasedicError as error:
         return _not_done(task, staging, error.text, error.exit_code)
     except OSError as error:
-        words = f"{error.filename or task.folder}: cannot be written ({error.strerror or error}); make room"
+        words = Message("{path}: cannot be written ({why}); make room", error.filename or task.folder, error)
         return _not_done(task, staging, words, 4)
     except Exception as error:
         log.exception("a defect of phasedic; please report it with this traceback")
-        return _not_done(task, staging, f"a defect of phasedic: {type(error).__name__}: {error}", 1)
+        words = Message("a defect of phasedic: {kind}: {error}", type(error).__name__, error)
+        return _not_done(task, staging, words, 1)
 
 
 def _not_done(task: Task, staging: Path, words: str, code: int) -> BatchRow:
@@ -194,9 +194,9 @@ def _not_done(task: Task, staging: Path, words: str, code: int) -> BatchRow:
     return row_done(task) or failed(task.title, task.source, _as_published(task, staging, words), code)
 
 
-def _as_published(task: Task, staging: Path, words: str) -> str:
+def _as_published(task: Task, staging: Path, words: object) -> str:
     """An error with the path of the results in place of that of the staging folder."""
-    return words.replace(str(staging), str(task.folder))
+    return changed(words, lambda part: part.replace(str(staging), str(task.folder)))
 
 
 def _replayed(task: Task, staging: Path, on_progress: OnProgress) -> BatchRow:

@@ -48,7 +48,7 @@ def main() -> int:
     _put(answers, {"compiled": not not_compiled(PICTURE_KINDS)})  # loads numba, while the caller plans
     while True:
         row = perform(Task.from_json(tasks.get()), lambda progress: _put_progress(answers, progress))
-        _put(answers, {"row": dict(row.values)})
+        _put(answers, {"row": row.to_json()})
 
 
 def _answers() -> TextIO:
@@ -103,7 +103,7 @@ def perform_on_worker(line: str, folder: str, topic: str) -> dict[str, Any]:
     """Perform the task ``line`` (JSON) in ``folder`` and return its row; progress goes to ``topic``."""
     task = Task.from_json(line)
     with contextlib.chdir(folder):
-        return dict(perform(task, _progress_to(task, topic)).values)
+        return perform(task, _progress_to(task, topic)).to_json()
 
 
 def _progress_to(task: Task, topic: str) -> Callable[[TaskProgress], None]:
@@ -328,8 +328,12 @@ class Pool:
             if self._first_deaths is not None:
                 self._first_deaths += 1
                 if self._first_deaths >= MAX_DEATHS:
-                    self._hopeless = f"no worker can work here, {MAX_DEATHS} died at once: {why[:80]}"
+                    self._hopeless = Message(
+                        "no worker can work here, {n} died at once: {why}", MAX_DEATHS, why[:80]
+                    )
             if self._deaths[task.title] < MAX_DEATHS:
                 return None
-        words = f"its worker died {MAX_DEATHS} times ({why[:80]}); is there memory enough for --workers?"
+        words = Message(
+            "its worker died {n} times ({why}); is there memory enough for --workers?", MAX_DEATHS, why[:80]
+        )
         return failed(task.title, task.source, words, 1)

@@ -12,7 +12,7 @@ from acquire.errors import DataError
 from acquire.hdf5 import storable
 from acquire.text import Message
 from acquire.text.message import joined as joined_texts
-from acquire.text.quantity import Amount
+from acquire.text.quantity import Amount, counts
 from analysis.evaluate import AT_LEAST, CONFIDENCE
 from live.pipeline.consumer import Screen
 from live.results.budget import CameraView, budget_cells
@@ -184,7 +184,10 @@ def _head(run: RunFolder, curve: EvaluatedCurve, test: FinishedTest) -> Html:
     now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
     seconds = float(run.strain.time_s[-1])
     words = Message(
-        "Test of {start}: {n} measurements in {seconds:.4g} s.", run.strain.start_utc, run.strain.n, seconds
+        "Test of {start}: {n} measurements in {seconds:.4g} s.",
+        run.strain.start_utc,
+        *counts(run.strain.n),
+        seconds,
     )
     made = Message(" Report made by phasedic on {now}.", now)
     unfinished = Message("The results were not closed by their writer; the report has all complete rows.")
@@ -246,7 +249,7 @@ def _strain_of(curve: EvaluatedCurve) -> dict[str, str]:
 
 def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
     values, e = run.strain.values, curves.strain_unit(curve.axial)
-    valid, zois = (Amount("count", int(values[name][-1])) for name in ("n_valid", "n_zoi"))
+    valid, zois = counts(*(int(values[name][-1]) for name in ("n_valid", "n_zoi")))
     found: dict[str, str] = {Message("ZOIs with a value, last"): Message("{valid} of {zois}", valid, zois)}
     if np.isfinite(curve.axial).any():
         largest = curve.axial[np.nanargmax(np.abs(curve.axial))]
@@ -284,7 +287,7 @@ def _rig(run: RunFolder, pictures: MapPictures) -> dict[str, object]:
         found[Message("warnings of the devices")] = joined_texts("; ", warnings)
     found["ZOIs"] = Message(
         "{n} of {size} px, {step} px apart, region x,y,w,h = {roi} px",
-        Amount("count", grid.n_active), grid.size, grid.step, grid.roi.text,
+        *counts(grid.n_active), grid.size, grid.step, grid.roi.text,
     )  # fmt: skip
     return found
 
@@ -386,7 +389,7 @@ def _noise_section(content: _Content) -> list[Html]:
     words = Message(
         "Standard deviation of single ZOIs in the first {n} instants (to {t:.4g} s): displacements about a plane, "
         "strains about their mean.",
-        n,
+        *counts(n),
         float(content.run.strain.time_s[n - 1]),
     )
     words += Message(" Predicted: sigma of each value, from the noise of the pictures.")

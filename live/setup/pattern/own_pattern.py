@@ -64,11 +64,11 @@ def characterise_pattern(arguments: argparse.Namespace, folder: Path) -> int:
         raise ConfigError("--burst {given}: give 1 or more frames", arguments.burst)
     if not arguments.target > 0:
         raise ConfigError("--target {given}: give a strain noise in um/m above 0", arguments.target)
-    progress, begin = ProgressBar("pattern", sys.stderr), time.monotonic()
+    progress, begin = ProgressBar(told(Message("pattern")), sys.stderr), time.monotonic()
     context = ExperimentContext(folder, arguments.quick, None, progress)
     outcome = pattern(context, picture, bits, arguments.noise, arguments.burst, arguments.target * 1e-6)
     outcome = replace(outcome, seconds=time.monotonic() - begin)
-    progress.done(f"{outcome.seconds:.1f} s")
+    progress.done(told(Message("{seconds:.1f} s", outcome.seconds)))
     write_outcome(outcome, folder, "pattern")
     target = Path(arguments.page) if arguments.page else folder / PAGE
     write_page(

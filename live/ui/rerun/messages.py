@@ -19,7 +19,7 @@ from acquire.frame import Frame
 from acquire.text import Message
 from acquire.text.message import joined, word
 from acquire.text.printable import share_text
-from acquire.text.quantity import PLUS_MINUS, Amount
+from acquire.text.quantity import PLUS_MINUS, Amount, counts
 from analysis.field import StrainField, ZoiGrid
 from live.pipeline.measurement import Measurement
 from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot
@@ -165,7 +165,7 @@ def _line(s: Snapshot) -> str:
     if not s.zois:
         return told(Message("nothing measured yet"))
     lost, part = s.zois - s.valid, share_text(s.area_share)
-    words = Message("{valid} of {zois} ZOIs", s.valid, s.zois)
+    words = Message("{valid} of {zois} ZOIs", *counts(s.valid, s.zois))
     words += Message(", {lost} LOST", lost) * (lost > 0) + Message("; strain {part}", part) * bool(part)
     return told(
         joined("   ", (words, *(joined(" ", (word(r.figure.said), r.amount)) for r in s.rows("display"))))

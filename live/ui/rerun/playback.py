@@ -21,7 +21,7 @@ from acquire.events import Level
 from acquire.frame import Frame, frozen
 from acquire.text import Message
 from acquire.text.message import about, word
-from acquire.text.quantity import Amount
+from acquire.text.quantity import Amount, counts
 from analysis.evaluate import evaluate_test
 from live.config.gauges import gauge_colours, outlines
 from live.config.loading import from_dict
@@ -126,7 +126,7 @@ class _PlayedMessages:
             for message in playback_messages(self._run, self._rows):
                 yield message
                 done += message.kind is Kind.FIELD
-                self._screen.status(Message("instant {done} of {all}", done, len(self._rows)))
+                self._screen.status(Message("instant {done} of {all}", *counts(done, len(self._rows))))
         except PhasedicError as error:
             self.trouble = str(error)
         self.all.set()
@@ -134,7 +134,7 @@ class _PlayedMessages:
 
 def _report_selection(shown: int, run: RunFolder, screen: Screen) -> None:
     if shown < run.strain.n:
-        what = Message("{shown} of {n} instants", shown, run.strain.n)
+        what = Message("{shown} of {n} instants", *counts(shown, run.strain.n))
         screen.print(Message("{what} are shown; --from, --to and --every choose others", what))
     if run.pictures is None and not run.notes:
         maps = Message("the pictures that were measured are not here any more; maps alone")
@@ -297,6 +297,8 @@ def _status(run: RunFolder) -> str:
     values = run.strain.values
     valid, zois = int(values["n_valid"][-1]), int(values["n_zoi"][-1])
     head = Message(
-        "**{title}**, {n} instants, {valid} of {zois} ZOIs at the end", run.title, run.strain.n, valid, zois
+        "**{title}**, {n} instants, {valid} of {zois} ZOIs at the end",
+        run.title,
+        *counts(run.strain.n, valid, zois),
     )
     return "\n\n".join(told(line).strip() for line in (head, *lines))

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, TextIO
 from acquire.text import Message
 from acquire.text.message import about, joined
 from acquire.text.printable import duration, printable, share_text
-from acquire.text.quantity import IN_ASCII, Amount
+from acquire.text.quantity import IN_ASCII, Amount, counts
 from live.pipeline.consumer import Screen
 from live.ui.terminal.status_line import GAP, cameras_line, force_text, gauge_texts, status_line
 from live.words.language import told
@@ -109,13 +109,13 @@ class TerminalScreen(Screen):
 
     def progress(self, i: TimeStep, done: int, expected: int | None, elapsed_s: float) -> None:
         """Renew the status line of a replay: ``done`` of ``expected`` bursts, ZOI/s, remaining time."""
-        bursts, left, rate = Message("{done} bursts", done), "", ""
+        bursts, left, rate = Message("{done} bursts", *counts(done)), "", ""
         if expected is not None and done <= expected:
-            bursts = Message("{done} of {expected} bursts", done, expected)
+            bursts = Message("{done} of {expected} bursts", *counts(done, expected))
             left = Message("{time} left", duration(elapsed_s / done * (expected - done)))
         if elapsed_s > 0:
             rate = Message("{rate} ZOI/s", Amount("count", done * i.n_zoi / elapsed_s))
-        valid = Message("{valid}/{zois} ZOIs", i.n_valid, i.n_zoi)
+        valid = Message("{valid}/{zois} ZOIs", *counts(i.n_valid, i.n_zoi))
         strains = (*gauge_texts(i), share_text(i.area_share))
         self.status(joined(GAP, (bursts, force_text(i.force), *strains, valid, rate, left)))
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from acquire.text import Message
 from acquire.text.message import joined, word
 from acquire.text.printable import duration, share_text
-from acquire.text.quantity import UNKNOWN, Amount
+from acquire.text.quantity import UNKNOWN, Amount, counts
 from live.pipeline.snapshot import AXIAL, BURST, FORCE, STRESS
 from live.pipeline.timed.figure import BEYOND, LACKING, FigureState
 from live.words.language import told
@@ -131,11 +131,11 @@ def _item(row: ShownFigure) -> Item:
 
 
 def _zois(valid: int, zois: int) -> str:
-    return Message("{valid}/{zois} ZOIs", valid, zois)
+    return Message("{valid}/{zois} ZOIs", *counts(valid, zois))
 
 
 def _frames(s: Snapshot) -> str:
-    return Message("{n} frames", s.frames["grabbed"])
+    return Message("{n} frames", *counts(s.frames["grabbed"]))
 
 
 def figure_text(figure: TimedFigure, live: str, last: str = "") -> str:

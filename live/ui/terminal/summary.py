@@ -11,7 +11,7 @@ import numpy as np
 
 from acquire.text import Message
 from acquire.text.printable import counted
-from acquire.text.quantity import Amount
+from acquire.text.quantity import Amount, counts
 from live.pipeline.consumer import ConsumerReport, Screen
 from live.pipeline.event_log import sentence
 from live.pipeline.history import History
@@ -108,7 +108,9 @@ def _at_end(history: History, axis: str) -> list[str]:
     if n - 1 in known[-1:]:
         return [Message("strain along {axis} at the end: {text}", axis, texts[0])]
     last = history.time_steps[-1]
-    why = last.apart or Message("{n_valid} of {n_zoi} valid ({why})", last.n_valid, last.n_zoi, last.refused)
+    why = last.apart or Message(
+        "{n_valid} of {n_zoi} valid ({why})", *counts(last.n_valid, last.n_zoi), last.refused
+    )
     none = Message("strain along {axis} at the end: no value, {why}", axis, why)
     newest = (
         Message("the last burst with a value is {k} of {n}: {text}", known[-1] + 1, n, texts[0])

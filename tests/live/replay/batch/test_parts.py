@@ -17,10 +17,11 @@ from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.pipeline.consumer import Screen
 from live.replay.batch import task as module
-from live.replay.batch.row import RENEWED
+from live.replay.batch.row import RENEWED, BatchRow
 from live.replay.batch.task import FIELDS_FILE, LOG_FILE, ROW_FILE, Task, TaskProgress, perform, row_done
 from live.replay.parts import _BURST, StoredResults, measure_part
 from live.results import Strain
+from live.words.language import said
 from tests.live.made_run import session_writer
 from tests.live.made_up import START, make_frame
 
@@ -161,6 +162,12 @@ def test_a_task_that_fails_is_a_row_and_leaves_nothing(
     row = perform(task)
     assert (row.values["outcome"], row.values["exit_code"]) == ("failed", code)
     assert row.values["error"] == words.replace("FOLDER", str(task.folder))
+    elsewhere = BatchRow.of(
+        json.loads(json.dumps(row.to_json()))
+    )  # an error comes from a worker as a message
+    assert elsewhere.values == row.values and said(elsewhere.words, "de").startswith("a: gescheitert: ")
+    if isinstance(error, OSError):
+        assert "Platz schaffen" in said(elsewhere.words, "de")
     assert list(tmp_path.iterdir()) == [] and row_done(task) is None
 
 
