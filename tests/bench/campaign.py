@@ -19,12 +19,13 @@ import time
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from live.cli import main as phasedic
 from live.replay.batch.cluster import Cluster
 from live.replay.batch.row import BatchRow, failed
-from live.replay.batch.scheduler import BatchProgress
+from live.replay.batch.scheduler import BatchProgress, perform_all
 from live.replay.batch.task import Task
 from live.replay.batch.worker import Pool, WorkerProcesses
 from live.ui.terminal.screen import TerminalScreen
@@ -99,10 +100,10 @@ def empty(folder: Path, count: int) -> list[dict[str, Any]]:
         row = failed(task.name, task.source, "", 0).values
         (task.folder / "batch.json").write_text(json.dumps({"key": task.key, "row": row}), encoding="utf-8")
     with contextlib.closing(WorkerProcesses(0)) as on_start:
-        found = [_emptied("pool", tasks, lambda told, done: Pool(tasks, 2, told, done, on_start))]
+        found = [_emptied("pool", tasks, lambda told: Pool(2, told, on_start))]
     with running(folder) as cluster:
         screen = TerminalScreen(quiet=True)
-        made = _emptied("Dask", tasks, lambda told, done: Cluster(tasks, cluster.address, told, done, screen))
+        made = _emptied("Dask", tasks, lambda told: Cluster(cluster.address, folder, told, screen))
         found.append(made | {"MB scheduler": round(peak_MB(cluster.scheduler.pid))})
     return found
 
@@ -118,11 +119,11 @@ def _emptied(name: str, tasks: list[Task], start: Callable[..., Pool | Cluster])
         done.append(task.name)
         return ()
 
-    workers = start(lambda task, progress: standing.told(task.title, progress), ended)
-    while not workers.wait(LOOK_S):
-        pass
-    took = time.perf_counter() - began
-    workers.close()
+    plan: Any = SimpleNamespace(first=lambda: tasks, on_done=ended)
+    with contextlib.closing(start(lambda task, progress: standing.update(task.title, progress))) as workers:
+        for _ in perform_all(plan, workers, LOOK_S):
+            pass
+        took = time.perf_counter() - began
     assert len(done) == len(tasks)
     return {
         "case": f"{len(tasks)} empty tasks, {name}", "s": round(took, 2), "first after s": round(first, 2),

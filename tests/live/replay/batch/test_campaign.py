@@ -7,6 +7,7 @@ import dataclasses
 import json
 import os
 import threading
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -26,12 +27,11 @@ from live.replay.batch.campaign import (
 )
 from live.replay.batch.keys import _pictures, _source, key_of
 from live.replay.batch.row import COLUMNS, BatchRow
-from live.replay.batch.scheduler import ChunkPlan
+from live.replay.batch.scheduler import ChunkPlan, perform_all
 from live.replay.batch.task import ROW_FILE, Task
 from live.replay.batch.test_list import BatchJob, find_tests
 from live.replay.batch.worker import Pool
 from tests.live.screens import RecordingScreen
-from tests.live.ui.waiting import LONG_S
 
 
 def sessions(folder: Path, names: str) -> list[BatchJob]:
@@ -195,6 +195,7 @@ class Dying:
 
     def __init__(self, name: str) -> None:
         self.name, self.tried, self.ended, self.taken = name, list[str](), 0, 0
+        self.given_back = 0
 
     def take(self) -> Any:
         self.taken += 1
@@ -206,6 +207,9 @@ class Dying:
         if task.name == self.name:
             return None
         return BatchRow.of({"test": task.name, "outcome": "done", "exit_code": 0})
+
+    def give_back(self, worker: Any) -> None:
+        self.given_back += 1
 
     def end(self) -> None:
         self.ended += 1
@@ -225,14 +229,14 @@ def test_a_task_whose_worker_dies_is_tried_three_times_after_all_others() -> Non
         return [later] if task.name == "b" else []
 
     tasks = [Task(name, "", name) for name in "abc"]
-    pool = Pool(tasks, 1, lambda task, progress: None, done, processes)  # type: ignore[arg-type]
-    pool._threads[0].join(LONG_S)
-    assert pool.wait(0.1)
+    scheduler = SimpleNamespace(first=lambda: tasks, on_done=done)
+    with closing(Pool(1, lambda task, progress: None, processes)) as pool:  # type: ignore[arg-type]
+        for _ in perform_all(scheduler, pool, 0.05):  # type: ignore[arg-type]
+            pass
     assert processes.tried == ["a", "b", "z", "c", "a", "a"]
-    assert (processes.taken, processes.ended) == (3, 3), "a new one after each death"
+    assert (processes.taken - processes.given_back, processes.ended) == (3, 3), "a new one after each death"
     assert (
         rows["a"].values["error"]
         == "its worker died 3 times (signal 9); is there memory enough for --workers?"
     )
     assert rows["z"].is_well and rows["a"].values["exit_code"] == 1
-    pool.close()

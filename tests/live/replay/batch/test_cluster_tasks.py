@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import queue
 import socket
 from concurrent.futures import CancelledError
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,16 +16,17 @@ from live.replay.batch import cluster
 from live.replay.batch.cluster import Cluster, advice, check, check_scheduler
 from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow
+from live.replay.batch.scheduler import perform_all
 from live.replay.batch.task import ROW_FILE, Task, TaskProgress
-from live.replay.batch.worker import NEEDED
+from live.replay.batch.worker import NEEDED, compile_on_worker
 from tests.live.screens import RecordingScreen
 
 
 class Future:
     """One task of the fake client."""
 
-    def __init__(self, key: str, line: str) -> None:
-        self.key, self.task, self.status = key, Task.from_json(line), "pending"
+    def __init__(self, client: Client, key: str, line: str) -> None:
+        self.client, self.key, self.task, self.status = client, key, Task.from_json(line), "pending"
         self.error: Exception | None = None
         self._done: list[Any] = []
 
@@ -34,6 +35,11 @@ class Future:
 
     def exception(self) -> Exception | None:
         return self.error
+
+    def result(self) -> dict[str, Any]:
+        if self.client.lost:
+            raise OSError("lost")
+        return {"test": self.task.name, "outcome": "done", "exit_code": 0}
 
     def end(self, status: str = "finished", error: Exception | None = None) -> None:
         self.status, self.error = status, error
@@ -55,25 +61,19 @@ class Client:
             raise self.answers
         return self.answers
 
-    def submit(self, function: Any, *, workers: list[str], pure: bool) -> str:
-        self.compiled.append((workers, pure))
-        return workers[0]
+    def submit(self, function: Any, *given: Any, pure: bool, **more: Any) -> Any:
+        if function is compile_on_worker:
+            self.compiled.append((more["workers"], pure))
+            return more["workers"][0]
+        self.more = more | {"given": given[1:], "pure": pure}
+        self.futures.append(Future(self, more["key"], given[0]))
+        return self.futures[-1]
 
-    def gather(self, futures: list[Any], errors: str = "raise") -> list[Any]:
-        if self.lost:
-            raise OSError("lost")
-        if errors == "skip":
-            return futures
-        return [{"test": one.task.name, "outcome": "done", "exit_code": 0} for one in futures]
+    def gather(self, futures: list[Any], errors: str) -> list[Any]:
+        return futures
 
     def subscribe_topic(self, topic: str, call: Any) -> None:
         self.event = call
-
-    def map(self, function: Any, lines: list[str], *, key: list[str], **more: Any) -> list[Future]:
-        self.more = more
-        made = [Future(name, line) for name, line in zip(key, lines, strict=True)]
-        self.futures += made
-        return made
 
     def nthreads(self) -> dict[str, int]:
         return self.threads
@@ -106,9 +106,20 @@ class Running:
         monkeypatch.setattr(cluster, "_connected", lambda address: self.client)
         self.tasks = [Task(name, str(out), f"/data/{name}.h5", key=f"key-{name}") for name in names]
         self.cluster = Cluster(
-            self.tasks, "tcp://here:1", lambda task, progress: self.progress.append((task.name, progress)),
-            self._done, self.screen,
-        )  # fmt: skip
+            "tcp://here:1",
+            out,
+            lambda task, progress: self.progress.append((task.name, progress)),
+            self.screen,
+        )
+        plan = SimpleNamespace(first=lambda: self.tasks, on_done=self._done)
+        self._loop = perform_all(plan, self.cluster, 0.0)  # type: ignore[arg-type]
+        self.go_on()
+
+    def go_on(self) -> bool:
+        """Take what has ended and submit what there is room for; whether all is done."""
+        next(self._loop, None)
+        next(self._loop, None)
+        return self.rows.keys() >= {task.name for task in self.tasks}
 
     def _done(self, task: Task, row: BatchRow) -> list[Task]:
         self.rows[task.name] = row
@@ -125,15 +136,15 @@ def test_tasks_are_submitted_with_their_keys_and_their_rows_taken(
     assert list(tmp_path.iterdir()) == [], "the token is gone"
     assert [one.key for one in bench.client.futures] == [f"{tmp_path}/a-key-a", f"{tmp_path}/b-key-b"]
     assert bench.client.more["retries"] == 2 and bench.client.more["pure"] is False
-    assert bench.client.more["folder"] == str(Path.cwd())
-    assert not bench.cluster.wait(0)
+    assert bench.client.more["given"] == (str(Path.cwd()), bench.cluster._topic)
+    assert not bench.go_on()
     bench.client.futures[1].end()
-    assert not bench.cluster.wait(0) and list(bench.rows) == ["b"] and bench.rows["b"].is_well
+    assert not bench.go_on() and list(bench.rows) == ["b"] and bench.rows["b"].is_well
     bench.client.event((0.0, ["a", 3, 9, 30]))
     bench.client.event((0.0, ["unknown", 3, 9, 30]))
     assert bench.progress == [("a", TaskProgress(3, 9, 30))]
     bench.client.futures[0].end()
-    assert bench.cluster.wait(0)
+    assert bench.go_on()
     bench.cluster.close()
     assert bench.client.cancelled == [] and bench.client.closed == 1
 
@@ -147,11 +158,11 @@ def test_what_follows_a_task_is_submitted_before_what_waits(
     assert bench.names() == "ab", "no more than two at once"
     bench.then["a"] = [Task("z", str(tmp_path), "/data/z.h5")]
     bench.client.futures[0].end()
-    assert not bench.cluster.wait(0)
+    assert not bench.go_on()
     assert bench.names() == "abz"
     bench.client.futures[1].end()
     bench.client.futures[2].end()
-    bench.cluster.wait(0)
+    bench.go_on()
     assert bench.names() == "abzcd"
 
 
@@ -161,7 +172,7 @@ def test_four_tasks_a_worker_are_queued_and_two_hundred_at_least(
 ) -> None:
     answers = {f"w{k}": answer("a") for k in range(workers)}
     bench = Running(monkeypatch, tmp_path, "a", **answers)
-    assert bench.cluster._max_queued == queued
+    assert bench.cluster.at_once == queued
     assert bench.client.compiled == [([f"w{workers - 1}"], False)], "once on each machine"
 
 
@@ -173,7 +184,7 @@ def test_a_task_that_is_given_up_fails_with_why(monkeypatch: pytest.MonkeyPatch,
     row = {"test": "c", "outcome": "done", "exit_code": 0}
     (tmp_path / "c" / ROW_FILE).write_text(json.dumps({"key": "key-c", "row": row}), encoding="utf-8")
     bench.client.futures[2].end("error", CancelledError("killed"))
-    assert bench.cluster.wait(0)
+    assert bench.go_on()
     assert [bench.rows[name].values["error"] for name in "abc"] == [
         "the cluster gave it up: CancelledError: killed",
         "the cluster gave it up: no result arrived (cancelled)",
@@ -191,33 +202,26 @@ def test_rows_that_do_not_come_are_read_from_the_disk(
     (tmp_path / "a" / ROW_FILE).write_text(json.dumps({"key": "key-a", "row": row}), encoding="utf-8")
     bench.client.lost = True
     bench.client.futures[0].end()
-    assert bench.cluster.wait(0) and bench.rows["a"].is_well
-
-
-class Quick(queue.SimpleQueue):  # type: ignore[type-arg]
-    """Waits for nothing."""
-
-    def get(self, block: bool = True, timeout: float | None = None) -> Any:
-        return super().get_nowait()
+    assert bench.go_on() and bench.rows["a"].is_well
 
 
 def test_a_scheduler_that_is_away_for_five_seconds_has_ended(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     bench = Running(monkeypatch, tmp_path, "ab")
-    bench.cluster._ended = Quick()
     bench.client.status = "connecting"
     bench.client.futures[0].end("error", CancelledError("killed"))
     for _ in range(5):
-        assert not bench.cluster.wait(1.0)
+        bench.cluster.check(1.0)
+        assert not bench.go_on()
     assert bench.rows == {}, "what is lost with the connection is no failure of a task"
     bench.client.status = "running"
-    bench.cluster.wait(1.0)
+    bench.cluster.check(1.0)
     bench.client.status = "connecting"
     for _ in range(5):
-        bench.cluster.wait(1.0)
+        bench.cluster.check(1.0)
     with pytest.raises(DataError, match="the scheduler has ended; complete tests are kept"):
-        bench.cluster.wait(0.1)
+        bench.cluster.check(0.1)
     bench.cluster.close()
     assert bench.client.cancelled == []
 
@@ -226,25 +230,24 @@ def test_where_nothing_ends_and_there_are_no_workers_a_note_comes_every_fifteen_
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     bench = Running(monkeypatch, tmp_path, "ab")
-    bench.cluster._ended = Quick()
     bench.client.threads = {}
     for _ in range(3):
-        bench.cluster.wait(5.0)
+        bench.cluster.check(5.0)
     assert bench.screen.lines == []
     bench.client.futures[0].end()
-    bench.cluster.wait(5.0)
+    bench.go_on()
     for _ in range(3):
-        bench.cluster.wait(5.0)
+        bench.cluster.check(5.0)
     assert bench.screen.lines == [], "counted anew since a task has ended"
-    bench.cluster.wait(0.1)
+    bench.cluster.check(0.1)
     note = "tcp://here:1 has no workers; waiting for some"
     assert bench.screen.lines == [note]
     for _ in range(4):
-        bench.cluster.wait(5.0)
+        bench.cluster.check(5.0)
     assert bench.screen.lines == [note] * 2
     bench.client.threads = {"w": 1}
     for _ in range(4):
-        bench.cluster.wait(5.0)
+        bench.cluster.check(5.0)
     assert len(bench.screen.lines) == 2
     bench.cluster.close()
     assert bench.client.cancelled == [(f"{tmp_path}/b-key-b", True)] and bench.client.closed == 1
@@ -259,14 +262,13 @@ def test_workers_that_do_not_fit_end_it_before_any_task(
         clients.append(Client({"w": answer(slots=2)}))
         return clients[-1]
 
-    task = Task("a", str(tmp_path), "a.h5")
     monkeypatch.setattr(cluster, "_connected", connected)
     with pytest.raises(ConfigError, match="does 2 tasks at once"):
-        Cluster([task], "tcp://here:1", print, print, RecordingScreen())  # type: ignore[arg-type]
+        Cluster("tcp://here:1", tmp_path, print, RecordingScreen())  # type: ignore[arg-type]
     assert clients[0].closed == 1 and clients[0].futures == [] and list(tmp_path.iterdir()) == []
     monkeypatch.setattr(cluster, "_connected", lambda address: Client(ValueError("x")))  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match=r"a worker cannot run phasedic \(ValueError: x\)"):
-        Cluster([task], "tcp://here:1", print, print, RecordingScreen())  # type: ignore[arg-type]
+        Cluster("tcp://here:1", tmp_path, print, RecordingScreen())  # type: ignore[arg-type]
 
 
 def test_what_is_asked_of_workers() -> None:

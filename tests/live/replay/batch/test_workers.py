@@ -7,6 +7,7 @@ import json
 import queue
 import sys
 import threading
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,6 +20,7 @@ from live.replay.batch import campaign, worker
 from live.replay.batch.campaign import CampaignRequest, run_campaign
 from live.replay.batch.keys import longest_first
 from live.replay.batch.row import BatchRow, failed
+from live.replay.batch.scheduler import perform_all
 from live.replay.batch.task import Task, TaskProgress
 from live.replay.batch.test_list import find_tests
 from live.replay.batch.worker import NEEDED, ONE_THREAD, Pool, WorkerProcess, WorkerProcesses, describe_worker
@@ -41,6 +43,27 @@ class Counted(WorkerProcesses):
         worker = super().take()
         self.taken.append(worker.pid)
         return worker
+
+
+def ignore(task: Task, progress: TaskProgress) -> None:
+    pass
+
+
+class Appended:
+    """In place of a scheduler: these tasks, whose rows are kept."""
+
+    def __init__(self, tasks: list[Task], rows: list[BatchRow]) -> None:
+        self.first, self._rows = lambda: tasks, rows
+
+    def on_done(self, task: Task, row: BatchRow) -> tuple[Task, ...]:
+        self._rows.append(row)
+        return ()
+
+
+def performed(tasks: list[Task], pool: Pool, rows: list[BatchRow]) -> None:
+    with closing(pool):
+        for _ in perform_all(Appended(tasks, rows), pool, 0.05):  # type: ignore[arg-type]
+            pass
 
 
 @pytest.fixture(autouse=True)
@@ -99,10 +122,7 @@ def test_a_pool_starts_more_where_they_are_not_enough(tmp_path: Path) -> None:
     tasks = [Task(str(k), str(tmp_path), "nothing.h5", key="key") for k in range(2)]
     rows = []
     processes = Counted(1)
-    pool = Pool(tasks, 2, lambda task, progress: None, lambda task, row: rows.append(row) or (), processes)
-    while not pool.wait(0.05):
-        pass
-    pool.close()
+    performed(tasks, Pool(2, ignore, processes), rows)
     processes.close()
     assert [row.values["outcome"] for row in rows] == [failed("0", "", "", 1).values["outcome"]] * 2
     assert processes.pids[0] in processes.taken
@@ -151,8 +171,7 @@ def test_no_worker_can_be_started_any_more(tmp_path: Path, caplog: pytest.LogCap
 
     rows: list[BatchRow] = []
     tasks = [Task(str(k), str(tmp_path), "nothing.h5", key="key") for k in range(3)]
-    pool = Pool(tasks, 2, lambda task, progress: None, lambda task, row: rows.append(row) or (), Empty(0))
-    assert pool.wait(LONG_S)
+    performed(tasks, Pool(2, ignore, Empty(0)), rows)
     assert len(rows) == 3
     assert all("3 died at once: it cannot be started" in str(row.values["error"]) for row in rows)
     assert "too many" in caplog.text
@@ -251,12 +270,7 @@ def test_where_every_worker_dies_at_once_it_stops_with_the_error_of_the_worker(
     tasks = [Task(str(k), str(tmp_path), "nothing.h5", key="key") for k in range(12)]
     rows: list[BatchRow] = []
     processes = Counted(0)
-    pool = Pool(
-        tasks, workers, lambda task, progress: None, lambda task, row: rows.append(row) or (), processes
-    )
-    while not pool.wait(0.05):
-        pass
-    pool.close()
+    performed(tasks, Pool(workers, ignore, processes), rows)
     assert len(processes.taken) < 3 + workers, "those that had begun"
     assert sorted(int(str(row.values["test"])) for row in rows) == list(range(12))
     words = {str(row.values["error"]) for row in rows}
@@ -290,11 +304,9 @@ for line in sys.stdin:
     tasks = [Task(str(k), str(tmp_path), "nothing.h5", key="key") for k in range(3)]
     rows: list[BatchRow] = []
     processes = Counted(0)
-    pool = Pool(tasks, 1, lambda task, progress: None, lambda task, row: rows.append(row) or (), processes)
-    while not pool.wait(0.05):
-        pass
-    pool.close()
+    performed(tasks, Pool(1, ignore, processes), rows)
+    processes.close()
     words = [str(row.values.get("error")) for row in rows[1:]]
-    assert len(processes.taken) == 6 and all(
+    assert len(set(processes.taken)) == 6 and all(
         one == "its worker died 3 times (signal 9); is there memory enough for --workers?" for one in words
     )
