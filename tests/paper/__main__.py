@@ -25,9 +25,8 @@ from live.setup.pattern.outcome import (
     ProgressBar,
     figure,
     write_outcome,
-    write_page,
 )
-from tests.paper.outcomes import read_outcome
+from tests.paper.outcomes import read_outcome, write_page
 
 INTRODUCTION = """The accuracy of phase-DIC, on rendered truth and on real pictures, compared with its paper:
 J. Molimard, *Implementation of the direct evaluation of strains in a frequency-based image analysis code for random

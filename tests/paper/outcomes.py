@@ -1,16 +1,38 @@
-"""Verdicts, stored outcomes and maps of the experiments, beside what ``live.setup.pattern.outcome`` has."""
+"""Verdicts, stored outcomes, page and maps of the experiments, beside what ``live.setup.pattern.outcome`` has."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from acquire.errors import DataError
-from live.setup.pattern.outcome import FORMAT, Comparison, ExperimentOutcome, ResultTable, Word, shown
+from live.setup.pattern import outcome as product
+from live.setup.pattern.outcome import FORMAT, ExperimentOutcome, ResultTable, shown
 
 EQUAL_WITHIN = 0.1
+Word = Literal["better", "equal", "worse"]
+WORDS: tuple[Word, ...] = ("better", "equal", "worse")
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Our result against another one.
+
+    Attributes
+    ----------
+    subject : str
+        The quantity, with both figures.
+    against : str
+        "the paper", "the paper's estimator", "the limit", the name of a peer ...
+    word : "better" | "equal" | "worse"
+    """
+
+    subject: str
+    against: str
+    word: Word
 
 
 def compared(ours: float, theirs: float) -> Word:
@@ -70,3 +92,33 @@ def _from_dict(values: dict[str, Any]) -> ExperimentOutcome:
         values["name"], values["title"], values["text"], tables,
         tuple(values["figures"]), verdicts, float(values["seconds"]),
     )  # fmt: skip
+
+
+def comparison_summary(outcomes: Sequence[ExperimentOutcome]) -> str:
+    """The comparisons in which ours is worse, equal (within 10 %) or better, from all sections."""
+    verdicts = [verdict for outcome in outcomes for verdict in outcome.verdicts]
+    if not verdicts:
+        return ""
+    counts = ", ".join(f"{word} in {sum(v.word == word for v in verdicts)}" for word in WORDS)
+    lines = ["## Comparisons", "", f"Of {len(verdicts)} comparisons (equal: within 10 %): {counts}."]
+    for word in reversed(WORDS):
+        chosen = [v for v in verdicts if v.word == word]
+        if chosen:
+            lines += ["", f"**{word.capitalize()}** (ours first):", "", *(_line(v) for v in chosen)]
+    return "\n".join(lines)
+
+
+def _line(verdict: Comparison) -> str:
+    return f"- {verdict.subject} ({verdict.against})"
+
+
+def _table(verdicts: Sequence[Comparison]) -> ResultTable:
+    rows = [(v.word, v.subject, v.against) for word in reversed(WORDS) for v in verdicts if v.word == word]
+    return ResultTable("verdicts", ("verdict", "ours against the other", "the other"), tuple(rows))
+
+
+def write_page(outcomes: list[ExperimentOutcome], target: Path, folder: Path, typed: str, intro: str) -> None:
+    """The page with the comparisons first, and these as CSV beside the figures."""
+    product.write_page(outcomes, target, folder, typed, intro, comparison_summary(outcomes))
+    if verdicts := [v for outcome in outcomes for v in outcome.verdicts]:
+        (folder / "verdicts.csv").write_text(_table(verdicts).csv(), encoding="utf-8")

@@ -12,17 +12,10 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from analysis.field import Roi, ZoiGrid
 from hw_mocks.deformation import Affine
-from live.setup.pattern.outcome import (
-    Comparison,
-    ExperimentContext,
-    ExperimentOutcome,
-    ResultTable,
-    figure,
-    save_figure,
-)
+from live.setup.pattern.outcome import ExperimentContext, ExperimentOutcome, ResultTable, figure, save_figure
 from tests.paper.others import PROGRAMS, Program, installed
 from tests.paper.others import STEP as OTHERS_STEP
-from tests.paper.outcomes import verdict
+from tests.paper.outcomes import Comparison, verdict
 from tests.paper.truth import SensorModel, TrueScene, ours, papers
 
 log = logging.getLogger(__name__)

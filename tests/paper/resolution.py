@@ -15,15 +15,8 @@ from analysis.field import Roi, ZoiGrid
 from analysis.picture.pattern import resolution_length
 from hw_mocks.deformation import Affine, Wave
 from live.setup.pattern.imposed import LENGTH_OF_C
-from live.setup.pattern.outcome import (
-    Comparison,
-    ExperimentContext,
-    ExperimentOutcome,
-    ResultTable,
-    figure,
-    save_figure,
-)
-from tests.paper.outcomes import verdict
+from live.setup.pattern.outcome import ExperimentContext, ExperimentOutcome, ResultTable, figure, save_figure
+from tests.paper.outcomes import Comparison, verdict
 from tests.paper.truth import SensorModel, TrueScene, grey_picture, ours, papers
 
 Floats = NDArray[np.float64]

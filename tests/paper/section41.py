@@ -11,16 +11,9 @@ from numpy.typing import NDArray
 
 from analysis.field import Roi, ZoiGrid
 from hw_mocks.deformation import Wave
-from live.setup.pattern.outcome import (
-    Comparison,
-    ExperimentContext,
-    ExperimentOutcome,
-    ResultTable,
-    figure,
-    save_figure,
-)
+from live.setup.pattern.outcome import ExperimentContext, ExperimentOutcome, ResultTable, figure, save_figure
 from tests.paper.estimator import PaperSettings
-from tests.paper.outcomes import colour_map, verdict
+from tests.paper.outcomes import Comparison, colour_map, verdict
 from tests.paper.truth import Limit, SensorModel, TrueScene, limit, ours, papers
 
 Floats = NDArray[np.float64]

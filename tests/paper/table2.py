@@ -7,15 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from live.setup.pattern.outcome import (
-    Comparison,
-    ExperimentContext,
-    ExperimentOutcome,
-    ResultTable,
-    figure,
-    save_figure,
-)
-from tests.paper.outcomes import verdict
+from live.setup.pattern.outcome import ExperimentContext, ExperimentOutcome, ResultTable, figure, save_figure
+from tests.paper.outcomes import Comparison, verdict
 from tests.paper.table2_design import (
     BITS,
     CORNERS,

@@ -21,18 +21,11 @@ from hw_mocks.speckle import Speckle
 from live.commands import characterise
 from live.commands.inspect import add_arguments as add_inspect
 from live.commands.inspect import command as inspect
-from live.setup.pattern.outcome import (
-    Comparison,
-    ExperimentContext,
-    ExperimentOutcome,
-    ProgressBar,
-    comparison_summary,
-    page,
-    write_page,
-)
+from live.setup.pattern.outcome import ExperimentContext, ExperimentOutcome, ProgressBar, page
 from tests.acquire.session.fixtures import CAMERA, frame, writer
 from tests.live.screens import Terminal
 from tests.paper.__main__ import EXPERIMENTS, add_arguments, chosen, command, run
+from tests.paper.outcomes import Comparison, comparison_summary, write_page
 from tests.paper.peers import present
 
 

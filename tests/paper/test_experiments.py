@@ -17,7 +17,6 @@ from acquire.errors import ConfigError, DataError
 from live.results.maps.map import for_display
 from live.setup.pattern.imposed import ExpectedErrors, Imposed, robust_std
 from live.setup.pattern.outcome import (
-    Comparison,
     ExperimentContext,
     ExperimentOutcome,
     ResultTable,
@@ -27,7 +26,7 @@ from live.setup.pattern.outcome import (
     write_outcome,
 )
 from live.setup.pattern.own_pattern import recommended
-from tests.paper.outcomes import compared, read_outcome, verdict
+from tests.paper.outcomes import Comparison, compared, read_outcome, verdict
 from tests.paper.peers import GAUGE, dense_flow, plane_strain, pyramid_flow
 from tests.paper.resolution import autocorrelation, fitted_length, half_width
 from tests.paper.section41 import derived, low_pass_for

@@ -16,7 +16,6 @@ from analysis.field import Roi, StrainField, ZoiGrid
 from hw_mocks.deformation import SpecimenDeformation, StrainModes
 from live.results.maps.map import PAPER_LOW_PASS, for_display
 from live.setup.pattern.outcome import (
-    Comparison,
     ExperimentContext,
     ExperimentOutcome,
     ResultTable,
@@ -25,7 +24,7 @@ from live.setup.pattern.outcome import (
     shown,
 )
 from tests.paper.estimator import PaperSettings
-from tests.paper.outcomes import colour_map, verdict
+from tests.paper.outcomes import Comparison, colour_map, verdict
 from tests.paper.truth import SensorModel, TrueScene, grey_picture, ours, papers
 
 Floats = NDArray[np.float64]

@@ -1,8 +1,6 @@
-"""The outcome of a characterisation: what it consists of, its file, its progress.
+"""The outcome of a characterisation: what it consists of, its file and page, its progress.
 
-An ``ExperimentOutcome`` is text, tables and verdicts, stored as JSON without loss; figures and CSV files are beside it.
-
-The Markdown page of a characterisation: verdicts first, then section by section.
+An ``ExperimentOutcome`` is text and tables, stored as JSON without loss; figures and CSV files are beside it.
 """
 
 from __future__ import annotations
@@ -19,14 +17,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Literal, TextIO
+from typing import Any, TextIO
 
 from acquire.errors import ConfigError, DataError
 
 FORMAT = 1
 DPI = 80
 _BAR = 24  # letters
-Word = Literal["better", "equal", "worse"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,24 +50,6 @@ class ResultTable:
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
-    """Our result against another one.
-
-    Attributes
-    ----------
-    subject : str
-        The quantity, with both figures.
-    against : str
-        "the paper", "the paper's estimator", "the limit", the name of a peer ...
-    word : "better" | "equal" | "worse"
-    """
-
-    subject: str
-    against: str
-    word: Word
-
-
-@dataclass(frozen=True, slots=True)
 class ExperimentOutcome:
     """The result of one experiment.
 
@@ -82,7 +61,8 @@ class ExperimentOutcome:
     tables : tuple of ResultTable
     figures : tuple of str
         File names beside the page.
-    verdicts : tuple of Comparison
+    verdicts : tuple
+        Comparisons with others (``tests.paper.outcomes``); none of one's own pattern.
     seconds : float, s
         Time it took.
     """
@@ -92,7 +72,7 @@ class ExperimentOutcome:
     text: str
     tables: tuple[ResultTable, ...] = ()
     figures: tuple[str, ...] = ()
-    verdicts: tuple[Comparison, ...] = ()
+    verdicts: tuple[Any, ...] = ()
     seconds: float = 0.0
 
 
@@ -221,7 +201,6 @@ class ProgressBar:
             print(text, end="", file=self._screen, flush=True)
 
 
-WORDS: tuple[Word, ...] = ("better", "equal", "worse")
 LIBRARIES = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless")
 
 
@@ -249,7 +228,7 @@ def _processor() -> str:
     )
 
 
-def page(outcomes: Sequence[ExperimentOutcome], command: str, images: str, intro: str) -> str:
+def page(outcomes: Sequence[ExperimentOutcome], command: str, images: str, *intro: str) -> str:
     """The whole page.
 
     Parameters
@@ -259,12 +238,13 @@ def page(outcomes: Sequence[ExperimentOutcome], command: str, images: str, intro
         The command as typed.
     images : str
         Folder of the figures relative to the page; "" for the same folder.
-    intro : str
+    *intro : str
+        What stands above the first section; the line on command and machine comes behind the first.
     """
     seconds = sum(outcome.seconds for outcome in outcomes)
     today = datetime.datetime.now(datetime.UTC).date().isoformat()
     made = f"Made by `{command}` on {today} in {seconds:.0f} s on {machine()}."
-    parts = ["# Characterisation", intro.strip(), made, comparison_summary(outcomes)]
+    parts = ["# Characterisation", intro[0].strip(), made, *intro[1:]]
     parts += [f"## {outcome.title}\n\n{linked(outcome, images)}" for outcome in outcomes]
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -282,36 +262,12 @@ def linked(outcome: ExperimentOutcome, images: str) -> str:
     return text
 
 
-def comparison_summary(outcomes: Sequence[ExperimentOutcome]) -> str:
-    """The comparisons in which ours is worse, equal (within 10 %) or better, from all sections."""
-    verdicts = [verdict for outcome in outcomes for verdict in outcome.verdicts]
-    if not verdicts:
-        return ""
-    counts = ", ".join(f"{word} in {sum(v.word == word for v in verdicts)}" for word in WORDS)
-    lines = ["## Comparisons", "", f"Of {len(verdicts)} comparisons (equal: within 10 %): {counts}."]
-    for word in reversed(WORDS):
-        chosen = [v for v in verdicts if v.word == word]
-        if chosen:
-            lines += ["", f"**{word.capitalize()}** (ours first):", "", *(_line(v) for v in chosen)]
-    return "\n".join(lines)
-
-
-def _line(verdict: Comparison) -> str:
-    return f"- {verdict.subject} ({verdict.against})"
-
-
-def _table(verdicts: Sequence[Comparison]) -> ResultTable:
-    rows = [(v.word, v.subject, v.against) for word in reversed(WORDS) for v in verdicts if v.word == word]
-    return ResultTable("verdicts", ("verdict", "ours against the other", "the other"), tuple(rows))
-
-
-def write_page(outcomes: list[ExperimentOutcome], target: Path, folder: Path, typed: str, intro: str) -> None:
-    """Write the Markdown page with links to the figures, and the verdicts as CSV beside them."""
+def write_page(
+    outcomes: Sequence[ExperimentOutcome], target: Path, folder: Path, typed: str, *intro: str
+) -> None:
+    """Write the Markdown page with links to the figures."""
     images = os.path.relpath(folder, target.parent)
-    text = page(outcomes, typed, "" if images == "." else images, intro)
     try:
-        target.write_text(text, encoding="utf-8")
-        if verdicts := [v for outcome in outcomes for v in outcome.verdicts]:
-            (folder / "verdicts.csv").write_text(_table(verdicts).csv(), encoding="utf-8")
+        target.write_text(page(outcomes, typed, "" if images == "." else images, *intro), encoding="utf-8")
     except OSError as error:
         raise DataError("{path} cannot be written: {why}; give another --page", target, error) from error
