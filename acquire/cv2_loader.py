@@ -31,6 +31,14 @@ def load_cv2() -> Any:
     return cv2
 
 
+def encoded(ending: str, image: Any, quality: int | None = None) -> bytes:
+    """The bytes of a file ".jpg", of this quality (0 to 100), or ".png", of this compression (0 to 9)."""
+    cv2 = load_cv2()
+    flag = cv2.IMWRITE_JPEG_QUALITY if ending == ".jpg" else cv2.IMWRITE_PNG_COMPRESSION
+    _, data = cv2.imencode(ending, image, [] if quality is None else [flag, quality])
+    return bytes(data)
+
+
 def drawn_letters(text: str) -> str:
     """The text in letters that ``putText`` has: most of Unicode since OpenCV 5, before it ASCII (um/m, +-)."""
     text = text.replace(GAP, " ")

@@ -8,7 +8,6 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from acquire.errors import ConfigError
 from acquire.text import Message
 from live.commands.docs import shipped
 from live.config.new_files import new_folder
@@ -29,8 +28,6 @@ def command(arguments: argparse.Namespace) -> int:
     from hw_mocks.example_pictures import write_pictures
 
     folder = Path(arguments.folder)
-    if folder.exists() or folder.is_symlink():
-        raise ConfigError("{path} exists; nothing is overwritten, choose another name", folder)
     ignored = shutil.ignore_patterns("__*", "*.egg-info", "build")
     with new_folder(folder) as part:
         try:

@@ -9,6 +9,7 @@ from pathlib import Path
 from acquire.errors import ConfigError
 from live.commands.options import add_gauge_option, add_gauges, add_time_span
 from live.commands.signals import signals
+from live.config.new_files import check_free
 from live.results.run_folder import open_run
 from live.ui.rerun.playback import ShowRequest, show
 from live.ui.terminal.screen import TerminalScreen
@@ -46,5 +47,5 @@ def _check(arguments: argparse.Namespace) -> None:
         raise ConfigError("--every {n} is not possible; give a whole number from 1", arguments.every)
     if not 1024 <= arguments.port <= 65535:
         raise ConfigError("--port {port} is not possible; give 1024 to 65535", arguments.port)
-    if arguments.rrd and Path(arguments.rrd).exists():
-        raise ConfigError("{path} exists already and is not overwritten; give another name", arguments.rrd)
+    if arguments.rrd:
+        check_free(Path(arguments.rrd))

@@ -22,7 +22,7 @@ def check_free(*paths: Path) -> None:
     """Raise ConfigError where one of ``paths`` exists."""
     for path in paths:
         if path.exists():
-            raise ConfigError("{path} exists already and is not overwritten; choose another --out", path)
+            raise ConfigError("{path} exists already and is not overwritten; choose another name", path)
 
 
 @contextlib.contextmanager

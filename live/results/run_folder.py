@@ -179,6 +179,14 @@ class RunFolder(Closing):
         except PhasedicError:
             return None
 
+    @property
+    def picture_size(self) -> tuple[int, int]:
+        """Width and height of the pictures, px; where they are gone, the extent of the ZOIs with equal margins."""
+        if self.pictures is not None:
+            return self.pictures.info.width, self.pictures.info.height
+        roi = self.strain.grid.roi
+        return 2 * roi.x + roi.width, 2 * roi.y + roi.height
+
     def _readable(self, found: Pictures, rows: Sequence[int]) -> Iterator[Image | None]:
         """The picture of each row; None for one that is damaged."""
         for row in rows:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.cv2_loader import load_cv2
+from acquire.cv2_loader import encoded, load_cv2
 from acquire.errors import ConfigError, DataError
 
 # Codec of the encoders in OpenCV's wheel, and the programs that do not play it.
@@ -37,11 +37,9 @@ _MIN_GIF_PX = 120  # smaller pictures show nothing
 
 def write_png(job: ExportJob, path: Path) -> None:
     """A folder with one picture an instant."""
-    cv2 = load_cv2()
     with new_folder(path) as folder:
         for k, image in _frames(job):
-            _, data = cv2.imencode(".png", image)
-            (folder / f"{job.fields[0]}_{k:05d}.png").write_bytes(bytes(data))
+            (folder / f"{job.fields[0]}_{k:05d}.png").write_bytes(encoded(".png", image))
 
 
 def write_mp4(job: ExportJob, path: Path) -> None:
@@ -125,7 +123,7 @@ def _frames(job: ExportJob, longest: int = 1280) -> Iterator[tuple[int, NDArray[
         scale = ColourScale.of_run(
             job.strain, name, job.rows, job.options.limit, display.unit(name), display.factor(name)
         )
-    painter = Painter(job.strain, name, scale, _size(job, pictures), longest)
+    painter = Painter(job.strain, name, scale, job.run.picture_size, longest)
     levels: Levels | None = None
     with closing(_images(job, pictures)) as images:
         for k, row in job.steps():
@@ -142,12 +140,3 @@ def _images(job: ExportJob, pictures: Pictures | None) -> Generator[Any]:
         yield from pictures.each(job.rows)
     while True:
         yield None
-
-
-def _size(job: ExportJob, pictures: Pictures | None) -> tuple[int, int]:
-    """Size of the pictures; without pictures, the extent of the ZOIs with equal margins."""
-    if pictures is not None:
-        return pictures.info.width, pictures.info.height
-    grid = job.strain.grid
-    roi = grid.roi
-    return 2 * roi.x + roi.width, 2 * roi.y + roi.height

@@ -6,7 +6,6 @@ the title names them. A rejected ZOI is transparent; the field "status" shows wh
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,11 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.cv2_loader import load_cv2
-from acquire.errors import ConfigError, DataError
+from acquire.cv2_loader import encoded
+from acquire.errors import ConfigError
 from acquire.text import Message
 from analysis.evaluate import deconvolved, effect
 from analysis.field import ZoiGrid
+from live.config.new_files import new_file
 from live.results.maps.painting import Image, Painter
 from live.results.maps.scale import AutoRange, ColourScale, range_kind
 from live.results.reader import Strain
@@ -172,18 +172,8 @@ def save(image: Image, path: Path) -> None:
     """
     if path.suffix.lower() not in FORMATS:
         raise ConfigError("{path}: choose a name that ends in {endings}", path, ", ".join(FORMATS))
-    _, data = load_cv2().imencode(path.suffix.lower(), image)
-    try:
-        with path.open("xb") as file:
-            file.write(bytes(data))
-    except FileExistsError:
-        raise ConfigError("{path} exists and is not overwritten; choose another name", path) from None
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            path.unlink(missing_ok=True)
-        raise DataError(
-            "{path}: cannot be written: {strerror}; look at the folder and the disk", path, error
-        ) from None
+    with new_file(path) as part:
+        part.write_bytes(encoded(path.suffix.lower(), image))
 
 
 def _sigma(strain: Strain, name: str, row: int) -> NDArray[Any] | None:

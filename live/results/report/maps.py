@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.cv2_loader import load_cv2
+from acquire.cv2_loader import encoded
 from acquire.frame import CameraInfo
 from acquire.text import Message
 from acquire.text.message import about, word
@@ -53,13 +53,12 @@ def map_pictures(run: RunFolder, rows: list[int]) -> MapPictures:
     """Read the pictures of ``rows``; where there are none, the painter uses plain grey of the extent of the ZOIs."""
     pictures = run.pictures
     if pictures is None:
-        roi = run.strain.grid.roi
-        return MapPictures(dict.fromkeys(rows), None, (2 * roi.x + roi.width, 2 * roi.y + roi.height))
+        return MapPictures(dict.fromkeys(rows), None, run.picture_size)
     images: dict[int, NDArray[Any] | None] = dict.fromkeys(rows)
     images.update(zip(rows, pictures.each(rows), strict=False))
     first = next((image for image in images.values() if image is not None), None)
     levels = Levels.of(first) if first is not None else None
-    return MapPictures(images, levels, (pictures.info.width, pictures.info.height), pictures.info)
+    return MapPictures(images, levels, run.picture_size, pictures.info)
 
 
 def maps(
@@ -120,9 +119,7 @@ def statuses(run: RunFolder, row: int, pictures: MapPictures, longest: int) -> H
 
 
 def _picture(image: NDArray[np.uint8], words: str) -> Html:
-    cv2 = load_cv2()
-    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-    text = base64.b64encode(bytes(data)).decode("ascii")
+    text = base64.b64encode(encoded(".jpg", image, _QUALITY)).decode("ascii")
     height, width = image.shape[:2]
     source = f"data:image/jpeg;base64,{text}"
     return Html(f'<img src="{source}" width="{width}" height="{height}" alt="{safe(words)}">')

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from acquire.errors import ConfigError, DataError
+from live.config.new_files import new_file
 
 FORMAT = 1
 DPI = 80
@@ -164,15 +165,8 @@ def save_new(drawn: Any, path: Path) -> None:
     """
     if path.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise ConfigError("{path}: choose a name that ends in .png, .svg or .pdf", path)
-    try:
-        with path.open("xb") as file:
-            drawn.savefig(file, dpi=110, format=path.suffix.lower()[1:])
-    except FileExistsError:
-        raise ConfigError("{path} exists and is not overwritten; choose another name", path) from None
-    except OSError as error:
-        raise DataError(
-            "{path}: cannot be written: {strerror}; look at the folder and the disk", path, error
-        ) from None
+    with new_file(path) as part:
+        drawn.savefig(part, dpi=110, format=path.suffix.lower()[1:])
 
 
 class ProgressBar:

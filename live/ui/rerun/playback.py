@@ -188,22 +188,14 @@ def selected_rows(run: RunFolder, request: ShowRequest) -> tuple[int, ...]:
 
 
 def _bytes_each(run: RunFolder) -> float:
-    width, height = picture_size(run)
+    width, height = run.picture_size
     reduced = max(1, math.ceil(max(width, height) / _MAX_PX))
     return _BYTES_PX * width * height / reduced**2 + _BYTES_ZOI * run.strain.grid.n_active
 
 
-def picture_size(run: RunFolder) -> tuple[int, int]:
-    """Width and height of the pictures, px; without pictures, those that the ZOIs need."""
-    if run.pictures is not None:
-        return run.pictures.info.width, run.pictures.info.height
-    roi = run.strain.grid.roi
-    return 2 * roi.x + roi.width, 2 * roi.y + roi.height
-
-
 def view_setup(run: RunFolder) -> ViewSetup:
     """Settings of the view for ``run``."""
-    width, height = picture_size(run)
+    width, height = run.picture_size
     return ViewSetup(
         title=run.title,
         width=width,

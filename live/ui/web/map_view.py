@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.cv2_loader import load_cv2
+from acquire.cv2_loader import encoded, load_cv2
 from acquire.text import Message
 from analysis.field import Status, ZoiGrid
 from live.config.gauges import complete_gauges, gauge_colours
@@ -63,15 +63,12 @@ def mark_saturated(picture: Bytes, scale: float, image: NDArray[Any], saturation
 
 def as_jpeg(picture: Bytes) -> bytes:
     """(h, w, 3), blue, green, red, or (h, w) grey levels, as the bytes of a file."""
-    cv2 = load_cv2()
-    _, content = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
-    return bytes(content)
+    return encoded(".jpg", picture, QUALITY)
 
 
 def as_png(picture: NDArray[Any]) -> bytes:
     """A picture as the bytes of a file, without loss."""
-    _, content = load_cv2().imencode(".png", picture)
-    return bytes(content)
+    return encoded(".png", picture)
 
 
 def cells_png(cells: Bytes) -> bytes:

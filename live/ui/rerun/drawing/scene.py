@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.cv2_loader import encoded
 from acquire.events import Event, EventKind
 from analysis.field import Status
 from live.pipeline.queues import Thinned
@@ -36,7 +37,6 @@ from live.ui.rerun.drawing.shapes import (
     DIM,
     YELLOW,
     ArrowScale,
-    encode,
     mean_motion,
     reduced,
     region_edges,
@@ -124,7 +124,7 @@ class ViewScene:
             return
         light = self._setup.light
         image, factor = reduced(picture.image, picture.bits, LIGHT_MAX_PX if light else MAX_PX)
-        data = encode(".jpg", image, LIGHT_QUALITY if light else QUALITY)
+        data = encoded(".jpg", image, LIGHT_QUALITY if light else QUALITY)
         self._at(picture.t)
         self._log_due(
             "camera/picture", rr.EncodedImage(contents=data, media_type="image/jpeg", draw_order=-10)
@@ -163,7 +163,7 @@ class ViewScene:
                 name, AutoRange(range_kind(name)).update(values, maps.get(f"sigma_{name}"))
             )
             painted = Painted(scale.colours(values, _ALPHA), scale)
-            data = encode(".png", painted.rgba[..., [2, 1, 0, 3]], 1)
+            data = encoded(".png", painted.rgba[..., [2, 1, 0, 3]], 1)
             picture = rr.EncodedImage(contents=data, media_type="image/png", draw_order=10)
             self._log(f"specimen/map/{name}", picture, static=True)
             self._bar(name, painted, is_static=True)
@@ -241,7 +241,7 @@ class ViewScene:
         import rerun as rr
 
         for name, painted in self._maps.paint(field, names).items():
-            data = encode(".png", painted.rgba[..., [2, 1, 0, 3]], 1)
+            data = encoded(".png", painted.rgba[..., [2, 1, 0, 3]], 1)
             picture = rr.EncodedImage(contents=data, media_type="image/png", draw_order=10)
             self._log_due(f"specimen/map/{name}", picture)
             self._count(data)
@@ -270,7 +270,7 @@ class ViewScene:
         colours = painted.scale.ramp(_RAMP[1])[::-1]
         if painted.scale.is_diverging:
             colours[_RAMP[1] // 2 - 1 : _RAMP[1] // 2 + 1] = 0
-        data = encode(".png", np.repeat(colours[:, None, ::-1], _RAMP[0], axis=1), 1)
+        data = encoded(".png", np.repeat(colours[:, None, ::-1], _RAMP[0], axis=1), 1)
         picture = rr.EncodedImage(contents=data, media_type="image/png")
         self._log(f"bar/{name}/ramp", picture, static=is_static)
         w, h = self._setup.width, self._setup.height
@@ -365,7 +365,7 @@ class ViewScene:
 
         self._due = due
         if due:
-            data = encode(".jpg", paint(shown), FIGURES_QUALITY)
+            data = encoded(".jpg", paint(shown), FIGURES_QUALITY)
             self._at(shown.t)
             self._log_due("figures", rr.EncodedImage(contents=data, media_type="image/jpeg"))
 

@@ -56,14 +56,6 @@ def reduced(image: NDArray[Any], bits: int, max_px: int) -> tuple[NDArray[np.uin
     return image, factor
 
 
-def encode(kind: str, image: NDArray[np.uint8], quality: int) -> bytes:
-    """An image (colours in the order of OpenCV) as a file of ``kind`` ".jpg" or ".png"."""
-    cv2 = load_cv2()
-    flag = cv2.IMWRITE_JPEG_QUALITY if kind == ".jpg" else cv2.IMWRITE_PNG_COMPRESSION
-    _, data = cv2.imencode(kind, image, [flag, quality])
-    return bytes(data)
-
-
 def centres(grid: ZoiGrid) -> Points:
     """(R, C, 2) centres of all ZOIs, px of the viewer."""
     x, y = np.meshgrid(np.asarray(grid.x, np.float64), np.asarray(grid.y, np.float64))

@@ -16,7 +16,7 @@ from acquire.text.printable import printable
 from acquire.text.quantity import Amount
 from live.pipeline.snapshot import Snapshot
 from live.results.finished.readings import Readings
-from live.results.run_folder import open_run
+from live.results.run_folder import RunFolder, open_run
 from live.ui.rerun import playback, view
 from live.ui.rerun.messages import (
     ViewSetup,
@@ -241,7 +241,7 @@ def test_the_settings_and_the_words_of_a_finished_run(tmp_path: Path) -> None:
 
 def test_as_many_instants_as_the_viewer_keeps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_run(make_run(tmp_path, PULLED[:20], session=False)) as run:
-        monkeypatch.setattr(playback, "picture_size", lambda run: (3000, 1000))
+        monkeypatch.setattr(RunFolder, "picture_size", (3000, 1000))
         # A third of the sides is drawn, 0.35 byte a pixel, and 250 bytes a ZOI.
         each = 0.35 * 3000 * 1000 / 9 + 250 * 34
         for limit, every in ((20 * each, 1), (19.9 * each, 2), (10 * each, 2), (9.9 * each, 3)):
