@@ -68,6 +68,17 @@ def other_than_zero(word: str) -> float:
     return number
 
 
+def positive(word: str) -> float:
+    """The finite number above zero that ``word`` is; raises ``NotAllowed``."""
+    try:
+        number = number_of(word, 0)
+    except NotAllowed:
+        number = 0.0
+    if number == 0:
+        raise NotAllowed("a number above 0")
+    return number
+
+
 def yes_or_no(word: str) -> bool:
     """Whether ``word`` says yes; raises ``NotAllowed``."""
     if word.lower() not in TRUE_WORDS + FALSE_WORDS:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from acquire.text import Message
 from live.commands.options import (
     FORCES,
     OF_PICTURES,
+    POSITIVE,
     add_as_measured,
     add_config_file,
     add_help_all,
@@ -25,6 +25,7 @@ from live.commands.options import (
     add_verbose,
     in_picture_order,
     overrides,
+    whole,
 )
 from live.commands.signals import signals
 from live.ui.terminal.screen import TerminalScreen
@@ -40,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", dest="folder", required=True, metavar="DIR", help=words)
     parser.add_argument(
         "--workers",
-        type=int,
+        type=whole(1),
         default=cores(),
         metavar="N",
         help="number of processes (default: one per core)",
@@ -48,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     words = "scheduler of a running Dask cluster instead of --workers: tcp://HOST:PORT (extra cluster)"
     parser.add_argument("--scheduler", metavar="ADDRESS", help=words)
     words = "split longer sessions into chunks of S seconds for several workers (differs by less than 0.005 sigma)"
-    parser.add_argument("--chunk", dest="chunk_s", type=float, metavar="S", help=words)
+    parser.add_argument("--chunk", dest="chunk_s", type=POSITIVE, metavar="S", help=words)
     add_as_measured(parser)
     add_time_span(parser)
     add_config_file(parser)
@@ -67,8 +68,10 @@ def command(arguments: argparse.Namespace) -> int:
     from live.replay.batch.campaign import CampaignRequest, run_campaign
     from live.replay.batch.test_list import find_tests
 
-    if arguments.workers < 1:
-        raise ConfigError("--workers {n} is not possible; allowed: from 1", arguments.workers)
+    if arguments.chunk_s is not None and arguments.as_measured:
+        raise ConfigError(
+            "--as-measured is bit-identical to the live run and chunks are not; leave --chunk out"
+        )
     request = CampaignRequest(
         tests=[
             replace(test, source=in_picture_order(test.source, arguments.picture_order))
@@ -82,7 +85,7 @@ def command(arguments: argparse.Namespace) -> int:
         start_s=arguments.start_s,
         end_s=arguments.end_s,
         as_measured=arguments.as_measured,
-        chunk_s=_chunk_s(arguments),
+        chunk_s=arguments.chunk_s,
         scheduler=arguments.scheduler,
     )
     screen, stopping = TerminalScreen(), threading.Event()
@@ -97,14 +100,3 @@ def command(arguments: argparse.Namespace) -> int:
             Message("exit code 130: interrupted; finished tests are kept, the same call does the rest")
         )
     return done.exit_code
-
-
-def _chunk_s(arguments: argparse.Namespace) -> float | None:
-    chunk_s: float | None = arguments.chunk_s
-    if chunk_s is not None and not (math.isfinite(chunk_s) and chunk_s > 0):
-        raise ConfigError("--chunk {seconds} is not possible; allowed: seconds above 0", chunk_s)
-    if chunk_s is not None and arguments.as_measured:
-        raise ConfigError(
-            "--as-measured is bit-identical to the live run and chunks are not; leave --chunk out"
-        )
-    return chunk_s

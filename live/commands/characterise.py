@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from acquire.errors import ConfigError, DataError
+from acquire.errors import ConfigError
+from live.commands.options import POSITIVE, number, whole
+from live.config.new_files import made_folder
 from live.pipeline.reference import on_fit_machine
 
 
@@ -18,14 +20,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="about a minute, with fewer ZOIs and cases")
     parser.add_argument("--page", metavar="FILE", help="where the page goes (default DIR/pattern.md)")
     parser.add_argument(
-        "--noise", type=float, metavar="GL", help="noise of one frame (default: from its spectrum)"
+        "--noise", type=number(0), metavar="GL", help="noise of one frame (default: from its spectrum)"
     )
     parser.add_argument(
-        "--burst", type=int, metavar="N", help="frames averaged in a test (default: 1, 4, 16, 64)"
+        "--burst", type=whole(1), metavar="N", help="frames averaged in a test (default: 1, 4, 16, 64)"
     )
     parser.add_argument("--roi", metavar="X,Y,W,H", help="part of the picture, px")
     parser.add_argument(
-        "--target", type=float, default=100.0, metavar="UM/M", help="wanted strain noise (default 100)"
+        "--target", type=POSITIVE, default=100.0, metavar="UM/M", help="wanted strain noise (default 100)"
     )
 
 
@@ -51,12 +53,3 @@ def command(arguments: argparse.Namespace) -> int:
     figure(1, 1)  # a missing matplotlib ends the command before the work
     with on_fit_machine():
         return characterise_pattern(arguments, made_folder(Path(arguments.out)))
-
-
-def made_folder(folder: Path) -> Path:
-    """The folder, made where it is not there; raises DataError."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DataError("{folder} cannot be made: {why}; give another --out", folder, error) from error
-    return folder

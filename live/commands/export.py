@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 
 from acquire.errors import ConfigError
 from acquire.text import Message
-from live.commands.options import add_gauge_option, add_gauges
+from live.commands.options import POSITIVE, add_gauge_option, add_gauges, number
 from live.results.export.formats import FORMATS, ExportRequest, export
 from live.results.export.job import ExportOptions
 from live.results.quantities import Display
@@ -39,8 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_gauge_option(parser)
     add_display(parser)
     films = parser.add_argument_group("pictures and films")
-    films.add_argument("--fps", type=float, metavar="N", help="instants per second of film (default 10)")
-    films.add_argument("--limit", type=float, help="colour range -LIMIT to LIMIT (default: automatic)")
+    films.add_argument(
+        "--fps", type=number(0.1, 240), metavar="N", help="instants per second of film (default 10)"
+    )
+    films.add_argument("--limit", type=POSITIVE, help="colour range -LIMIT to LIMIT (default: automatic)")
     films.add_argument("--no-picture", action="store_true", help="maps on plain grey")
 
 
@@ -74,11 +75,6 @@ def display_of(arguments: argparse.Namespace, stored: float | None = None) -> Di
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic export``."""
     _refuse_without_effect(arguments)
-    arguments.fps = FPS if arguments.fps is None else arguments.fps
-    if not 0.1 <= arguments.fps <= 240:
-        raise ConfigError("--fps {fps:g} is not possible; give 0.1 to 240", arguments.fps)
-    if arguments.limit is not None and not 0 < arguments.limit < math.inf:
-        raise ConfigError("--limit {limit:g} is not possible; give a number above 0", arguments.limit)
     screen = TerminalScreen()
     with open_run(arguments.run) as run:
         if arguments.more_gauges:
@@ -109,5 +105,7 @@ def _request(arguments: argparse.Namespace, run: RunFolder) -> ExportRequest:
         arguments.start_s,
         arguments.end_s,
         display_of(arguments, run.mm_per_px),
-        ExportOptions(arguments.layout or "long", arguments.fps, arguments.limit, not arguments.no_picture),
+        ExportOptions(
+            arguments.layout or "long", arguments.fps or FPS, arguments.limit, not arguments.no_picture
+        ),
     )

@@ -9,6 +9,7 @@ Gauges that are added to a finished run, read from its stored maps (``--gauges``
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from acquire.addresses import parse_address, with_setting
+from acquire.bounds import NotAllowed, integer_of, number_of, positive
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError
 from acquire.text import Message
@@ -75,6 +77,30 @@ def _reader(read: Any) -> Any:
             raise bad_value("{text}", text) from None
 
     return reader
+
+
+def number(low: float = -math.inf, high: float = math.inf) -> Any:
+    """What reads an option that is a finite number within bounds."""
+    return _bounded(lambda word: number_of(word, low, high))
+
+
+def whole(low: float = -math.inf, high: float = math.inf) -> Any:
+    """What reads an option that is a whole number within bounds."""
+    return _bounded(lambda word: integer_of(word, low, high))
+
+
+def _bounded(read: Any) -> Any:
+    def reader(word: str) -> Any:
+        try:
+            return read(word)
+        except NotAllowed as allowed:
+            raise bad_value("{given}: give {kind}", repr(word), allowed.text) from None
+
+    return reader
+
+
+POSITIVE = _bounded(positive)
+"""What reads an option that is a number above 0."""
 
 
 class _Order(argparse.Action):
@@ -154,8 +180,8 @@ def add_metadata(parser: argparse.ArgumentParser) -> None:
 
 def add_time_span(parser: argparse.ArgumentParser) -> None:
     """Add --from and --to."""
-    parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin at this time, s")
-    parser.add_argument("--to", dest="end_s", type=float, metavar="S", help="end at this time, s")
+    parser.add_argument("--from", dest="start_s", type=number(0), metavar="S", help="begin at this time, s")
+    parser.add_argument("--to", dest="end_s", type=number(0), metavar="S", help="end at this time, s")
 
 
 def add_as_measured(parser: argparse.ArgumentParser) -> None:

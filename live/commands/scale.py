@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 from acquire.errors import ConfigError
 from acquire.text import Message
 from acquire.text.quantity import Amount
-from live.commands.options import add_options, add_verbose, configured
+from live.commands.options import POSITIVE, add_options, add_verbose, configured, number
 from live.config.loading import Config
 from live.config.rig_file import write_rig
 from live.config.values import AUTO, Number, numbers_of
@@ -31,21 +30,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, "picture", "camera", "crop", "roi", "mask", "axis")
     how = parser.add_argument_group("method, one of these")
     how.add_argument("--points", metavar="X1,Y1,X2,Y2", help="two points in px, with --length")
-    how.add_argument("--length", type=float, metavar="MM", help="distance between the two points")
+    how.add_argument("--length", type=POSITIVE, metavar="MM", help="distance between the two points")
     add_board(how)
     how.add_argument(
-        "--width", type=float, nargs="?", const=WIDTH_OF_RIG, metavar="MM",
+        "--width", type=POSITIVE, nargs="?", const=WIDTH_OF_RIG, metavar="MM",
         help="width of the specimen, which is found in the picture (default: width_mm of the rig file)",
     )  # fmt: skip
     parser.add_argument(
         "--sigma",
-        type=float,
+        type=number(0),
         default=0.0,
         metavar="MM",
         help="standard uncertainty of the length, the width or the board (default 0)",
     )
     parser.add_argument(
-        "--stand-off", type=float, metavar="MM", help="distance from the camera to the specimen"
+        "--stand-off", type=POSITIVE, metavar="MM", help="distance from the camera to the specimen"
     )
     add_verbose(parser)
 
@@ -56,8 +55,8 @@ def add_board(group: Any) -> None:
     group.add_argument("--checkerboard", metavar="CxR", help=words)
     words = "board with columns x rows of squares, with --square, --marker, --dictionary"
     group.add_argument("--charuco", metavar="CxR", help=words)
-    group.add_argument("--square", type=float, metavar="MM", help="side of a square of the board")
-    group.add_argument("--marker", type=float, metavar="MM", help="side of a marker of a ChArUco board")
+    group.add_argument("--square", type=POSITIVE, metavar="MM", help="side of a square of the board")
+    group.add_argument("--marker", type=POSITIVE, metavar="MM", help="side of a marker of a ChArUco board")
     words = "its dictionary of markers (default 4X4_50)"
     group.add_argument("--dictionary", default="4X4_50", metavar="NAME", help=words)
 
@@ -91,18 +90,6 @@ def _check(arguments: argparse.Namespace) -> None:
         raise ConfigError(
             "give one of {options}, not {n} of them", ", ".join(f"--{way}" for way in ways), len(given)
         )
-    for name, low in (
-        ("length", 0.0),
-        ("square", 0.0),
-        ("marker", 0.0),
-        ("stand_off", 0.0),
-        ("sigma", -1e-300),
-    ):
-        value = getattr(arguments, name)
-        if value is not None and not low < value < math.inf:
-            raise ConfigError(
-                "--{name} {value:g} is not possible; give mm above 0", name.replace("_", "-"), value
-            )
 
 
 def _scale(arguments: argparse.Namespace, config: Config, stand_off: float | None, screen: Screen) -> Scale:
@@ -116,7 +103,7 @@ def _scale(arguments: argparse.Namespace, config: Config, stand_off: float | Non
     if board is not None:
         return from_board(first.picture, board, arguments.sigma, stand_off)
     width = config.specimen.width_mm if arguments.width == WIDTH_OF_RIG else arguments.width
-    if width is None or not 0 < width < math.inf:
+    if width is None:
         raise ConfigError(
             "--width: give the width of the specimen in mm, or specimen.width_mm in the rig file"
         )

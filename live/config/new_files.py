@@ -25,6 +25,15 @@ def check_free(*paths: Path) -> None:
             raise ConfigError("{path} exists already and is not overwritten; choose another name", path)
 
 
+def made_folder(folder: Path) -> Path:
+    """The folder, made where it is not there; raises ConfigError where that cannot be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError("{folder}: cannot be made ({why}); choose another --out", folder, error) from None
+    return folder
+
+
 @contextlib.contextmanager
 def new_file(path: Path) -> Iterator[Path]:
     """A path beside ``path`` to write to; it is renamed to ``path`` at the end, and removed after an error.

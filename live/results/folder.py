@@ -18,7 +18,7 @@ from acquire.frame import Burst
 from acquire.text import Message
 from acquire.text.printable import printable
 from live import VERSION
-from live.config.new_files import free_name
+from live.config.new_files import free_name, made_folder
 from live.pipeline.measure import NewReference
 from live.pipeline.run_state import RunState
 
@@ -112,13 +112,7 @@ def make_folder(wanted: str | None, now: datetime.datetime) -> Path:
     """
     runs = Path("runs")
     own = free_name(now.strftime("%Y%m%dT%H%M%SZ"), lambda name: (runs / name).exists())
-    folder = Path(wanted) if wanted else runs / own
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(
-            "{folder}: cannot be made ({strerror}); choose another --out", folder, error
-        ) from None
+    folder = made_folder(Path(wanted) if wanted else runs / own)
     _check_free(folder)
     return folder
 

@@ -17,6 +17,7 @@ from live.cli import main
 from live.commands.demo import ZoiTruth
 from live.results.response.stored import StoredResponse
 from live.results.run_folder import RunFolder, open_run
+from tests.live.ended import code_of
 
 KINDS = ("uniform", "woven", "hole", "halves")
 SIM = "sim:{}?width=208&height=272&seconds=20&fps=20&bits=12&noise=0.1&hole=24&cell=64&lockstep=yes"
@@ -191,10 +192,7 @@ def test_a_channel_that_is_not_there_is_refused_before_anything_is_written(
 ) -> None:
     out = tmp_path / "out"
     source = f"files:{shots}/*.tif?bits=12"
-    try:
-        code = main(["replay", source, *more, "--roi", "all", "--zoi", "32", *QUIET, "--out", str(out)])
-    except SystemExit as ended:  # of argparse
-        code = int(ended.code or 0)
+    code = code_of(["replay", source, *more, "--roi", "all", "--zoi", "32", *QUIET, "--out", str(out)])
     assert code == 2 and words in capsys.readouterr().err
     assert not out.exists()
 

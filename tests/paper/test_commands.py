@@ -140,9 +140,9 @@ def test_ones_own_pattern(tmp_path: Path, picture: Path) -> None:
     [
         (["--pattern", "none.png"], DataError, "none.png"),
         ([], ConfigError, "give a picture of your pattern, --pattern FILE; in a checkout make paper"),
-        (["--pattern", "mine.png", "--noise", "-1"], ConfigError, "--noise"),
-        (["--pattern", "mine.png", "--burst", "0"], ConfigError, "--burst"),
-        (["--pattern", "mine.png", "--target", "0"], ConfigError, "--target"),
+        (["--pattern", "mine.png", "--noise", "-1"], SystemExit, "2"),
+        (["--pattern", "mine.png", "--burst", "0"], SystemExit, "2"),
+        (["--pattern", "mine.png", "--target", "0"], SystemExit, "2"),
         (["--pattern", "mine.png", "--roi", "0,0,900,9"], ConfigError, "leaves the picture"),
         (["--pattern", "mine.png", "--roi", "a"], ConfigError, "four whole numbers"),
         (["--pattern", "mine.png", "--roi", "0,0,20,20"], DataError, "too few"),

@@ -20,7 +20,7 @@ from acquire.errors import EXIT_INTERRUPTED, LOSS, ConfigError, DataError, Phase
 from acquire.text import Message
 from acquire.text.printable import counted
 from live.config.loading import load_config
-from live.config.new_files import replaced_file
+from live.config.new_files import made_folder, replaced_file
 from live.pipeline.consumer import Screen
 from live.replay.batch.cluster import Cluster, check_scheduler
 from live.replay.batch.keys import key_of, longest_first
@@ -153,7 +153,7 @@ def run_campaign(wanted: CampaignRequest, screen: Screen, stopping: threading.Ev
     load_config(Path(wanted.config) if wanted.config else None, wanted.overrides)
     if wanted.scheduler is not None:
         check_scheduler(wanted.scheduler)
-    _make(wanted.out)
+    made_folder(wanted.out)
     with closing(_processes(wanted)) as processes:
         rows, tasks = _planned(wanted)
         _sweep(wanted.out, rows, tasks)
@@ -194,13 +194,6 @@ def _sweep(out: Path, rows: Mapping[str, BatchRow], tasks: Sequence[Task]) -> No
     sweep(out)
     sweep_done(out, done)
     sweep_chunks(out, done, {task.name: task for task in tasks})
-
-
-def _make(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError("{folder}: cannot be made ({why}); choose another --out", out, error) from None
 
 
 def _planned(wanted: CampaignRequest) -> tuple[dict[str, BatchRow], list[Task]]:

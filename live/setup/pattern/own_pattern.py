@@ -56,14 +56,6 @@ def characterise_pattern(arguments: argparse.Namespace, folder: Path) -> int:
         A file that is not a picture, or one without a pattern.
     """
     picture, bits = _picture(Path(arguments.pattern), arguments.roi)
-    if arguments.noise is not None and not arguments.noise >= 0:
-        raise ConfigError(
-            "--noise {given}: give a standard deviation in grey levels, 0 or more", arguments.noise
-        )
-    if arguments.burst is not None and arguments.burst < 1:
-        raise ConfigError("--burst {given}: give 1 or more frames", arguments.burst)
-    if not arguments.target > 0:
-        raise ConfigError("--target {given}: give a strain noise in um/m above 0", arguments.target)
     progress, begin = ProgressBar(told(Message("pattern")), sys.stderr), time.monotonic()
     context = ExperimentContext(folder, arguments.quick, None, progress)
     outcome = pattern(context, picture, bits, arguments.noise, arguments.burst, arguments.target * 1e-6)

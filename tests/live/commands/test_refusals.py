@@ -24,6 +24,7 @@ from live.results.report import saving
 from live.results.report.svg import Plot, PlotLine
 from live.ui.terminal.screen import TerminalScreen
 from tests.adversary.test_terminal import HOSTILE
+from tests.live.ended import code_of
 from tests.live.made_run import make_run
 
 ROOT = Path(__file__).parents[3]
@@ -32,10 +33,7 @@ ROOT = Path(__file__).parents[3]
 def refused(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str]:
     """Exit code and message of a command that must not end with a traceback."""
     capsys.readouterr()
-    try:
-        code = main(list(words))
-    except SystemExit as ended:
-        code = int(ended.code or 0)
+    code = code_of(list(words))
     said = "".join(capsys.readouterr())
     assert "Traceback" not in said and "please report it" not in said, said
     return code, said

@@ -24,6 +24,7 @@ from live.replay.replay import replay
 from live.replay.source import ReplayRequest
 from live.results import Strain
 from live.ui.terminal.screen import TerminalScreen
+from tests.live.ended import code_of
 
 SHAPE = (128, 160)
 STRAINS = (0.0, 0.001, 0.002, 0.003, 0.004, 0.005)
@@ -75,11 +76,11 @@ def test_a_reference_of_ones_own(
         (["--reference", "PIPE"], 4, "it is a pipe"),
         (["--reference", "DEEP"], 4, "the reference has 16-bit samples"),
         (["--reference", "SMALL"], 4, "the reference has 20 x 10 px"),
-        (["--from", "nan"], 2, "--from nan is not possible"),
-        (["--to", "nan"], 2, "--to nan is not possible"),
-        (["--from", "inf"], 2, "--from inf is not possible"),
-        (["--to", "-5"], 2, "--to -5.0 is not possible"),
-        (["--from", "-5"], 2, "--from -5.0 is not possible"),
+        (["--from", "nan"], 2, "--from: 'nan': give a number from 0"),
+        (["--to", "nan"], 2, "--to: 'nan': give a number from 0"),
+        (["--from", "inf"], 2, "--from: 'inf': give a number from 0"),
+        (["--to", "-5"], 2, "--to: '-5': give a number from 0"),
+        (["--from", "-5"], 2, "--from: '-5': give a number from 0"),
         (["--from", "3", "--to", "2"], 2, "--from 3.0 must be before --to 2.0"),
         (["--from", "1000"], 4, "the last one is at 5.000 s"),
         (["--burst", "200"], 4, "no whole burst follows"),
@@ -94,7 +95,7 @@ def test_what_is_refused(
     (tmp_path / "SMALL").write_bytes(cv2.imencode(".png", np.zeros((10, 20), np.uint8))[1].tobytes())
     more = [str(tmp_path / word) if word.isupper() else word for word in more]
     path = str(request.getfixturevalue(source))
-    assert main(["replay", path, *SMALL, "--out", str(tmp_path / "out"), *more]) == code
+    assert code_of(["replay", path, *SMALL, "--out", str(tmp_path / "out"), *more]) == code
     assert says in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 

@@ -57,14 +57,13 @@ def test_new_references_pass_whatever_the_part_is() -> None:
     assert list(part(1.0, 2.0).part(items[:1])) == items[:1]
 
 
-@pytest.mark.parametrize(("start", "end", "good"), [(0.0, 1.0, True), (1.0, 1.0, False), (2.0, 1.0, False),
-                                                    (-0.1, None, False), (None, math.inf, False)])  # fmt: skip
+@pytest.mark.parametrize(("start", "end", "good"), [(0.0, 1.0, True), (1.0, 1.0, False), (2.0, 1.0, False)])
 def test_a_part_begins_before_it_ends(start: float | None, end: float | None, good: bool) -> None:
     request = replace(REQUEST, start_s=start, end_s=end)
     if good:
         check_window(request)
     else:
-        with pytest.raises(ConfigError, match=r"--(from|to) "):
+        with pytest.raises(ConfigError, match=r"--from .* must be before --to "):
             check_window(request)
 
 

@@ -30,6 +30,7 @@ from live.setup.scale import (
     from_width,
     specimen_width,
 )
+from tests.live.ended import code_of
 from tests.live.made_run import CONFIG, make_run
 
 CHECKER = Board(9, 6, 5.0)
@@ -152,7 +153,7 @@ def test_the_rig_file_gets_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         (["--points", "1,2,3"], 2, "give 4 numbers, as 12,30"),
         (["--points", "1,2,nan,9", "--length", "3"], 2, "give 4 numbers"),
         (["--points", "1,2,30,4"], 2, "--length MM is needed"),
-        (["--points", "1,2,30,4", "--length", "-1"], 2, "--length -1 is not possible"),
+        (["--points", "1,2,30,4", "--length", "-1"], 2, "--length: '-1': give a number above 0"),
         (["--width", "--camera", "sim:"], 2, "give the width of the specimen"),
         (["--width", "10"], 2, "no camera is given"),
         (["--checkerboard", "9by6", "--camera", "sim:uniform"], 2, "give 2 numbers, as 9x6"),
@@ -168,7 +169,7 @@ def test_the_rig_file_gets_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 def test_what_cannot_be(
     capsys: pytest.CaptureFixture[str], arguments: list[str], code: int, message: str
 ) -> None:
-    assert main(["scale", *arguments]) == code
+    assert code_of(["scale", *arguments]) == code
     assert message in capsys.readouterr().err
 
 

@@ -16,6 +16,7 @@ from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
 from live.results import Strain
+from tests.live.ended import code_of
 from tests.live.made_run import session_writer
 from tests.live.made_up import START, make_frame
 from tests.live.replay.batch.running import is_gone, parts, pid_of, rows, started
@@ -143,15 +144,15 @@ def test_a_renewed_reference_is_not_cut(
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["--chunk", "0"], "--chunk 0.0 is not possible"),
-        (["--chunk", "nan"], "--chunk nan is not possible"),
+        (["--chunk", "0"], "--chunk: '0': give a number above 0"),
+        (["--chunk", "nan"], "--chunk: 'nan': give a number above 0"),
         (["--chunk", "9", "--as-measured"], "leave --chunk out"),
     ],
 )
 def test_what_is_refused(
     long: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], says: str
 ) -> None:
-    assert main(["batch", str(long), *words, "--out", str(tmp_path / "out")]) == 2
+    assert code_of(["batch", str(long), *words, "--out", str(tmp_path / "out")]) == 2
     assert says in capsys.readouterr().err
 
 

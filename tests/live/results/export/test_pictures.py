@@ -22,6 +22,7 @@ from live.results.maps.scale import ColourScale
 from live.results.quantities import Display
 from live.results.run_folder import open_run
 from live.ui.terminal.screen import TerminalScreen
+from tests.live.ended import code_of
 from tests.live.made_run import make_run
 from tests.live.made_up import make_grid
 
@@ -149,14 +150,14 @@ def test_nothing_is_overwritten(
         (2, "--mm needs the scale", ["--mm"]),
         (2, "has no effect without --mm", ["--scale", "0.1"]),
         (2, "mm/px is not possible", ["--mm", "--scale", "-1"]),
-        (2, "--fps 0 is not possible", ["--to", "gif", "--fps", "0"]),
+        (2, "--fps: '0': give a number from 0.1 to 240", ["--to", "gif", "--fps", "0"]),
         (2, ".mp4 or .webm", ["--to", "mp4", "--out", "film.avi"]),
     ],
 )
 def test_arguments(
     run_dir: Path, capsys: pytest.CaptureFixture[str], code: int, message: str, arguments: list[str]
 ) -> None:
-    assert main(["export", str(run_dir), "--to", "csv", *arguments]) == code
+    assert code_of(["export", str(run_dir), "--to", "csv", *arguments]) == code
     assert message in capsys.readouterr().err
 
 

@@ -16,6 +16,7 @@ from live.results.run_folder import RunFolder, open_run
 from live.ui.rerun.messages import events_of, field_of, picture_of, rows_of
 from live.ui.rerun.playback import ShowRequest, playback_messages, selected_rows, show, view_setup
 from live.ui.rerun.wire import Kind
+from tests.live.ended import code_of
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
 
 chunk = pytest.importorskip("rerun.chunk")
@@ -145,15 +146,15 @@ def test_a_long_run_is_thinned_to_what_the_viewer_keeps(
     ("more", "code", "says"),
     [
         (["--from", "100"], 2, "no measurement between 100 and inf s"),
-        (["--every", "0"], 2, "--every 0 is not possible"),
-        (["--port", "80"], 2, "--port 80 is not possible"),
+        (["--every", "0"], 2, "--every: '0': give a whole number from 1"),
+        (["--port", "80"], 2, "--port: '80': give a whole number from 1024 to 65535"),
         (["--rrd", "{folder}/strain.h5"], 2, "exists already and is not overwritten"),
     ],
 )
 def test_refusals(
     folder: Path, capsys: pytest.CaptureFixture[str], more: list[str], code: int, says: str
 ) -> None:
-    assert main(["show", str(folder), *(word.format(folder=folder) for word in more)]) == code
+    assert code_of(["show", str(folder), *(word.format(folder=folder) for word in more)]) == code
     assert says in capsys.readouterr().err
 
 
