@@ -141,7 +141,7 @@ class Accumulator(ABC, Generic[Made]):
         DataError
             The picture is of another size or depth than the one before.
         """
-        if self._gap_before(frame):
+        if self._times and (frame.lost_before > 0 or frame.index != self._last + 1):
             self._start_anew()
         self._lost += frame.lost_before
         if frame.damaged or frame.t < self._not_before:
@@ -161,9 +161,6 @@ class Accumulator(ABC, Generic[Made]):
         made = self._single(frame) if self._sums is None else self._finished(self._sums, frame)
         self._times, self._sums, self._lost = [], None, 0
         return made
-
-    def _gap_before(self, frame: Frame) -> bool:
-        return bool(self._times) and (frame.lost_before > 0 or frame.index != self._last + 1)
 
     def _start_anew(self) -> None:
         self._times, self._sums = [], None

@@ -65,10 +65,6 @@ class PixelFormat:
         ]
 
 
-def _bayer(fourcc: str, order: str, bits: int) -> PixelFormat:
-    return PixelFormat(fourcc, bits, "bayer", 1 if bits == 8 else 2, order)
-
-
 _ORDERS = ("BGGR", "GBRG", "GRBG", "RGGB")
 _BAYER = {
     8: ("BA81", "GBRG", "GRBG", "RGGB"),
@@ -89,7 +85,7 @@ FORMATS: dict[str, PixelFormat] = {
         PixelFormat("YUYV", 8, "luma", 2, "0"),
         PixelFormat("UYVY", 8, "luma", 2, "1"),
         *(
-            _bayer(code, order, bits)
+            PixelFormat(code, bits, "bayer", 1 if bits == 8 else 2, order)
             for bits in _BAYER
             for code, order in zip(_BAYER[bits], _ORDERS, strict=True)
         ),

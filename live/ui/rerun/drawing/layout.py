@@ -123,7 +123,7 @@ def blueprint(setup: ViewSetup) -> Any:
             *([] if setup.finished else [_large_figures()]),
             _middle(setup),
             _below(setup),
-            row_shares=_rows(setup),
+            row_shares=ROWS[1:] if setup.finished else ROWS,
         ),
         rrb.TimePanel(
             state="collapsed", timeline="time", play_state="paused" if setup.finished else "following"
@@ -133,10 +133,6 @@ def blueprint(setup: ViewSetup) -> Any:
         auto_views=False,
         auto_layout=False,
     )
-
-
-def _rows(setup: ViewSetup) -> list[float]:
-    return ROWS[1:] if setup.finished else ROWS
 
 
 def _large_figures() -> Any:
