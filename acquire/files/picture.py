@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import LOG_WARNING, load_cv2, log_settings
 from acquire.errors import DataError
-from acquire.files.tiff import UNREADABLE, tiff_pages
+from acquire.files.headers import UNREADABLE, tiff_pages
 from acquire.text import Message
 
 MAX_BYTES = 2**31 - 1

@@ -25,10 +25,9 @@ from acquire.addresses import Address
 from acquire.camera import CameraBase
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import EventSink, device_event, ignore_event
-from acquire.files.jpeg import quantisation
+from acquire.files.headers import full_pages, quantisation, tiff_pages
 from acquire.files.order import AUTO, BY, in_order, listed, masks
 from acquire.files.picture import LOSSY, Source, check_regular, picture_source, read_bytes, read_picture_page
-from acquire.files.tiff import full_pages, tiff_pages
 from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, to_gray
 from acquire.opencv.image_metadata import read_stamps, taken_times

@@ -19,7 +19,7 @@ from acquire.camera import CameraBase
 from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
 from acquire.events import EventSink, device_event
-from acquire.files.jpeg import quantisation
+from acquire.files.headers import quantisation
 from acquire.files.picture import check_regular, is_utf8
 from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray

@@ -17,7 +17,7 @@ from acquire.addresses import parse_address
 from acquire.camera.opening import open_camera
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Event
-from acquire.files.tiff import full_pages
+from acquire.files.headers import full_pages
 from acquire.opencv import images
 from acquire.opencv.gray import to_gray
 from acquire.opencv.image_metadata import read_stamps

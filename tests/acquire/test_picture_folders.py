@@ -16,8 +16,7 @@ from acquire.addresses import parse_address
 from acquire.camera.opening import open_camera
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event
-from acquire.files.jpeg import quantisation
-from acquire.files.tiff import full_pages
+from acquire.files.headers import full_pages, quantisation
 from acquire.frame import QUANTISATION
 from acquire.opencv.image_metadata import taken_times
 from acquire.opencv.images import find_images, picture_names, picture_times

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquire.files.jpeg import quantisation
+from acquire.files.headers import quantisation
 from analysis import PhaseKernel, Roi, ZoiGrid
 from analysis.field import Status
 from analysis.picture.pattern import hidden_noise, noise_of_picture
