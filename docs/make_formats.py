@@ -25,7 +25,7 @@ from live.config.figures import FIGURES, columns
 from live.results.finished.cycles import COLUMNS as CYCLES
 from live.results.quantities import quantity_of
 from live.results.response import stored
-from live.results.strain_csv import COLUMNS
+from live.results.writer import COLUMNS
 from live.setup.devices import camera_settings, load_settings
 
 DOCS = Path(__file__).parent

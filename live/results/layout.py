@@ -14,7 +14,7 @@ from analysis.field import Status
 from live.config.figures import FIGURES, columns
 from live.results.quantities import quantity_of
 from live.results.row import BLUR, GRADIENTS, STRAINS, gauge_columns
-from live.results.strain_csv import COLUMNS
+from live.results.writer import COLUMNS
 
 FORMAT, FORMAT_VERSION = "phasedic-strain", 1
 PLAIN_MAPS = ("u", "v", *GRADIENTS, *STRAINS)

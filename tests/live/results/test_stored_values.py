@@ -26,8 +26,8 @@ from live.results.__main__ import main as probed
 from live.results.quantities import Display
 from live.results.row import StrainRow, gauge_columns
 from live.results.stored_fields import length_between, read_field
-from live.results.strain_csv import CsvWriter
 from live.results.strain_h5 import StrainWriter, normal_matrices
+from live.results.writer import CsvWriter
 from tests.clock import Clock
 from tests.live.made_up import CAMERA, START, make_grid, make_measurement
 

@@ -29,8 +29,8 @@ from live.results import Results, ResultsInfo, Strain
 from live.results.layout import MAPS, PLAIN_MAPS
 from live.results.row import StrainRow, maps_of
 from live.results.stored_fields import read_field
-from live.results.strain_csv import COLUMNS
 from live.results.strain_h5 import FLUSH_S, StrainWriter, rounded
+from live.results.writer import COLUMNS
 from tests.acquire.session.fixtures import writer
 from tests.clock import Clock
 from tests.live.made_up import CAMERA, START, make_grid, make_measurement
