@@ -19,7 +19,6 @@ from live.pipeline.timed.figure import OLD_S
 from live.pipeline.timed.force_watch import with_force_watch
 from live.results.finished.figures_file import finished
 from live.results.finished.finished_test import reference_force
-from live.run.camera_source import CameraSource, GrabPlan
 from live.run.control import ControlRefused
 from live.run.incoming_bursts import TAKING, IncomingBursts
 from live.run.measurer import Measurer
@@ -28,6 +27,7 @@ from live.run.prepared_run import PreparedRun
 from live.run.recording.cycle_pictures import CyclePictures
 from live.run.recording.pre_trigger import PreTriggerBuffer
 from live.run.recording.recorder import open_recording
+from live.run.sources import CameraSource, GrabPlan
 from live.setup.devices import Rig
 from live.stream.adapted import Outputs
 from live.stream.stream import Record, ReferenceWanted, StateKeeper, Stream, Subscriber, Waiting

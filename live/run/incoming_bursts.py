@@ -13,7 +13,7 @@ from live.pipeline.measure import NewReference
 from live.pipeline.queues import LatestQueue
 from live.pipeline.reference import ReferenceBurst
 from live.pipeline.run_state import FrameCounts
-from live.run.camera_source import LATE_S, GrabPlan, held_at_first, held_bursts, memory_of_measured
+from live.run.sources import LATE_S, GrabPlan, held_at_first, held_bursts, memory_of_measured
 from live.stream.stream import CameraEnded, Record, ReferenceWanted, Stream, Subscriber, Waiting
 
 POLL_S = 0.2

@@ -26,9 +26,9 @@ from live.results.folder import make_folder
 from live.results.writer import write_results
 from live.run.camera_run import CameraRun
 from live.run.control import ControlRefused, TareControl
-from live.run.load_source import LoadSource
 from live.run.outcome import Outcome, OutcomeOfTest, StopSignal
 from live.run.prepared_run import PreparedRun, new_run_state, set_up
+from live.run.sources import LoadSource
 from live.setup.devices import Rig, open_rigs
 from live.stream.stream import Stream
 

@@ -34,9 +34,9 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.reference import ReferenceBurst, ReferenceTaker
 from live.pipeline.run_state import FrameCounts, RunState
 from live.run import live_run as live_module
-from live.run.camera_source import CameraSource, GrabPlan
 from live.run.live_run import run_live
 from live.run.outcome import Outcome
+from live.run.sources import CameraSource, GrabPlan
 from live.stream.stream import Stream
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.fakes import ListCamera, frame
@@ -128,7 +128,7 @@ def test_a_gap_that_is_open_at_the_end_is_counted(
 ) -> None:
     """The last frame came 7 s before the end, of a camera with 10 frames a second."""
     now = [100.0]
-    monkeypatch.setattr("live.run.camera_source.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("live.run.sources.time.monotonic", lambda: now[0])
     camera = ListCamera((frame(i) for i in range(4)), live=live)
     camera.info = replace(camera.info, fps=10.0)
     run_state, stream = RunState.new(0.5), Stream()

@@ -10,7 +10,7 @@ import pytest
 
 from acquire.frame import Frame
 from live.pipeline.run_state import RunState
-from live.run.camera_source import CameraSource, GrabPlan
+from live.run.sources import CameraSource, GrabPlan
 from tests.live.fakes import ListCamera, frame
 from tests.live.streaming import KeptState, Noted
 

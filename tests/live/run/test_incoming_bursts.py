@@ -11,8 +11,8 @@ from acquire.frame import Burst, Frame
 from live.pipeline.measure import NewReference
 from live.pipeline.reference import ReferenceBurst, ReferenceTaker
 from live.pipeline.run_state import FrameCounts
-from live.run.camera_source import CameraSource, GrabPlan
 from live.run.incoming_bursts import TAKING, IncomingBursts
+from live.run.sources import CameraSource, GrabPlan
 from live.stream.stream import CameraEnded, ReferenceWanted, Stream, Waiting
 from tests.live.fakes import ListCamera, frame
 from tests.live.streaming import KeptState, Noted, record_of

@@ -10,7 +10,7 @@ import pytest
 from acquire.errors import DeviceError
 from acquire.load_cell.contract import NoLoadCell
 from acquire.load_sample import LoadSample
-from live.run.load_source import LoadSource
+from live.run.sources import LoadSource
 from tests.live.streaming import KeptState
 from tests.live.ui.waiting import LONG_S
 

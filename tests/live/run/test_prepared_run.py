@@ -16,8 +16,8 @@ from acquire.load_sample import LoadSample
 from live.config.loading import load_config
 from live.pipeline.event_log import EventLog
 from live.run import prepared_run
-from live.run.camera_source import GrabPlan, _bytes_a_pixel, held_at_first, held_bursts
 from live.run.prepared_run import PreparedRun, _burst_lengths, _device_names, _time_zero, new_run_state
+from live.run.sources import GrabPlan, _bytes_a_pixel, held_at_first, held_bursts
 from tests.live.fakes import ListCamera, frame
 
 

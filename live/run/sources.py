@@ -19,14 +19,60 @@ from acquire.camera import Camera, missing_at_end
 from acquire.errors import PhasedicError
 from acquire.events import EventKind, RateLimiter
 from acquire.frame import Burst, CameraInfo, Frame, frozen
+from acquire.load_cell import LoadCell
+from acquire.system import lower_priority
 from acquire.text import Message
 from acquire.text.printable import counted
 from live.config.loading import Config
+from live.pipeline.latency import LOAD
 from live.pipeline.reference import ReferenceTaker
 from live.pipeline.run_state import RunState
-from live.stream.stream import CameraEnded, Record, ReferenceWanted, Role, Stream, Subscriber
+from live.stream.stream import CameraEnded, LoadEnded, Record, ReferenceWanted, Role, Stream, Subscriber
 
 log = logging.getLogger(__name__)
+
+
+class LoadSource:
+    """Reads ``cell`` in its own thread; a failure there never ends the images.
+
+    Parameters
+    ----------
+    cell : LoadCell
+    stream : Stream
+        Takes each LoadSample, and LoadEnded at the end.
+    """
+
+    def __init__(self, cell: LoadCell, stream: Stream) -> None:
+        self._cell, self._stream = cell, stream
+        self._thread = threading.Thread(target=self._work, name="load", daemon=True)
+
+    def start(self) -> None:
+        """Begin; the load cell must have been entered."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End it."""
+        self._cell.stop()
+
+    def join(self) -> None:
+        """Wait for the end, where it was started."""
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def _work(self) -> None:
+        lower_priority(LOAD)
+        error: Exception | None = None
+        try:
+            for sample in self._cell:
+                self._stream.publish(sample)
+        except Exception as found:
+            if not isinstance(found, PhasedicError):
+                log.exception("the load thread failed")
+            error = found
+        finally:
+            self._stream.publish(LoadEnded(error))
+
+
 HELD_BYTES, HELD_S, A_MEGAPIXEL_S, LATE_S = 512_000_000, 1.0, 0.25, 0.25
 """Limits of the bursts that wait: bytes; s while the first is prepared, longer for a large reference; s later."""
 _AT_WORK, _MEASURED, _OF_REFERENCE = 2, 3, 3
