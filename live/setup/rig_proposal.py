@@ -15,8 +15,7 @@ import numpy as np
 from acquire.errors import ConfigError
 from acquire.text.printable import printable
 from analysis.quality.pattern import zoi_pattern
-from analysis.quality.plates import FoundPlates, find_plates
-from analysis.quality.specimen import find_specimen
+from analysis.quality.specimen import FoundPlates, find_plates, find_specimen
 from live.config.gauges import GaugeTable
 from live.config.loading import Config
 from live.config.values import AUTO

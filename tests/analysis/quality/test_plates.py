@@ -7,8 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from analysis.field import Roi
-from analysis.quality.plates import _beside, _is_plate, find_plates
-from analysis.quality.specimen import Specimen, find_specimen
+from analysis.quality.specimen import Specimen, _beside, _is_plate, find_plates, find_specimen
 from hw_mocks.scene import Scene
 from hw_mocks.specimen import VirtualSpecimen
 
