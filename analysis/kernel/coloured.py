@@ -23,7 +23,7 @@ from analysis.kernel.lines import inner, left_by_fit, lines_along, some, zois_of
 from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.solve import Solution
 from analysis.kernel.white_noise import halves
-from analysis.picture.blocks import BLOCKS, blockiness
+from analysis.picture.pattern import BLOCKS, blockiness
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.float32]

@@ -13,8 +13,8 @@ from scipy.ndimage import gaussian_filter
 from analysis.field import Roi
 from analysis.follow.repetition import side_peaks
 from analysis.kernel.lines import APART, _profile, apart
-from analysis.picture.blocks import BLOCKS, blockiness
 from analysis.picture.impulses import without_impulses
+from analysis.picture.pattern import BLOCKS, blockiness
 from analysis.quality.pattern import depth, exposure
 from tests.analysis.speckle import picture
 

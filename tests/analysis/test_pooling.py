@@ -19,8 +19,8 @@ from analysis.kernel.lines import left_by_fit
 from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.solve import Solution
 from analysis.kernel.white_noise import white_cubic
-from analysis.picture.blocks import BLOCKS, blockiness
 from analysis.picture.impulses import without_impulses
+from analysis.picture.pattern import BLOCKS, blockiness
 from tests.accuracy.truth import Speckle, affine
 from tests.accuracy.truth import field as displaced
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from acquire.load_cell.check import LoadReport
 from acquire.text import Message
 from acquire.text.quantity import number
-from analysis.picture.blocks import BLOCKS, blockiness
+from analysis.picture.pattern import BLOCKS, blockiness
 from analysis.quality.pattern import Depth, Exposure, depth, exposure, speckle_radius, zoi_pattern
 from live.config.loading import Config
 from live.setup.check.noise_floor import (
