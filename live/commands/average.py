@@ -23,7 +23,7 @@ def command(arguments: argparse.Namespace) -> int:
     from acquire.burst import average_bursts, compile_loops, save_mean
     from acquire.errors import DataError
     from live.setup.dry_run import picture_kinds
-    from live.setup.frames import camera_of, frames_of
+    from live.setup.pictures import camera_of, frames_of
 
     screen = TerminalScreen()
     given = getattr(arguments, "camera.crop")

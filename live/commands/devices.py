@@ -34,7 +34,7 @@ from acquire.text.message import Message, word
 from acquire.text.printable import brief, printable
 from live import VERSION
 from live.setup.devices import open_load
-from live.setup.frames import camera_of
+from live.setup.pictures import camera_of
 from live.ui.terminal.screen import print_line
 
 CROP, MAX_CROPS = 256, 64  # px of the middle of the picture, and how many, that noise is taken from

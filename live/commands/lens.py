@@ -90,7 +90,7 @@ def _pictures(arguments: argparse.Namespace) -> Iterator[np.ndarray]:
     ConfigError
         It is a live camera, which does not end.
     """
-    from live.setup.frames import camera_of, whole_frames
+    from live.setup.pictures import camera_of, whole_frames
 
     with camera_of(with_scheme(arguments.source)) as camera:
         if camera.info.live:

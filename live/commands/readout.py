@@ -47,7 +47,7 @@ def command(arguments: argparse.Namespace) -> int:
 
 
 def _of_lamp(arguments: argparse.Namespace) -> Readout:
-    from live.setup.frames import camera_of, whole_frames
+    from live.setup.pictures import camera_of, whole_frames
 
     with camera_of(with_scheme(arguments.source)) as camera:
         return from_lamp(whole_frames(camera), arguments.lamp)

@@ -23,9 +23,8 @@ from live.replay.session import session_config, session_path, session_source
 from live.replay.source import ReplayRequest, ReplaySource, check_window
 from live.results.folder import differing_versions
 from live.setup.compiling import Stopping
-from live.setup.frames import camera_of
 from live.setup.grid import grid_for
-from live.setup.pictures import read_mask
+from live.setup.pictures import camera_of, read_mask
 from live.setup.prepared import MeasurePlan, PreparedKernel
 from live.setup.region import FirstLook, located_on
 

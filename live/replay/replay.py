@@ -48,8 +48,7 @@ from live.results.finished.finished_test import FinishedTest
 from live.results.folder import LOG, BurstFailures, check_folder, make_folder
 from live.results.response.evaluate import check_channel
 from live.results.writer import write_results
-from live.setup.frames import camera_of
-from live.setup.pictures import with_film, with_mask
+from live.setup.pictures import camera_of, with_film, with_mask
 from live.setup.region import is_auto_region
 from live.stream.adapted import Outputs
 from live.stream.stream import StateKeeper, Stream

@@ -19,9 +19,8 @@ from analysis.picture.pattern import noise_of_picture
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST
 from live.pipeline.reference import Correction, averaged
-from live.setup.frames import camera_of, frames_of
 from live.setup.grid import kernel_settings
-from live.setup.pictures import correction
+from live.setup.pictures import camera_of, correction, frames_of
 from live.setup.region import Region
 
 if TYPE_CHECKING:

@@ -69,7 +69,7 @@ def test_a_bad_picture_is_not(
     arguments: tuple[str, ...],
     message: str,
 ) -> None:
-    monkeypatch.setattr("live.setup.frames.at_rest", lambda address: address)
+    monkeypatch.setattr("live.setup.pictures.at_rest", lambda address: address)
     if not arguments:  # the table of other sizes and bursts tells nothing of the picture
         monkeypatch.setattr("live.setup.check.check_list.SIZES", ())
     code, output = checked(capsys, more, *arguments)
@@ -78,7 +78,7 @@ def test_a_bad_picture_is_not(
 
 
 def test_too_short(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("live.setup.frames.at_rest", lambda address: address)
+    monkeypatch.setattr("live.setup.pictures.at_rest", lambda address: address)
     assert main(["check"]) == 2
     assert main(["check", "--camera", "sim:uniform?fps=50&seconds=0.1&width=224&height=192"]) == 4
     assert "whole frames, a check needs 8" in capsys.readouterr().err

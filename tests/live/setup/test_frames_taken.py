@@ -25,7 +25,7 @@ from tests.live.setup.test_prepared import CAMERA
 def taken(monkeypatch: pytest.MonkeyPatch, frames: list[Any], reference: int | None) -> Any:
     camera, closed = ListCamera(frames, live=True), list[str]()
     rig = SimpleNamespace(camera=camera, close=lambda: closed.append("closed"))
-    monkeypatch.setattr("live.setup.frames.open_rig", lambda *given, **more: rig)
+    monkeypatch.setattr("live.setup.pictures.open_rig", lambda *given, **more: rig)
     settings: dict[str, Any] = {"camera.address": "list:"}
     if reference is not None:
         settings["measure.reference_burst"] = reference

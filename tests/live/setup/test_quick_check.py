@@ -115,7 +115,7 @@ def test_ctrl_c_leaves_the_table(capsys: pytest.CaptureFixture[str], monkeypatch
 
 
 def test_a_camera_that_ends(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("live.setup.frames.at_rest", lambda address: address)
+    monkeypatch.setattr("live.setup.pictures.at_rest", lambda address: address)
     arguments = ["--camera", STILL + "&seconds=4&lockstep=yes", "--no-view", *SMALL]
     assert main(["check", "--watch", *arguments]) == 0
     assert "strain noise of one ZOI" in capsys.readouterr().out

@@ -128,7 +128,7 @@ def test_warnings_of_the_camera_are_printed(monkeypatch: pytest.MonkeyPatch) -> 
         on_event(Event(0.0, EventKind.LOST, "camera", "opened", "info"))
         return open_rig(address, load, on_event, **how)
 
-    monkeypatch.setattr("live.setup.frames.open_rig", troubled)
+    monkeypatch.setattr("live.setup.pictures.open_rig", troubled)
     screen = RecordingScreen()
     first = first_look(load_config(None, {"camera.address": SIM}), screen)
     assert screen.lines == ["no picture for 2.0 s; still waiting"]
@@ -141,7 +141,7 @@ def test_a_camera_without_whole_pictures_is_given_up(
     monkeypatch: pytest.MonkeyPatch, look: Callable[[Config], object], fault: str
 ) -> None:
     """A run waits for it; a look before a test, which nobody's test hangs on, ends and names what to look at."""
-    monkeypatch.setattr("live.setup.frames.SILENCE_S", 0.3)
+    monkeypatch.setattr("live.setup.pictures.SILENCE_S", 0.3)
     silent = f"sim:hole?fps=20&width=320&height=320&hole=40&faults={fault}"
     with pytest.raises(DeviceError, match=r"no whole picture came in 0\.3 s; look at its cable"):
         look(load_config(None, {"camera.address": silent}))

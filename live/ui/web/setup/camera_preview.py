@@ -16,7 +16,7 @@ from acquire.frame import CameraInfo, Frame
 from acquire.system import lower_priority
 from acquire.text.printable import brief, printable
 from live.pipeline.latency import OUTPUT
-from live.setup.frames import camera_of
+from live.setup.pictures import camera_of
 from live.ui.web.setup.config_draft import ConfigDraft
 
 log = logging.getLogger(__name__)
