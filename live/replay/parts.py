@@ -23,8 +23,7 @@ from analysis import StrainField
 from live.pipeline.consumer import Screen
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import unchanged
-from live.replay.opening import open_session_source, prepare_replay
-from live.replay.session import session_path
+from live.replay.opening import open_session_source, prepare_replay, session_path
 from live.replay.source import ReplayRequest, check_window, prefetch
 from live.setup.prepared import PreparedKernel
 

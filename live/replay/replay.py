@@ -38,10 +38,9 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import FrameCounts, RunState
 from live.pipeline.timed.force_watch import with_force_watch
 from live.replay.forces import read_forces
-from live.replay.opening import open_session_source, prepare_replay
+from live.replay.opening import open_session_source, prepare_replay, session_path
 from live.replay.parts import StoredResults
 from live.replay.pictures import picture_of, picture_source, with_reference, write_names
-from live.replay.session import session_path
 from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Work, check_window, prefetch
 from live.results.finished.figures_file import finished
 from live.results.finished.finished_test import FinishedTest

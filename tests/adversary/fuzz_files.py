@@ -24,7 +24,7 @@ from typing import Any
 from acquire.errors import DataError, PhasedicError
 from acquire.session import Session, recover
 from live.cli import main as phasedic
-from live.replay.session import session_config, session_source
+from live.replay.opening import session_config, session_source
 from live.replay.source import ReplayRequest
 from live.results import Strain
 from tests.adversary.structure import change, make_fifo

@@ -18,8 +18,8 @@ from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
 from live.config.loading import load_config
 from live.pipeline.measure import NewReference
-from live.replay import session as module
-from live.replay.session import session_source
+from live.replay import opening as module
+from live.replay.opening import session_source
 from live.replay.source import ReplayRequest, ReplaySource
 from tests.live.made_up import CAMERA, START, make_measurement
 

@@ -22,9 +22,9 @@ from live.pipeline.measure import NewReference
 from live.pipeline.run_state import RunState
 from live.replay.burst_index import open_store
 from live.replay.forces import read_forces
+from live.replay.opening import _measured_within, session_config
 from live.replay.pictures import _expected, picture_of
 from live.replay.replay import _account, _with_final_folder, speed_line
-from live.replay.session import _measured_within, session_config
 from live.replay.source import PictureCount, ReplayRequest, Window, check_window
 from live.replay.study import NO_WINDOW, StudySetting, _found, _largest, _loaded, still_window, take_windows
 from tests.live.fakes import frame
