@@ -7,9 +7,8 @@ what reading line by line adds, for the time that ``readout`` finds; ``burst_mot
 during a burst; ``lens`` the distortion, which ``shifts`` finds.
 """
 
-from analysis.optics.keystone import Keystone, alike, keystones
 from analysis.optics.lens import LENS_NAMES, LensCorrection, LensModel, LensReading, strain_of_shift
-from analysis.optics.plane import MODELS, NAMES, SCALE, ApparentMotion, Model
+from analysis.optics.plane import MODELS, NAMES, SCALE, ApparentMotion, Keystone, Model, alike, keystones
 from analysis.optics.plates import (
     ASSUMED_TILT,
     Box,
