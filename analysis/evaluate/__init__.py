@@ -28,9 +28,19 @@ from analysis.evaluate.gauges.readings import GaugeSet, GaugeValue, distance, fa
 from analysis.evaluate.gauges.taken import COME_APART
 from analysis.evaluate.lag import Track, find_lag
 from analysis.evaluate.programme import KINDS, Kind
-from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
 from analysis.evaluate.tensile import evaluate_test
-from analysis.evaluate.tensile_figures import Span, StrainZero, TensileFigures, TensileOptions, ZeroBy
+from analysis.evaluate.tensile_figures import (
+    STANDARDS,
+    Band,
+    Interval,
+    Span,
+    Standard,
+    StrainZero,
+    TensileFigures,
+    TensileOptions,
+    ZeroBy,
+    free,
+)
 
 __all__ = [
     "AT_LEAST",

@@ -34,7 +34,6 @@ from analysis.evaluate.figure import Figure
 from analysis.evaluate.flow import anisotropy, hardening
 from analysis.evaluate.programme import KindOfTest
 from analysis.evaluate.seen import Unseen, confirmed, unseen, without_stopped
-from analysis.evaluate.standards import Band, Standard
 from analysis.evaluate.strengths import (
     Yield,
     proof_strength,
@@ -43,7 +42,7 @@ from analysis.evaluate.strengths import (
     tensile_strength,
     yield_point,
 )
-from analysis.evaluate.tensile_figures import Span, StrainZero, TensileFigures, TensileOptions
+from analysis.evaluate.tensile_figures import Band, Span, Standard, StrainZero, TensileFigures, TensileOptions
 
 _PARTS, _IN_PART = 10, 5  # of a strain rate held against a standard, and the points that each needs
 

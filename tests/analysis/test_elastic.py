@@ -23,8 +23,8 @@ from analysis.evaluate.elastic import (
     poisson_between,
 )
 from analysis.evaluate.figure import Figure
-from analysis.evaluate.standards import Band
 from analysis.evaluate.tensile import midway, strain_rate
+from analysis.evaluate.tensile_figures import Band
 
 E_PA, NU, N = 70e9, 0.3, 60
 STRESS = np.linspace(10e6, 70e6, N)

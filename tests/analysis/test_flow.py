@@ -15,8 +15,8 @@ from analysis.evaluate.curve import Loading
 from analysis.evaluate.elastic import FittedLine
 from analysis.evaluate.figure import Figure
 from analysis.evaluate.flow import _slope, anisotropy, hardening, neck
-from analysis.evaluate.standards import Band
 from analysis.evaluate.tensile import midway, seconds_of, strain_rate
+from analysis.evaluate.tensile_figures import Band
 from analysis.field import Roi, StrainField, ZoiGrid
 from hw_mocks.machine import FlowCurve, PowerLaw
 
