@@ -44,8 +44,7 @@ from acquire.hdf5 import (
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import layout, stored
-from acquire.session.bursts import burst_from
-from acquire.session.loads import LoadPiece, LoadTable
+from acquire.session.rows import LoadPiece, LoadTable, burst_from
 from acquire.session.stored import events_from, read_column, read_rows
 from acquire.text import Message
 from acquire.text.message import about

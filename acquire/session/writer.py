@@ -39,8 +39,8 @@ from acquire.hdf5 import (
 )
 from acquire.load_sample import LoadSample
 from acquire.session import layout
-from acquire.session.bursts import BurstTable
 from acquire.session.layout import SessionInfo
+from acquire.session.rows import BurstTable
 from acquire.text import Message
 
 log = logging.getLogger(__name__)

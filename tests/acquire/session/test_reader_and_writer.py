@@ -20,7 +20,8 @@ from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
-from acquire.session import Session, loads
+from acquire.session import Session
+from acquire.session import rows as loads
 from acquire.session.devices import open_session_camera, open_session_load
 from acquire.session.layout import FORMAT_VERSION, image_dtype
 from acquire.session.stored import read_column
