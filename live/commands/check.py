@@ -42,8 +42,8 @@ from live.config.cameras import camera_configs
 from live.config.loading import Config
 from live.config.sections import DEFAULT_REFERENCE_BURST
 from live.pipeline.consumer import Screen
-from live.setup.check.check_line import CheckLine, budget_lines, disk_lines, write_rate
 from live.setup.check.check_list import CheckFigures, examine, table_lines
+from live.setup.check.lines import CheckLine, budget_lines, disk_lines, write_rate
 from live.setup.check.quick_check import QUICK_FRAMES, QuickCheck, QuickChecker, RollingFrames
 from live.setup.check.sample import take
 from live.setup.check.verdict import DEFAULT_TARGET, check_lines

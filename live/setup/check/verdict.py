@@ -12,9 +12,8 @@ from acquire.text.message import joined
 from acquire.text.quantity import Amount
 from analysis.quality.pattern import SPECKLE_RADIUS_PX
 from analysis.quality.steadiness import aliased, mains_of
-from live.setup.check.advice import advice, motion_lines
-from live.setup.check.check_line import CheckLine, not_measured
 from live.setup.check.check_list import CheckFigures, median
+from live.setup.check.lines import CheckLine, advice, motion_lines, not_measured
 
 MAX_SATURATED, MAX_DARK, MAX_PILED = 1e-4, 0.01, 1e-3
 MIN_LIGHT = 0.3  # of full scale, 99th percentile

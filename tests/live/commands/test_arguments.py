@@ -22,7 +22,7 @@ from live.commands.scale import board_of
 from live.commands.study import _csv, _line, _settings
 from live.config.loading import Config, load_config
 from live.replay.study import NO_WINDOW, StudyResult, StudySetting
-from live.setup.check.check_line import CheckLine
+from live.setup.check.lines import CheckLine
 from live.setup.check.quick_check import QuickCheck
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.screens import Terminal

@@ -17,8 +17,8 @@ import pytest
 from acquire.events import ignore_event
 from live.cli import main
 from live.config.loading import Config, load_config
-from live.setup.check.advice import advice, reaching
 from live.setup.check.check_list import CheckFigures, automatic_controls, examine, table_lines
+from live.setup.check.lines import advice, reaching
 from live.setup.check.noise_floor import BURSTS, StrainNoise, ZoiFloor
 from live.setup.check.sample import FrameStack, take
 from live.setup.check.verdict import check_lines

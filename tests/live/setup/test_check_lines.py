@@ -11,8 +11,7 @@ import pytest
 
 from analysis.quality.pattern import Depth, Exposure
 from analysis.quality.steadiness import Steadiness
-from live.setup.check.advice import advice, motion_lines
-from live.setup.check.check_line import CheckLine
+from live.setup.check.lines import CheckLine, advice, motion_lines
 from live.setup.check.noise_floor import GaugeNoise, StrainNoise, ZoiFloor
 from live.setup.check.sample import MIN_FRAMES
 from live.setup.check.verdict import (

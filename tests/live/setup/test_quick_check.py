@@ -23,8 +23,8 @@ from live.cli import main
 from live.commands import check as check_watch
 from live.commands.check import RenewedLines, blur_line, card, peak_line
 from live.config.loading import load_config
-from live.setup.check.check_line import CheckLine
 from live.setup.check.check_list import examine
+from live.setup.check.lines import CheckLine
 from live.setup.check.quick_check import (
     RENEW_EVERY,
     SEARCH_EVERY,

@@ -14,10 +14,9 @@ from acquire.frame import CameraInfo
 from analysis.quality.steadiness import Steadiness
 from live.config.loading import load_config
 from live.results.budget import CameraView, budget_rows
-from live.setup.check import check_line
-from live.setup.check.advice import _vibration, reaching
-from live.setup.check.check_line import CheckLine, budget_lines, disk_lines, write_rate
+from live.setup.check import lines as check_line
 from live.setup.check.check_list import automatic_controls, table_lines
+from live.setup.check.lines import CheckLine, _vibration, budget_lines, disk_lines, reaching, write_rate
 from live.setup.check.noise_floor import GaugeNoise, StrainNoise, ZoiFloor
 from live.setup.check.sample import FrameStack
 from live.setup.check.stillness import PictureStillness

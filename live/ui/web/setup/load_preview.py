@@ -21,7 +21,7 @@ from acquire.text import Message
 from acquire.text.printable import brief, printable
 from live.pipeline.latency import OUTPUT
 from live.pipeline.timed.figure import OLD_S
-from live.setup.check.check_line import CheckLine
+from live.setup.check.lines import CheckLine
 from live.setup.devices import open_load
 from live.ui.web.setup.config_draft import ConfigDraft
 

@@ -23,8 +23,8 @@ from acquire.text.printable import brief, printable
 from live.config.sections import DEFAULT_REFERENCE_BURST
 from live.pipeline.consumer import Screen
 from live.pipeline.latency import OUTPUT
-from live.setup.check.check_line import CheckLine, disk_lines, write_rate
 from live.setup.check.check_list import CheckFigures, examine
+from live.setup.check.lines import CheckLine, disk_lines, write_rate
 from live.setup.check.quick_check import QuickChecker
 from live.setup.check.sample import FrameStack
 from live.setup.check.verdict import check_lines

@@ -18,7 +18,7 @@ from acquire.frame import CameraInfo
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.serial_line.ports import PortInfo
 from live.config.loading import load_config
-from live.setup.check.check_line import CheckLine
+from live.setup.check.lines import CheckLine
 from live.ui.web.setup import device_lists, specimen_check
 from live.ui.web.setup.config_draft import ConfigDraft
 from live.ui.web.setup.device_lists import DeviceLists
