@@ -34,8 +34,8 @@ from live.ui.web.run_result import peaks
 from live.ui.web.server import DEFAULT_PORT, REPORT_POLICY, PageServer, Response, jpeg_response
 from live.ui.web.setup.config_draft import ConfigDraft, drafts_of, next_name
 from live.ui.web.setup.draft_changes import CHANGES
-from live.ui.web.setup.drawn_region import DrawnRegion
 from live.ui.web.setup.setup_session import SetupSession, SetupSessions
+from live.ui.web.setup.specimen_region import DrawnRegion
 
 if TYPE_CHECKING:
     from live.run.live_run import LiveRun

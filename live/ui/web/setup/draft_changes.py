@@ -15,8 +15,8 @@ from acquire.text import Message
 from analysis.evaluate import GAUGE_KINDS
 from live.config.new_files import free_name
 from live.setup.scale import Board, from_points
-from live.ui.web.setup.drawn_region import are_points
 from live.ui.web.setup.setup_session import OVERLAYS, SetupSession
+from live.ui.web.setup.specimen_region import are_points
 
 Request = Mapping[str, Any]
 MAX_MM = 1e5

@@ -25,9 +25,8 @@ from live.ui.web.setup import load_preview
 from live.ui.web.setup.camera_preview import RECENT, CameraPreview
 from live.ui.web.setup.config_draft import ConfigDraft, next_name
 from live.ui.web.setup.draft_changes import CHANGES
-from live.ui.web.setup.drawn_region import DrawnRegion
 from live.ui.web.setup.setup_session import SetupSession
-from live.ui.web.setup.specimen_region import SpecimenRegion
+from live.ui.web.setup.specimen_region import DrawnRegion, SpecimenRegion
 from tests.live.setup.test_scale import CHARUCO, CHECKER, seen
 from tests.live.ui.waiting import until
 

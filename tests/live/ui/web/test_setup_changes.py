@@ -22,9 +22,8 @@ from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.map_view import gauge_shapes
 from live.ui.web.setup.config_draft import drafts_of
 from live.ui.web.setup.draft_changes import CHANGES
-from live.ui.web.setup.drawn_region import DrawnRegion
 from live.ui.web.setup.setup_session import SetupSession, SetupSessions
-from live.ui.web.setup.specimen_region import SpecimenRegion
+from live.ui.web.setup.specimen_region import DrawnRegion, SpecimenRegion
 from tests.live.made_up import make_grid
 from tests.live.ui.web.test_setup_values import draft_of, figures
 
