@@ -27,8 +27,7 @@ from live.pipeline.consumer import Screen
 from live.replay.batch.cluster import Cluster
 from live.replay.batch.keys import is_session, key_of_chunk
 from live.replay.batch.row import RENEWED, BatchRow, failed
-from live.replay.batch.task import Task, TaskProgress
-from live.replay.batch.workdir import remove, staging_dirs
+from live.replay.batch.task import Task, TaskProgress, remove, staging_dirs
 from live.replay.batch.worker import Pool
 from live.replay.opening import open_source
 

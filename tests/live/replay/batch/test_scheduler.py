@@ -25,8 +25,7 @@ from live.replay.batch.scheduler import (
     join_task,
     sweep_chunks,
 )
-from live.replay.batch.task import FIELDS_FILE, Task, TaskProgress
-from live.replay.batch.workdir import _host, staging_dir
+from live.replay.batch.task import FIELDS_FILE, Task, TaskProgress, _host, staging_dir
 from tests.live.screens import RecordingScreen
 
 
