@@ -15,10 +15,9 @@ from live.config.new_files import check_free, free_name, new_file
 from live.pipeline.consumer import Screen
 from live.results.finished.figures_file import FILE, FiguresFile
 from live.results.quantities import Display
-from live.results.report.cameras import report_of_cameras
-from live.results.report.comparison import compare, tests_of, write_table
 from live.results.report.report import Report, ReportRequest, make_report
 from live.results.report.saving import NO_BROWSER, find_browser, save_figures, save_page, save_pdf
+from live.results.report.several import compare, report_of_cameras, tests_of, write_table
 from live.results.run_folder import RunFolder, open_run
 from live.results.sides import cameras_in
 from live.ui.terminal.screen import TerminalScreen

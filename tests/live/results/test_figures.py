@@ -34,7 +34,7 @@ from live.results.figures import (
     tensile_options,
     tensile_table,
 )
-from live.results.report.comparison import _summary as summary_of_rows
+from live.results.report.several import _summary as summary_of_rows
 from live.results.summary import latency_lines, noise_line, summary_lines
 from tests.analysis.curves import Truth, composite, noisy, ramberg_osgood
 from tests.live.made_run import finished

@@ -19,7 +19,7 @@ from analysis.evaluate import Curve, GaugeValue, TwoSides
 from live.config.sections import SpecimenConfig
 from live.pipeline.run_state import RunState
 from live.results import sides as clocks
-from live.results.report.cameras import _strains, _stress_strain, report_of_cameras
+from live.results.report.several import _strains, _stress_strain, report_of_cameras
 from live.results.run_folder import open_run
 from live.results.sides import (
     JointChannels,

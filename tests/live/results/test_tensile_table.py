@@ -21,7 +21,7 @@ from live.pipeline.run_state import FrameCounts, RunState
 from live.replay.batch.row import COLUMNS
 from live.replay.batch.row import _figures as batch_figures
 from live.results.figures import TensileRow, evaluate, figure_lines, headline, tensile_table
-from live.results.report import comparison
+from live.results.report import several as comparison
 from live.results.report.evaluation import EvaluatedCurve as RunCurve
 from live.results.report.report import budget_table, tensile
 from live.results.run_folder import open_run

@@ -18,14 +18,14 @@ from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
 from live.results.finished.finished_test import FinishedTest
-from live.results.report import comparison
-from live.results.report.comparison import _quoted as quoted
-from live.results.report.comparison import summary
+from live.results.report import several as comparison
 from live.results.report.curves import force_unit, stress_strain, valid_share
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, time_steps
 from live.results.report.practice import PracticeValues, reporting_table
 from live.results.report.record import times
 from live.results.report.report import Report, ReportRequest, make_report
+from live.results.report.several import _quoted as quoted
+from live.results.report.several import summary
 from live.results.run_folder import RunFolder, open_run
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.made_run import CONFIG, E_PA, GAUGES, PULLED, YIELD, make_run
