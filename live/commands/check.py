@@ -49,8 +49,8 @@ from live.setup.check.sample import take
 from live.setup.check.verdict import DEFAULT_TARGET, check_lines
 from live.setup.compiling import Stopping
 from live.setup.devices import check_load_port, open_load
+from live.setup.grid import with_auto_gauges
 from live.setup.pictures import camera_of, report_warnings
-from live.setup.placement import with_auto_gauges
 from live.setup.specimen_drawing import Overlay, snapshot
 from live.ui.rerun.messages import ViewSetup
 from live.ui.rerun.view import View, spawn_viewer

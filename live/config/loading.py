@@ -80,7 +80,7 @@ class Config:
 
 
 AUTO_GAUGES = ("extension", "width", "area")
-"""The gauges that ``live.setup.placement`` places on the specimen."""
+"""The gauges that ``live.setup.grid`` places on the specimen."""
 
 _SECTIONS: dict[str, type] = {
     f.name: f.default_factory  # type: ignore[misc]

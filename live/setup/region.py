@@ -24,9 +24,8 @@ from acquire.text import Message
 from live.config.loading import Config
 from live.config.values import ALL, AUTO
 from live.pipeline.consumer import Screen
-from live.setup.grid import grid_for, whole_picture
+from live.setup.grid import grid_for, whole_picture, with_auto_gauges
 from live.setup.pictures import camera_of, read_mask, report_warnings, whole_frames, with_mask
-from live.setup.placement import with_auto_gauges
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid

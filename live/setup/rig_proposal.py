@@ -19,7 +19,7 @@ from analysis.quality.specimen import FoundPlates, find_plates, find_specimen
 from live.config.gauges import GaugeTable
 from live.config.loading import Config
 from live.config.values import AUTO
-from live.setup.placement import with_auto_gauges
+from live.setup.grid import with_auto_gauges
 from live.setup.region import FirstLook, Region, is_auto_region, region_of
 
 ZOI_SIZES = (64, 48, 32, 24, 16)  # px

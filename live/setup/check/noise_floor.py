@@ -24,7 +24,7 @@ from live.config.gauges import gauges_for
 from live.pipeline.guards import picture_words
 from live.pipeline.reference import averaged, prepare, repetition_text
 from live.setup.check.sample import CheckSample
-from live.setup.placement import with_auto_gauges
+from live.setup.grid import with_auto_gauges
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel, ZoiGrid

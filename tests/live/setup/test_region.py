@@ -25,7 +25,7 @@ from live.pipeline.consumer import Screen
 from live.results import Strain
 from live.setup.check.sample import take
 from live.setup.devices import open_rig
-from live.setup.placement import auto_gauges, with_auto_gauges
+from live.setup.grid import auto_gauges, with_auto_gauges
 from live.setup.region import FirstLook, Region, _mean_and_noise, _within, first_look, located_on, region_of
 from live.setup.rig_proposal import _axis, _size
 from tests.live.made_up import CAMERA, make_field

@@ -22,9 +22,8 @@ from analysis.evaluate import inside_polygon
 from live.config.gauges import GaugeTable, gauges_for, with_colours
 from live.config.loading import Config
 from live.config.values import AUTO, GIVEN
-from live.setup.grid import grid_for
+from live.setup.grid import auto_gauges, grid_for
 from live.setup.pictures import read_mask
-from live.setup.placement import auto_gauges
 from live.setup.region import region_of
 from live.ui.web.map_view import as_png
 from live.ui.web.setup.config_draft import ConfigDraft
