@@ -1,4 +1,8 @@
-"""The pages of a TIFF by its directories (TIFF 6.0, section 2; BigTIFF); no pixel is read."""
+"""What picture files say of themselves; no pixel is decoded.
+
+The pages of a TIFF by its directories (TIFF 6.0, section 2; BigTIFF), the quantisation of a JPEG by its own tables
+(ITU-T T.81, B.2.4.1).
+"""
 
 from __future__ import annotations
 
@@ -16,6 +20,16 @@ _ZIGZAG = sorted(
     ((row, column) for row in range(8) for column in range(8)),
     key=lambda at: (sum(at), at[0] if sum(at) % 2 else at[1]),
 )
+
+
+SUFFIXES = (".tif", ".tiff")
+_WIDTH, _HEIGHT, _COMPRESSION = 256, 257, 259
+_SIZES = {1: "B", 3: "H", 4: "I", 16: "Q"}  # types of whole numbers
+UNREADABLE = {
+    34925: "LZMA", 50000: "ZSTD", 50001: "WebP", 50002: Message("JPEG XL"), 34887: "LERC", 34712: "JPEG 2000",
+    33003: "JPEG 2000", 33005: "JPEG 2000",
+}  # fmt: skip
+"""Compressions that OpenCV cannot read."""
 
 
 def quantisation(content: bytes) -> tuple[int, ...] | None:
@@ -50,16 +64,6 @@ def _read_tables(part: bytes) -> dict[int, tuple[int, ...]]:
         found[number] = tuple(placed[row, column] for row in range(8) for column in range(8))
         part = part[size:]
     return found
-
-
-SUFFIXES = (".tif", ".tiff")
-_WIDTH, _HEIGHT, _COMPRESSION = 256, 257, 259
-_SIZES = {1: "B", 3: "H", 4: "I", 16: "Q"}  # types of whole numbers
-UNREADABLE = {
-    34925: "LZMA", 50000: "ZSTD", 50001: "WebP", 50002: Message("JPEG XL"), 34887: "LERC", 34712: "JPEG 2000",
-    33003: "JPEG 2000", 33005: "JPEG 2000",
-}  # fmt: skip
-"""Compressions that OpenCV cannot read."""
 
 
 class Page(NamedTuple):

@@ -1,9 +1,8 @@
 """The pictures that a folder, a glob or the name of a file stands for, and their order in time.
 
-The order of the pictures of a test by their names, and by their times where names do not say it.
-
-Numbers count by their value. What a name may mean is put in ``_Reading``: where two readings give two orders, times
-of the pictures decide if they follow one of them and not merely the alphabet, as copied files do; else it is asked.
+The names decide, or the times where names do not say it. Numbers count by their value, dates by the calendar. What a
+name may mean is put in ``_Reading``: where two readings give two orders, times of the pictures decide if they follow
+one of them and not merely the alphabet, as copied files do; else it is asked.
 """
 
 from __future__ import annotations
@@ -29,6 +28,25 @@ _MONTHS = re.compile(
 )
 _DATE = re.compile(r"(?<!\d)(\d{1,2})[-_./ ]+(\d{1,2})[-_./ ]+((?:19|20)\d\d)(?!\d)")
 _HALF_DAY = re.compile(r"(?<!\d)(\d{1,2})((?:[-_.:]\d\d)*)[ _]?([ap])\.?m\b")
+
+
+SUFFIXES = (".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm")
+_SYSTEM = ("thumbs.db", "ehthumbs.db", "desktop.ini")
+AUTO, BY = "auto", ("auto", "name", "time")
+WAY_OUT = Message("give --reference NAME, --order time or --order name (in an address: ?order=time)")
+_REFERENCE = {
+    "ref", "reference", "undeformed", "unloaded", "initial", "before",
+    "referenz", "unverformt", "unbelastet", "référence", "initiale",
+}  # fmt: skip
+_MASK = {"mask", "maske", "masque"}
+_VERSION = re.compile(r"(?:^|[^a-z])(?:v|ver|version|rev)[\s._-]*$")
+_NUMBER = re.compile(
+    r"((?<![^\s_=(-])[-+])?((?<![^\s_=(+-])\d*[.,]?\d+e[-+]\d\d+(?![\d.,])|(?<![^\s_=(+-])[.,]\d+|\d+(?:[.,]\d+)*)"
+)
+"""A sign after a blank, ``_``, ``=``, ``(``, a hyphen or at the beginning; 5e-05, .05, 0.05, 7, or 2025.11.25."""
+_LEAST_WRAP, _NEAR = 3, 20
+"""Digits of a counter that begins again, at least; how near to its ends pictures lie that show it."""
+Key = list[str | Decimal]
 
 
 def dated(stems: Sequence[str]) -> list[list[str]]:
@@ -72,10 +90,6 @@ def _of_24_hours(match: re.Match[str]) -> str:
     return f"{hour:02}{match[2]}"
 
 
-SUFFIXES = (".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm")
-_SYSTEM = ("thumbs.db", "ehthumbs.db", "desktop.ini")
-
-
 def listed(target: str) -> list[Path]:
     """The images of ``find_images`` in no order; raises DataError where there is none."""
     path = expanded(target)
@@ -110,24 +124,6 @@ def listed(target: str) -> list[Path]:
 def _is_seen(path: Path) -> bool:
     """Whether it is no file of a file manager or hidden."""
     return not path.name.startswith(".") and path.name.lower() not in _SYSTEM
-
-
-AUTO, BY = "auto", ("auto", "name", "time")
-WAY_OUT = Message("give --reference NAME, --order time or --order name (in an address: ?order=time)")
-_REFERENCE = {
-    "ref", "reference", "undeformed", "unloaded", "initial", "before",
-    "referenz", "unverformt", "unbelastet", "référence", "initiale",
-}  # fmt: skip
-_MASK = {"mask", "maske", "masque"}
-_VERSION = re.compile(r"(?:^|[^a-z])(?:v|ver|version|rev)[\s._-]*$")
-_NUMBER = re.compile(
-    r"((?<![^\s_=(-])[-+])?((?<![^\s_=(+-])\d*[.,]?\d+e[-+]\d\d+(?![\d.,])|(?<![^\s_=(+-])[.,]\d+|\d+(?:[.,]\d+)*)"
-)
-"""A sign after a blank, ``_``, ``=``, ``(``, a hyphen or at the beginning; 5e-05, .05, 0.05, 7, or 2025.11.25."""
-_LEAST_WRAP, _NEAR = 3, 20
-"""Digits of a counter that begins again, at least; how near to its ends pictures lie that show it."""
-
-Key = list[str | Decimal]
 
 
 class _Reading(NamedTuple):

@@ -1,4 +1,8 @@
-"""The load samples of a file, read by the piece: a day of them is larger than memory."""
+"""Bursts and load samples of a session.
+
+A burst is stored as the exact sum of its frames, from which the mean comes back to the last bit. Load samples are read
+by the piece: a day of them is larger than memory.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +22,12 @@ from acquire.record_mode import RecordMode
 from acquire.session import layout
 from acquire.session.oddities import Oddities
 from acquire.session.stored import Rows, read_column, same_length, usable
+
+PIECE = 1 << 16
+"""Samples that are read at once."""
+_STABLE = {code: word for word, code in layout.STABLE.items()}
+_SAMPLE = ("monotonic_s", "force", "unit", "stable", "flags", "device_ms")
+_TIME = "monotonic_s"
 
 
 def mean_of(total: NDArray[Any], n: int) -> NDArray[np.float32]:
@@ -100,13 +110,6 @@ def burst_from(total: NDArray[Any], clipped: NDArray[np.uint8], row: Mapping[str
         blank=row["blank"],
         clock=layout.CLOCKS[row["clock"]],
     )
-
-
-PIECE = 1 << 16
-"""Samples that are read at once."""
-_STABLE = {code: word for word, code in layout.STABLE.items()}
-_SAMPLE = ("monotonic_s", "force", "unit", "stable", "flags", "device_ms")
-_TIME = "monotonic_s"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

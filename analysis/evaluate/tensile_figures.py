@@ -14,6 +14,9 @@ from analysis.evaluate.programme import KINDS, Kind
 PER_MINUTE = 1 / 60
 
 
+ZeroBy = Literal["raw", "toe", "preload"]
+
+
 @dataclass(frozen=True, slots=True)
 class Interval:
     """Where the modulus is taken.
@@ -113,9 +116,6 @@ STANDARDS = {
 def free(interval: Interval) -> Standard:
     """No standard: only an interval of one's own."""
     return Standard("free", interval)
-
-
-ZeroBy = Literal["raw", "toe", "preload"]
 
 
 @dataclass(frozen=True, slots=True)

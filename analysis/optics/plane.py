@@ -27,6 +27,13 @@ ALIKE = 2.0
 _MIN_ZOIS = 12
 
 
+Model = Literal["scale", "pose", "homography"]
+MODELS: dict[Model, int] = {"scale": 4, "pose": 6, "homography": 8}
+"""How many of the parameters are fitted, the others being 0."""
+NAMES = ("shift_x", "shift_y", "scale", "turn", "keystone_x", "keystone_y", "stretch", "shear")
+SCALE, KEYSTONE, STRETCH = 2, (4, 5), (6, 7)
+
+
 def alike(one: float, other: float, noise: float) -> float:
     """What two values have in common, their mean; 0 where they differ, or where it is not beyond ``noise``."""
     both, half = (one + other) / 2, abs(one - other) / 2
@@ -83,13 +90,6 @@ def keystones(field: StrainField) -> tuple[Keystone, Keystone]:
         1.5 * u_xy / width, 1.5 * v_yy / height, 1.5 * max(s_xy / width, s_yy / height), height
     )
     return along_x, along_y
-
-
-Model = Literal["scale", "pose", "homography"]
-MODELS: dict[Model, int] = {"scale": 4, "pose": 6, "homography": 8}
-"""How many of the parameters are fitted, the others being 0."""
-NAMES = ("shift_x", "shift_y", "scale", "turn", "keystone_x", "keystone_y", "stretch", "shear")
-SCALE, KEYSTONE, STRETCH = 2, (4, 5), (6, 7)
 
 
 def shapes(x: Floats, y: Floats, length: float) -> Floats:

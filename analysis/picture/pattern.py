@@ -24,6 +24,15 @@ BLOCKS = 1.3
 """Blockiness from which on a picture was compressed: JPEG 80 has 1.9, JPEG 50 2.7, raw pictures 0.98 to 1.06."""
 
 
+Floats = NDArray[np.float64]
+SIGNAL_OVER_NOISE = 2.0
+"""A frequency carries pattern where its power is at least this many times that of the noise."""
+MIN_SIDE = 16
+SLOW_SHARE = 12
+LOSS = 0.1
+"""l_10%: the period of a sine that has lost so much of its amplitude."""
+
+
 def blockiness(image: NDArray[Any]) -> float:
     """Third differences of an image (H, W) across the borders of blocks of 8 px over those elsewhere; about 1."""
     worst = 1.0
@@ -40,16 +49,6 @@ def blockiness(image: NDArray[Any]) -> float:
 def _some(count: int) -> slice:
     """About ``MAX_LINES`` of that many rows or columns, evenly spaced."""
     return slice(None, None, max(1, count // MAX_LINES))
-
-
-Floats = NDArray[np.float64]
-
-SIGNAL_OVER_NOISE = 2.0
-"""A frequency carries pattern where its power is at least this many times that of the noise."""
-MIN_SIDE = 16
-SLOW_SHARE = 12
-LOSS = 0.1
-"""l_10%: the period of a sine that has lost so much of its amplitude."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,6 +26,21 @@ MIN_LENGTH = 0.4  # of the specimen beside it
 RIM_PX = 16
 
 
+Cells = NDArray[np.float32]
+Bools = NDArray[np.bool_]
+CELL = 4
+"""Side of a cell, px: the gradient is taken on pixels, judged in cells."""
+QUANTISATION = 12**-0.5  # GL: the least noise there is
+OVER_NOISE = 2.0  # times the variance that noise alone gives a gradient
+OF_ALL, OF_AROUND = 0.06, 0.4  # least share of the specimen's own quality, overall and within some speckles
+CAP = 1.5  # times the rms gradient of the speckle: no edge counts for more
+MIN_WIDTH_PX = 32.0  # px: what is narrower takes no ZOI
+SPECKLES = 3.0  # radii: std of the window that judges
+WINDOW = (5.0, 24.0)  # px
+MIN_PICTURE_SHARE = 0.005  # of the picture
+SLOW_PX = 20.0  # std of what is taken for light and background, for the contrast
+
+
 @dataclass(frozen=True, slots=True)
 class FoundPlates:
     """What looks like plates in a still picture, which does not show what they hang from.
@@ -87,22 +102,6 @@ def _beside(box: Roi, of: Roi) -> bool:
     common = min(box.y + box.height, of.y + of.height) - max(box.y, of.y)
     apart = box.x >= of.x + of.width or box.x + box.width <= of.x
     return apart and common >= MIN_LENGTH * of.height
-
-
-Cells = NDArray[np.float32]
-Bools = NDArray[np.bool_]
-
-CELL = 4
-"""Side of a cell, px: the gradient is taken on pixels, judged in cells."""
-QUANTISATION = 12**-0.5  # GL: the least noise there is
-OVER_NOISE = 2.0  # times the variance that noise alone gives a gradient
-OF_ALL, OF_AROUND = 0.06, 0.4  # least share of the specimen's own quality, overall and within some speckles
-CAP = 1.5  # times the rms gradient of the speckle: no edge counts for more
-MIN_WIDTH_PX = 32.0  # px: what is narrower takes no ZOI
-SPECKLES = 3.0  # radii: std of the window that judges
-WINDOW = (5.0, 24.0)  # px
-MIN_PICTURE_SHARE = 0.005  # of the picture
-SLOW_PX = 20.0  # std of what is taken for light and background, for the contrast
 
 
 @dataclass(frozen=True, slots=True, eq=False)

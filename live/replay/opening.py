@@ -1,4 +1,4 @@
-"""Opening the source of a replay, and preparing the kernel on its reference."""
+"""Opening the source of a replay, a recorded session or pictures, and preparing the kernel on its reference."""
 
 from __future__ import annotations
 
@@ -44,6 +44,9 @@ LIVE_ONLY = ("output", "record", "operate", "strain_out", "alarm")
 """Sections of the configuration that a replay leaves out."""
 BESIDE_S = 10.0
 """Load samples so long after the last that is measured are read: a burst may reach beyond it."""
+
+
+_FORMER_AUTO_GAUGES = ("axial", "transverse")  # of recordings made before November 2026
 
 
 def session_path(source: str) -> Path | None:
@@ -205,9 +208,6 @@ def _as_measured(stored: BurstStore, events: Iterable[Event], wanted: set[int]) 
             # Sessions of older versions have no such value; the burst then has its own count.
             lost = event.data.get("lost")
             yield replace(burst, lost=lost) if isinstance(lost, int) else burst
-
-
-_FORMER_AUTO_GAUGES = ("axial", "transverse")  # of recordings made before November 2026
 
 
 @contextmanager

@@ -32,6 +32,9 @@ COLUMNS = columns()
 sigma and share of each virtual gauge."""
 
 
+DEFERRED_FLUSH_S = 10.0  # in a replay, which can be run again
+
+
 class CsvWriter:
     """Appends rows to a new file.
 
@@ -150,9 +153,6 @@ class Results(Closing):
             self._csv.close()
         finally:
             self._h5.close()
-
-
-DEFERRED_FLUSH_S = 10.0  # in a replay, which can be run again
 
 
 class ResultsConsumer(Consumer):

@@ -1,7 +1,8 @@
-"""A camera as a source of the stream: its thread publishes each frame and the bursts that it averages them to.
+"""Camera and load cell as sources of the stream, each with a thread that publishes what the device gives.
 
-It does nothing else, so that the camera never waits. The reference is taken from the first frames, and
-again on demand; all frames after it become bursts.
+That of a camera publishes each frame and the bursts that it averages them to. It does nothing else, so that the camera
+never waits. The reference is taken from the first frames, and again on demand; all frames after it become bursts. The
+samples of the load cell are those of every camera.
 """
 
 from __future__ import annotations
@@ -30,6 +31,12 @@ from live.pipeline.run_state import RunState
 from live.stream.stream import CameraEnded, LoadEnded, Record, ReferenceWanted, Role, Stream, Subscriber
 
 log = logging.getLogger(__name__)
+
+
+HELD_BYTES, HELD_S, A_MEGAPIXEL_S, LATE_S = 512_000_000, 1.0, 0.25, 0.25
+"""Limits of the bursts that wait: bytes; s while the first is prepared, longer for a large reference; s later."""
+_AT_WORK, _MEASURED, _OF_REFERENCE = 2, 3, 3
+"""Bursts beside those that wait: summed, taken; measured, the one before, and shown; a reference with its halves."""
 
 
 class LoadSource:
@@ -71,12 +78,6 @@ class LoadSource:
             error = found
         finally:
             self._stream.publish(LoadEnded(error))
-
-
-HELD_BYTES, HELD_S, A_MEGAPIXEL_S, LATE_S = 512_000_000, 1.0, 0.25, 0.25
-"""Limits of the bursts that wait: bytes; s while the first is prepared, longer for a large reference; s later."""
-_AT_WORK, _MEASURED, _OF_REFERENCE = 2, 3, 3
-"""Bursts beside those that wait: summed, taken; measured, the one before, and shown; a reference with its halves."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""The grid of ZOIs and the kernel settings of a configuration."""
+"""The grid of ZOIs and the kernel settings of a configuration, and the automatic gauges on that grid."""
 
 from __future__ import annotations
 

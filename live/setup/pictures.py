@@ -1,4 +1,4 @@
-"""The pictures of a set-up: mask, dark and flat frame."""
+"""The pictures of a set-up: frames of a camera or of a recording without a load cell; mask, dark and flat frame."""
 
 from __future__ import annotations
 
@@ -25,6 +25,10 @@ from live.setup.devices import at_rest, open_rig
 
 SILENCE_S = 20.0
 """Wait for the next whole picture; a run waits for ever, since a test may be under way."""
+
+
+FILM_ERROR_PERCENT = 10.0
+"""H.264 to CRF 23, H.265, VP9 and MPEG-4 held back 3 to 7 % of 8,000 to 10,000 um/m (November 2026)."""
 
 
 @contextmanager
@@ -176,10 +180,6 @@ def with_flat_field(config: Config, folder: Path) -> Config:
     return replace(
         config, camera=replace(c, dark=copied(c.dark, "dark.tif"), flat=copied(c.flat, "flat.tif"))
     )
-
-
-FILM_ERROR_PERCENT = 10.0
-"""H.264 to CRF 23, H.265, VP9 and MPEG-4 held back 3 to 7 % of 8,000 to 10,000 um/m (November 2026)."""
 
 
 def with_film(config: Config, camera: CameraInfo) -> Config:

@@ -33,6 +33,11 @@ if TYPE_CHECKING:
 _SUFFIX = ".part"
 
 
+log = logging.getLogger(__name__)
+ROW_FILE, LOG_FILE, FIELDS_FILE = "batch.json", "replay.txt", "fields"
+_PROGRESS_EVERY_S = 0.25
+
+
 @dataclass(frozen=True, slots=True)
 class StagingDir:
     """A staging folder, of a process that may have ended."""
@@ -102,11 +107,6 @@ def remove(staging: Path) -> None:
 
 def _host() -> str:
     return platform.node().replace(".", "-") or "host"
-
-
-log = logging.getLogger(__name__)
-ROW_FILE, LOG_FILE, FIELDS_FILE = "batch.json", "replay.txt", "fields"
-_PROGRESS_EVERY_S = 0.25
 
 
 @dataclass(frozen=True, slots=True)

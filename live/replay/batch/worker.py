@@ -1,12 +1,9 @@
-"""A batch worker: a process of ``worker_processes``, and the functions that run on a worker of a Dask cluster.
+"""Workers of a batch: processes of this machine, and the functions that run on a worker of a Dask cluster.
 
 ``python -m live.replay.batch.worker`` reads tasks as lines of JSON on standard input and writes progress and rows
-to standard output. It ends with its caller: the end of standard input ends the process, also during a task.
-
-Worker processes of this machine: each performs one task at a time; one that dies is replaced and its task repeated.
-
-Each is a new Python process with one thread for the numerics (the libraries read that setting on import). A fork of a
-process that has loaded all libraries was tried: it is not faster, since as many processes as cores load in parallel.
+to standard output. It ends with its caller: the end of standard input ends the process, also during a task. Each has
+one thread for the numerics (the libraries read that setting on import). A fork of a process that has loaded all
+libraries was tried: it is not faster, since as many processes as cores load in parallel.
 """
 
 from __future__ import annotations
@@ -35,6 +32,20 @@ from analysis import PICTURE_KINDS, not_compiled
 from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress, perform
+
+ONE_THREAD = (
+    "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM",
+)  # fmt: skip
+NEEDED = ONE_THREAD[:3]  # those that a worker of a cluster needs
+_PROGRESS_EVERY_S = 2.0
+# Settings of glibc: memory that one task has freed goes back to the system before the next one.
+_LEAN = {
+    "MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "6000000", "MALLOC_TRIM_THRESHOLD_": "20000000",
+}  # fmt: skip
+_END_TIMEOUT_S = 5.0
+MAX_DEATHS = 3
+log = logging.getLogger(__name__)
+OnProgress = Callable[[Task, TaskProgress], object]
 
 
 def main() -> int:
@@ -71,13 +82,6 @@ def _put_progress(answers: TextIO, progress: TaskProgress) -> None:
 def _put(answers: TextIO, message: object) -> None:
     answers.write(json.dumps(message) + "\n")
     answers.flush()
-
-
-ONE_THREAD = (
-    "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM",
-)  # fmt: skip
-NEEDED = ONE_THREAD[:3]  # those that a worker of a cluster needs
-_PROGRESS_EVERY_S = 2.0
 
 
 def describe_worker(token: str, dask_worker: Any = None) -> dict[str, Any]:
@@ -123,22 +127,6 @@ def _progress_to(task: Task, topic: str) -> Callable[[TaskProgress], None]:
             logging.getLogger(__name__).debug("progress could not be sent: %s", error)
 
     return send
-
-
-if __name__ == "__main__":
-    sys.exit(main())
-
-
-# Settings of glibc: memory that one task has freed goes back to the system before the next one.
-_LEAN = {
-    "MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "6000000", "MALLOC_TRIM_THRESHOLD_": "20000000",
-}  # fmt: skip
-_END_TIMEOUT_S = 5.0
-MAX_DEATHS = 3
-
-log = logging.getLogger(__name__)
-
-OnProgress = Callable[[Task, TaskProgress], object]
 
 
 class WorkerProcesses:
@@ -337,3 +325,7 @@ class Pool:
             "its worker died {n} times ({why}); is there memory enough for --workers?", MAX_DEATHS, why[:80]
         )
         return failed(task.title, task.source, words, 1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,4 +1,4 @@
-"""Several tests in one report: their curves, and mean and scatter of their figures."""
+"""Several runs in one report: tests compared, or the cameras of one test."""
 
 from __future__ import annotations
 
@@ -43,6 +43,10 @@ ALIKE = Message(
 
 _Parts = tuple[str, str, tuple[Plot, ...], Mapping[str, TensileFigures], list[Html]]
 """What sides and fields have of their own: title, words on the test, plots, figures by whose strain, sections."""
+
+
+_MIN_RUNS = 2
+_MAX_LABELS = 50  # letters above the curves; longer names are replaced by numbers
 
 
 def report_of_cameras(runs: Mapping[str, RunFolder], reports: Mapping[str, str]) -> Report:
@@ -161,10 +165,6 @@ def _stress_strain(sides: SidesOfTest, stresses: bool) -> Plot:
     )
     title, up = load_labels(unit.name, stresses=stresses)
     return Plot("stress-strain", title, axial_label(e), up, lines)
-
-
-_MIN_RUNS = 2
-_MAX_LABELS = 50  # letters above the curves; longer names are replaced by numbers
 
 
 @dataclass(frozen=True, slots=True, eq=False)

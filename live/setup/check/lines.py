@@ -1,9 +1,4 @@
-"""What a check advises on motion and on noise.
-
-Lines of a check on what moves: drift, distance, tilt, vibration.
-
-What to change for a strain noise that is asked for: larger ZOIs, longer bursts, more light.
-"""
+"""The lines of a check: of the disk, of the budget of E, of what moves, and what to change for less noise."""
 
 from __future__ import annotations
 
@@ -29,6 +24,14 @@ from live.setup.check.check_list import CheckFigures
 from live.setup.check.noise_floor import ZoiFloor
 from live.setup.check.sample import MIN_FRAMES, FrameStack
 from live.setup.check.stillness import PictureStillness
+
+SHORTEST_S = 600.0
+"""Of a test whose length is not given."""
+ELASTIC = 1e-3
+"""End of the elastic interval where the standard takes it from the yield strength, which the test finds."""
+MAX_DILATATION = 5e-5  # common drift of exx and eyy
+FULL_LIGHT = 0.95  # of full scale: more light saturates
+MAX_BURST = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +65,6 @@ def not_measured(f: CheckFigures, what: str) -> CheckLine:
         ),
         measured=False,
     )
-
-
-SHORTEST_S = 600.0
-"""Of a test whose length is not given."""
 
 
 def write_rate(stack: FrameStack, config: Config) -> float:
@@ -124,10 +123,6 @@ def disk_lines(rate: float, config: Config) -> list[CheckLine]:
     ]
 
 
-ELASTIC = 1e-3
-"""End of the elastic interval where the standard takes it from the yield strength, which the test finds."""
-
-
 def budget_lines(figures: CheckFigures, config: Config) -> list[str]:
     """The table as text; nothing where no noise is known. Scatter is of one value: a line through many has less."""
     noise = _noise(figures)
@@ -156,9 +151,6 @@ def _noise(figures: CheckFigures) -> float:
     """Noise of the gauge along the load, else of the mean of the region."""
     known = {gauge.name: gauge.sigma for gauge in figures.gauges}
     return known.get(AXIAL, known.get("", math.nan))
-
-
-MAX_DILATATION = 5e-5  # common drift of exx and eyy
 
 
 def motion_lines(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
@@ -238,10 +230,6 @@ def _vibration(s: Steadiness, unit: float, name: str, digits: int) -> str:
     mains = mains_of(s, 1)
     cause = Message(", as from {mains:.0f} Hz mains", mains) if mains is not None else ""
     return Message("{text}, mainly at {frequency:.1f} Hz{cause}", text, s.frequency, cause)
-
-
-FULL_LIGHT = 0.95  # of full scale: more light saturates
-MAX_BURST = 1000
 
 
 def reaching(floors: Sequence[ZoiFloor], target: float) -> list[tuple[ZoiFloor, int]]:

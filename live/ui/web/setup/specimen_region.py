@@ -1,4 +1,4 @@
-"""The region of the specimen and its gauges during set-up: drawn, found or placed, undone, and saved."""
+"""The region of the specimen and its gauges during set-up: drawn by strokes, found or placed, undone, and saved."""
 
 from __future__ import annotations
 
@@ -35,6 +35,10 @@ MAX_UNDO = 12
 
 Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]
+
+
+SHADE = (60, 20, 0, 150)
+"""Colour over pixels that are not measured: blue, green, red, opacity."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,10 +190,6 @@ class DrawnRegion:
         """Make the change that was undone last again."""
         if self._undone:
             self._masks.append(self._undone.pop())
-
-
-SHADE = (60, 20, 0, 150)
-"""Colour over pixels that are not measured: blue, green, red, opacity."""
 
 
 class SpecimenRegion:
