@@ -32,6 +32,7 @@ from tests.bench import machine
 from tests.bench.soak import children, status
 from tests.live.replay.batch.running import running
 
+assert sys.platform != "win32"  # no getrusage there
 SESSIONS = 4
 CAMERA = "sim:hole?lockstep=yes&fps=20&width=1280&height=1024&bits=12"
 RUN = ["--load", "sim:", "--burst", "2", "--reference-burst", "8", "--no-view", "--no-rrd", "--roi", "all"]
@@ -118,7 +119,7 @@ def _emptied(name: str, tasks: list[Task], start: Callable[..., Pool | Cluster])
         done.append(task.name)
         return ()
 
-    workers = start(lambda task, progress: standing.told(task.title, progress), ended)
+    workers = start(lambda task, progress: standing.update(task.title, progress), ended)
     while not workers.wait(LOOK_S):
         pass
     took = time.perf_counter() - began
