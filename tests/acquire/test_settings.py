@@ -35,7 +35,7 @@ ALLOWED: Mapping[str, Mapping[str, str]] = {
         "width": "a number from 1", "height": "a number from 1", "fps": "a number from 0.001", "exposure": "a number",
         "gain": "a number",
     },
-    "video": GRAY, "session": {},
+    "video": GRAY | {"fps": "a number from 1e-06 to 1e+06", "first": "a whole number from 1"}, "session": {},
     "files": GRAY | {
         "fps": "a number from 1e-06 to 1e+06", "bits": "a whole number from 1 to 16", "white": SIDE,
         "order": "one of auto, name, time",
