@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DataError
 from acquire.events import ignore_event
 from acquire.frame import Burst, CameraInfo
 from acquire.session import Session
@@ -131,7 +131,13 @@ def prepare_replay(
         config, mask = located_on(config, look, screen)
     plan = MeasurePlan.of(config, camera, mask)
     plan.compile(camera, screen, stopping)
-    return plan.on(source.reference, f"the reference of {name}")
+    try:
+        return plan.on(source.reference, f"the reference of {name}")
+    except DataError as error:
+        raise DataError(
+            "{why}; where the first pictures are blank choose another: --reference NAME, of a film 'NAME?first=5'",
+            error,
+        ) from error
 
 
 def fields_of(

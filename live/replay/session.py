@@ -18,7 +18,7 @@ from acquire.events import Event, EventKind
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from acquire.session import Session
-from live.config.loading import Config, from_dict, settings_in
+from live.config.loading import Config, from_dict, laid_over, settings_in
 from live.pipeline.measure import NewReference
 from live.replay.burst_index import BurstStore, open_store
 from live.replay.pictures import reference_from, reference_words
@@ -52,7 +52,7 @@ def session_config(session: Session, request: ReplayRequest, extra: Mapping[str,
         stored[section] = _beside(stored.get(section, {}), keys, path)
     file = {} if request.config_file is None else settings_in(request.config_file)
     try:
-        return from_dict(stored, {**file, **extra, **request.overrides}, str(path))
+        return from_dict(stored, laid_over({**file, **extra}, request.overrides), str(path))
     except ConfigError:
         _check_stored(stored, str(path))
         raise
