@@ -86,6 +86,7 @@ def _why(error: Exception) -> str:
 
 _DECODERS = re.compile(r"grfmt_\w+\.cpp|loadsave\.cpp|bitstrm\.cpp|^libpng |JPEG")
 _DAMAGE = re.compile(r"TIFF_Error|can't read data|Decode: |Corrupt JPEG|Premature end|libpng error")
+_TOO_LARGE = re.compile(r"MAX_IMAGE_|Insufficient memory")
 _BEFORE = re.compile(r"^.*(TIFF_Error|TIFF_Warning|can't read data:) ?")
 _lock = threading.Lock()
 Source = bytes | str
@@ -101,10 +102,13 @@ class Decoded:
         None: it could not be decoded at all.
     damage : str
         What the decoder complained of; empty where all was well.
+    too_large : bool
+        Beyond the limit of ``load_cv2``, or the memory.
     """
 
     picture: NDArray[Any] | None
     damage: str
+    too_large: bool = False
 
 
 def decode(source: Source, page: int = 0) -> Decoded:
@@ -117,7 +121,8 @@ def decode(source: Source, page: int = 0) -> Decoded:
         except cv2.error as error:
             reports.append(str(error))
     damage = next((line for line in reports if _DAMAGE.search(line)), "")
-    return Decoded(picture, _BEFORE.sub("", damage).strip()[:200])
+    too_large = picture is None and any(_TOO_LARGE.search(line) for line in reports)
+    return Decoded(picture, _BEFORE.sub("", damage).strip()[:200], too_large)
 
 
 def _decode(cv2: Any, source: Source, page: int) -> NDArray[Any] | None:
@@ -245,6 +250,11 @@ def read_picture_page(path: Path, source: Source, page: int = 0) -> NDArray[Any]
     decoded = decode(source, page) if _complete(path, source) else None
     if decoded is None or decoded.picture is None:
         log.debug("%s: %s", path, decoded.damage if decoded else "ends too early")
+        if decoded and decoded.too_large:
+            raise DataError(
+                "{path}: more than 268 million pixels, or than the memory holds; cut out the specimen, or bin it",
+                path,
+            )
         raise DataError("{path}: {why_not}", path, _why_not(path, page))
     if decoded.damage:
         raise DataError(

@@ -57,7 +57,8 @@ def find_images(target: str, by: str = AUTO, first: str | None = None) -> list[P
     """
     found = listed(target)
     for item in found:
-        check_regular(item)
+        if item.exists():  # a link to nothing is a picture that cannot be read
+            check_regular(item)
     ends = masks([path.name for path in found])
     used, last = ([path for path in found if (path.name in ends) is end] for end in (False, True))
     common = os.path.commonpath([path.parent for path in used])
@@ -240,6 +241,16 @@ class ImageFiles(CameraBase):
         if any(path.suffix.lower() in LOSSY for path in self._paths):
             yield Message(
                 "JPEG is lossy: its artefacts (0.6 to 1.7 GL) do not average out; TIFF or PNG measure better"
+            )
+        zeros = int(np.bitwise_or.reduce(first, axis=None))
+        low = (zeros & -zeros).bit_length() - 1  # bits that are 0 in all pixels
+        if first.itemsize == 2 and first.max() >= 2**14 and 2 <= low <= 8 and self._settings.white is None:
+            yield Message(
+                "16-bit files whose values are multiples of {step}: if the camera has {bits} bits say white={white}, "
+                "so that clipped pixels are seen",
+                2**low,
+                16 - low,
+                65536 - 2**low,
             )
         for bits in (10, 12, 14):
             if self._settings.bits is None and first.itemsize == 2 and 2**8 <= first.max() < 2**bits:

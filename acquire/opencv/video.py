@@ -23,7 +23,7 @@ from acquire.files.headers import quantisation
 from acquire.files.picture import check_regular, is_utf8
 from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
-from acquire.settings import choice, read_settings, setting
+from acquire.settings import choice, number, read_settings, setting, whole
 from acquire.text import Message
 
 INTRA = {
@@ -44,6 +44,10 @@ class VideoSettings:
     """Settings of ``video:test.mp4``."""
 
     gray: str = setting(choice(*GRAYS), "luma", "what is grey in a colour picture")
+    fps: float | None = setting(
+        number(1e-6, 1e6), None, "of the camera, where the film is played slower", "1/s"
+    )
+    first: int = setting(whole(1), 1, "number of the first picture; those before it are left out")
 
 
 class VideoFile(CameraBase):
@@ -55,7 +59,7 @@ class VideoFile(CameraBase):
         Missing, no regular file, not a video, or with a name that OpenCV cannot take.
     """
 
-    def __init__(self, address: str, path: Path, gray: str, on_event: EventSink) -> None:
+    def __init__(self, address: str, path: Path, settings: VideoSettings, on_event: EventSink) -> None:
         super().__init__()
         cv2 = load_cv2()
 
@@ -66,17 +70,23 @@ class VideoFile(CameraBase):
             raise DataError("{path}: OpenCV opens a video by its name, which must be UTF-8; rename it", path)
         with path.open("rb") as file:
             self._head = file.read(_HEAD)
-        self._address, self._path, self._gray_plane, self._on_event = address, path, gray, on_event
+        self._address, self._path, self._settings, self._on_event = address, path, settings, on_event
         self._capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
             raise DataError(
                 "{path}: not a video that can be read, or cut off; try to play or convert it", path
             )
         self._promised = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
-        self._fps = self._capture.get(cv2.CAP_PROP_FPS) or 25.0
+        self._fps = settings.fps or self._capture.get(cv2.CAP_PROP_FPS) or 25.0
         code = _fourcc(int(self._capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF)
         inter_frame = code.lower() not in INTRA
         table = quantisation(self._head) if code.lower() in _AS_JPEG else None
+        count = self._count()
+        if count is not None and count < settings.first:
+            raise DataError(
+                "{path}: has {count} pictures, none with number {first}", path, count, settings.first
+            )
+        frames = None if count is None else count - settings.first + 1
         steps: dict[str, Any] = {QUANTISATION: table} if table else {}
         self.info = CameraInfo(
             address=address,
@@ -88,7 +98,7 @@ class VideoFile(CameraBase):
             clock="nominal",
             fps=self._fps,
             pixel_format=code,
-            controls={"gray": gray, "frames": self._count(), "inter_frame": inter_frame} | steps,
+            controls={"gray": settings.gray, "frames": frames, "inter_frame": inter_frame} | steps,
             warnings=(FILM_WARNING,) * inter_frame + (WEBCAM_WARNING,),
         )
 
@@ -96,20 +106,24 @@ class VideoFile(CameraBase):
         cv2 = load_cv2()
 
         index, t, longest, place = 0, 0.0, 1.0, 0.0
+        before = sum(self._capture.grab() for _ in range(self._settings.first - 1))
         while not self.stopped.is_set():
             well, picture = self._capture.read()
             if not well:
-                self._report_if_short(index, int(place + longest))
+                self._report_if_short(before + index, int(place + longest))
                 return
             former, place = place, self._capture.get(getattr(cv2, "CAP_PROP_PTS", -1))
             longest = max(longest, place - former) if index else longest
             stamp = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000
-            t = stamp if stamp > t or index == 0 else t + 1 / self._fps
+            if self._settings.fps:
+                t = index / self._fps
+            else:
+                t = stamp if stamp > t or index == 0 else t + 1 / self._fps
             yield Frame(frozen(self._grey(picture, index)), index, t, "nominal", 0, 8, stamp)
             index += 1
 
     def _grey(self, picture: NDArray[Any], index: int) -> NDArray[Any]:
-        image = to_gray(picture, self._gray_plane, str(self._path))
+        image = to_gray(picture, self._settings.gray, str(self._path))
         if image.shape != (self.info.height, self.info.width):
             raise DataError("{path}: frame {index} is of another size than the first", self._path, index)
         return image
@@ -151,5 +165,5 @@ def open_video(address: Address, on_event: EventSink) -> VideoFile:
     ConfigError, DataError
         See ``acquire.camera.open_camera``.
     """
-    gray = read_settings(VideoSettings, address).gray
-    return VideoFile(address.text, expanded(address.target), gray, on_event)
+    settings = read_settings(VideoSettings, address)
+    return VideoFile(address.text, expanded(address.target), settings, on_event)

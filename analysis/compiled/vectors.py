@@ -123,6 +123,21 @@ def load(_typing: Any, array: Any, index: Any) -> Any:
 
 
 @intrinsic
+def load_samples(_typing: Any, array: Any, index: Any) -> Any:
+    """LANES samples of a uint8, uint16 or float32 array from the flat ``index`` (uintp) on, as float32."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        kind, (array, index) = signature.args[0], arguments
+        place = builder.gep(context.make_array(kind)(context, builder, array).data, [index])
+        each = context.get_data_type(kind.dtype)
+        several = builder.bitcast(place, ir.VectorType(each, LANES).as_pointer())
+        found = builder.load(several, align=kind.dtype.bitwidth // 8)
+        return found if kind.dtype == types.float32 else builder.uitofp(found, _VECTOR)
+
+    return vector(array, types.uintp), generate
+
+
+@intrinsic
 def address(_typing: Any, array: Any, index: Any) -> Any:
     """Where the flat ``index`` (uintp) of a float32 array lies in memory, for ``load_from``."""
 
@@ -227,6 +242,26 @@ def above(_typing: Any, value: Any, limit: Any, yes: Any, no: Any) -> Any:
         return builder.select(builder.fcmp_ordered(">", arguments[0], arguments[1]), *arguments[2:])
 
     return vector(vector, vector, vector, vector), generate
+
+
+def _from_lane(first: int) -> Any:
+    """LANES lanes of two vectors side by side, from the lane ``first`` on."""
+
+    @intrinsic
+    def lanes(_typing: Any, before: Any, after: Any) -> Any:
+        def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            each = ir.Constant(ir.VectorType(_INT, LANES), list(range(first, first + LANES)))
+            return builder.shuffle_vector(*arguments, each)
+
+        return vector(vector, vector), generate
+
+    return lanes
+
+
+ahead_1, ahead_2, ahead_4, ahead_8 = map(_from_lane, (1, 2, 4, 8))
+"""Of a row of samples those so many further on, from a vector and the next one, ..."""
+back_1, back_2, back_4, back_8 = (_from_lane(LANES - n) for n in (1, 2, 4, 8))
+"""... and those so many back, from the vector before and a vector."""
 
 
 @intrinsic

@@ -186,6 +186,8 @@ def as_recorded(image: ArrayLike, what: str, *, any_values: bool = False) -> NDA
 
     ``any_values``: those that are not finite are found later.
     """
+    if np.ma.is_masked(image):
+        raise ValueError(f"{what} has masked pixels: give its data, and its mask as clipped=")
     array = np.asarray(image)
     if array.ndim != 2 or array.size == 0:
         raise ValueError(

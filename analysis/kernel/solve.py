@@ -26,7 +26,7 @@ from analysis.fit.validity import CENTRE_VARIANCE, CLIPPED_SHARE, CORNER_STEPS
 from analysis.kernel.images import NoiseModel, rounding_variance
 from analysis.kernel.quadrature import Sensors
 from analysis.kernel.reference import SPILL_PX, Places, ReferencePicture
-from analysis.picture.splines import Box, prefilter_taps, tap_table
+from analysis.picture.splines import Box, prefilter_poles, tap_table
 
 if TYPE_CHECKING:
     from analysis.fit.assembly import ExpectedNoise
@@ -138,8 +138,8 @@ class Solution:
         from analysis.picture.prefilter import coefficients
 
         self._box, prepared = box, self.reference.prepared
-        taps = prefilter_taps(self.reference.settings.interpolant)
-        if not coefficients(self.image, np.float32(prepared.pattern.mean), taps, box, self._room):
+        poles = prefilter_poles(self.reference.settings.interpolant)
+        if not coefficients(self.image, np.float32(prepared.pattern.mean), poles, box, self._room):
             raise ValueError("the deformed image holds values that are not finite")
         return PictureArgs.within(self._room, prepared.shape, box, SPILL_PX)
 

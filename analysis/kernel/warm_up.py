@@ -191,13 +191,13 @@ def _phase() -> None:
 def _prefilter(kinds: Sequence[str]) -> None:
     """What every deformed image goes through first, for each kind of picture."""
     from analysis.picture.prefilter import coefficients, room_for
-    from analysis.picture.splines import prefilter_taps
+    from analysis.picture.splines import prefilter_poles
 
     for kind in kinds:
         picture = _small()[0].astype(kind)
         picture.flags.writeable = False
         room = room_for(picture.shape)
-        coefficients(picture, np.float32(100), prefilter_taps(5), Box(0, 96, 0, 96), room)
+        coefficients(picture, np.float32(100), prefilter_poles(5), Box(0, 96, 0, 96), room)
 
 
 def _rest() -> None:

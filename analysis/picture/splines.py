@@ -1,4 +1,4 @@
-"""B-splines: weights of the taps, the prefilter as a short filter, gradients on whole pixels.
+"""B-splines: weights of the taps, the poles of the prefilter, gradients on whole pixels.
 
 Only tables and filters on whole images are here; a frame is filtered in ``prefilter.py`` and warped in ``warp.py``.
 Source: M. Unser, A. Aldroubi, M. Eden, B-spline signal processing, IEEE Trans. Signal Process.
@@ -16,8 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 TAPS = 6
-PREFILTER_REACH = 15
-"""Taps to each side; the quintic prefilter has fallen to 3e-6 there."""
+PASSES = 4, 2
+"""Of each pole of the prefilter along a row, which so ends after 16 and 4 samples; the quintic ones have fallen to 1e-6
+and 3e-6 there."""
+_POLES = {
+    1: (0.0, 0.0),
+    3: (3**0.5 - 2, 0.0),
+    5: ((67.5 - 4436.25**0.5) ** 0.5 + 26.25**0.5 - 6.5, (67.5 + 4436.25**0.5) ** 0.5 - 26.25**0.5 - 6.5),
+}
+"""Zeros of the sampled B-spline within the unit circle, by degree."""
 LINE = 16
 """Samples of a cache line."""
 PAD = 8
@@ -86,14 +93,18 @@ def _piece(degree: int, right: int) -> list[Fraction]:
 
 
 @lru_cache(maxsize=8)
-def prefilter_taps(degree: int) -> NDArray[np.float32]:
-    """One side of the inverse of the sampled B-spline, (16,), centre first."""
-    length = 256
-    samples = basis(degree, np.arange(-3.0, 4.0))
-    omega = 2 * np.pi * np.arange(length) / length
-    response = samples @ np.cos(np.outer(np.arange(-3, 4), omega))
-    impulse = np.fft.ifft(1 / response).real[: PREFILTER_REACH + 1]
-    return np.asarray(impulse / (impulse[0] + 2 * impulse[1:].sum()), np.float32)
+def prefilter_poles(degree: int) -> NDArray[np.float32]:
+    """The inverse of the sampled B-spline in ``prefilter.coefficients``: a factor and the two poles, (3,).
+
+    With the factor an even picture stays as it is, although the filter along rows ends after some samples.
+    """
+    factor = 1.0
+    for pole, passes in zip(_POLES[degree], PASSES, strict=True):
+        factor *= (1 - pole) ** 2
+        for k in range(passes):
+            z = pole**2**k
+            factor *= (1 + z * z) / (1 + z) ** 2
+    return np.array([factor, *_POLES[degree]], np.float32)
 
 
 def gradient_filter(degree: int, length: int) -> NDArray[np.complex128]:

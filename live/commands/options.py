@@ -239,7 +239,11 @@ def _section(text: str) -> dict[str, float]:
     try:
         width, thickness = numbers_of(text, float, 2)
     except ValueError:
-        raise ConfigError("--section {given}: give width,thickness in mm, for example 10,2", text) from None
+        raise ConfigError(
+            "--section {given}: give width,thickness in mm, for example 10,2; of another section "
+            "specimen.diameter_mm or specimen.area_mm2 in the file of --config",
+            text,
+        ) from None
     return {"specimen.width_mm": width, "specimen.thickness_mm": thickness}
 
 

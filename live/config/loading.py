@@ -81,6 +81,12 @@ class Config:
 
 AUTO_GAUGES = ("extension", "width", "area")
 """The gauges that ``live.setup.grid`` places on the specimen."""
+_SHAPES = (
+    frozenset({"specimen.width_mm", "specimen.thickness_mm"}),
+    frozenset({"specimen.diameter_mm"}),
+    frozenset({"specimen.area_mm2"}),
+)
+"""Keys that say the section in one way."""
 
 _SECTIONS: dict[str, type] = {
     f.name: f.default_factory  # type: ignore[misc]
@@ -113,6 +119,19 @@ def load_config(path: Path | None, overrides: Mapping[str, Any], text: str | Non
         overrides,
         str(path) if path else Message("command line"),
     )
+
+
+def other_shapes(given: Mapping[str, Any]) -> frozenset[str]:
+    """Keys of a section said in another way, which ``given`` ("section.key" -> value) replaces."""
+    named = {key for key, value in given.items() if value is not None}
+    used = [shape for shape in _SHAPES if shape & named]
+    return frozenset().union(*_SHAPES).difference(*used) if used else frozenset()
+
+
+def laid_over(lower: Mapping[str, Any], upper: Mapping[str, Any]) -> dict[str, Any]:
+    """``upper`` over ``lower``, both "section.key" -> value."""
+    gone = other_shapes(upper)
+    return {key: value for key, value in lower.items() if key not in gone} | dict(upper)
 
 
 def from_dict(stored: Mapping[str, Any], overrides: Mapping[str, Any], where: str) -> Config:
@@ -168,6 +187,8 @@ def _overlaid(tree: Mapping[str, Any], overrides: Mapping[str, Any], where: str)
         section = merged.setdefault(name, {})
         if isinstance(section, dict):
             section[key] = value
+    for name, _, key in (dotted.partition(".") for dotted in other_shapes(overrides)):
+        merged[name].pop(key, None)
     return _build(merged, where)
 
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from acquire.text import Message
 from live.config.listen_address import SOCKET
 from live.config.values import (
     ADDRESSES,
@@ -325,6 +326,17 @@ class SpecimenConfig:
         if self.width_mm is not None and self.thickness_mm is not None:
             return self.width_mm * self.thickness_mm * 1e-6
         return None if self.diameter_mm is None else math.pi / 4 * self.diameter_mm**2 * 1e-6
+
+    @property
+    def section_text(self) -> str:
+        """The section as it was given; empty where it is not known."""
+        if self.area_m2 is None:
+            return ""
+        if self.area_mm2 is not None:
+            return Message("{area:g} mm2", self.area_mm2)
+        if self.width_mm is not None and self.thickness_mm is not None:
+            return Message("{width:g} mm x {thickness:g} mm", self.width_mm, self.thickness_mm)
+        return Message("diameter {diameter:g} mm", self.diameter_mm)
 
     def load(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """The stress (N,), Pa, of ``force``, N; the force itself where the section is not known."""

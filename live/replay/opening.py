@@ -22,7 +22,7 @@ from acquire.load_sample import LoadSample
 from acquire.session import Session
 from acquire.text import Message
 from live.config.gauges import gauges_for
-from live.config.loading import AUTO_GAUGES, Config, from_dict, load_config, settings_in
+from live.config.loading import AUTO_GAUGES, Config, from_dict, laid_over, load_config, settings_in
 from live.config.values import AUTO
 from live.pipeline.consumer import Screen
 from live.pipeline.measure import NewReference
@@ -71,7 +71,7 @@ def session_config(session: Session, request: ReplayRequest, extra: Mapping[str,
         stored[section] = _beside(stored.get(section, {}), keys, path)
     file = {} if request.config_file is None else settings_in(request.config_file)
     try:
-        return from_dict(stored, {**file, **extra, **request.overrides}, str(path))
+        return from_dict(stored, laid_over({**file, **extra}, request.overrides), str(path))
     except ConfigError:
         _check_stored(stored, str(path))
         raise
@@ -306,7 +306,13 @@ def prepare_replay(
         config, mask = located_on(config, look, screen)
     plan = MeasurePlan.of(config, camera, mask)
     plan.compile(camera, screen, stopping)
-    return plan.on(source.reference, f"the reference of {name}")
+    try:
+        return plan.on(source.reference, f"the reference of {name}")
+    except DataError as error:
+        raise DataError(
+            "{why}; where the first pictures are blank choose another: --reference NAME, of a film 'NAME?first=5'",
+            error,
+        ) from error
 
 
 def fields_of(

@@ -48,7 +48,17 @@ def picture_source(camera: Camera, request: ReplayRequest, config: Config) -> Re
 def _words(request: ReplayRequest, reference: Burst, camera: CameraInfo) -> str:
     address = parse_address(with_scheme(request.source))
     if address.scheme != "files":
-        return reference_words(request, reference, camera.controls.get("frames"))
+        words = reference_words(request, reference, camera.controls.get("frames"))
+        return (
+            Message(
+                "{words} at {fps:g} a second, as the film is played (of a camera that was faster: '{film}?fps=1000')",
+                words,
+                camera.fps,
+                camera.name,
+            )
+            if address.scheme == "video" and "fps" not in dict(address.settings)
+            else words
+        )
     found = picture_names(address)
     ends = masks([name for name, _ in found])
     used = [(name, page) for name, page in found if name not in ends]

@@ -276,6 +276,8 @@ def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str
         return []
     rows = _rows(figures, specimen)
     of = Message(" of {strain}", figures.elastic_strain) if figures.elastic_strain else ""
+    if specimen.section_text:
+        of = Message("{of}, section {section}", of, specimen.section_text)
     limits = beyond_scatter(figures)
     held = Message(", of E with {limits}", limits) if limits else Message(" of the scatter alone")
     how = Message(

@@ -1,6 +1,6 @@
 """A live test: devices, cameras and outputs joined by one stream.
 
-Threads: grab, record and measure of each camera (``camera_run``), load (``load_source``), and one for each consumer
+Threads: grab, record and measure of each camera (``camera_run``), load (``sources``), and one for each consumer
 that may block. A test with several cameras is as one with a single camera, each with a name and a folder of its own;
 load cell, clock and commands are those of all.
 """

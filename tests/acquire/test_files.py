@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import struct
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -182,3 +184,18 @@ def test_a_picture_is_written_as_its_name_says(tmp_path: Path) -> None:
             write_picture(tmp_path / name, smooth())
     with pytest.raises(DataError, match="cannot be written: File exists; look at the folder and the disk"):
         write_picture(tmp_path / "a.png", smooth())
+
+
+def test_a_picture_beyond_the_limit_is_not_called_damaged(tmp_path: Path) -> None:
+    side, path = 2**14 + 1, tmp_path / "a.tif"
+    entries = [(256, 4, side), (257, 4, side), (258, 3, 8), (259, 3, 1), (262, 3, 1), (273, 4, 200), (277, 3, 1),
+               (278, 4, side), (279, 4, side * side)]  # fmt: skip
+    head = b"II*\0" + struct.pack("<IH", 8, len(entries))
+    path.write_bytes(
+        head + b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in entries) + bytes(4)
+    )
+    with path.open("r+b") as file:
+        file.truncate(200 + side * side)
+    code = f"from acquire.files.picture import read_picture; read_picture(__import__('pathlib').Path({str(path)!r}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "DataError" in done.stderr and "more than 268 million pixels" in done.stderr

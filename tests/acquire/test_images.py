@@ -414,3 +414,27 @@ def test_pages_of_a_tiff_are_its_directories(tmp_path: Path, order: str) -> None
             full_pages(path)
     path.rename(tmp_path / "a.png")
     assert full_pages(tmp_path / "a.png") == [0]
+
+
+@pytest.mark.parametrize(
+    ("step", "words"), [(16, "12 bits say white=65520"), (64, "10 bits say white=65472"), (1, "")]
+)
+def test_bits_in_the_high_bits_of_16_are_seen(tmp_path: Path, step: int, words: str) -> None:
+    image = np.arange(65536 // step, dtype=np.uint16)[:1000].reshape(20, 50) * np.uint16(step) + np.uint16(
+        2**15
+    )
+    path = tmp_path / "a.tif"
+    cv2.imwrite(str(path), image)
+    (warning, *_) = (*open_camera(f"files:{path}").info.warnings, "")
+    assert words in warning and bool(words) == bool(warning)
+    assert open_camera(f"files:{path}?white={65536 - step}").info.warnings == ()
+
+
+def test_a_link_to_nothing_is_left_out(tmp_path: Path) -> None:
+    for k in range(3):
+        cv2.imwrite(str(tmp_path / f"{k}.tif"), np.full((20, 30), 100 + k, np.uint8))
+    (tmp_path / "1a.tif").symlink_to(tmp_path / "nowhere.tif")
+    told: list[Event] = []
+    with open_camera(f"files:{tmp_path}", told.append) as camera:
+        assert [int(frame.image[0, 0]) for frame in camera if not frame.damaged] == [100, 101, 102]
+    assert "1a.tif: cannot be read: No such file or directory" in told[0].text

@@ -189,6 +189,19 @@ def test_frames_are_counted_where_the_container_does_not(tmp_path: Path, code: s
     assert told == []
 
 
+def test_a_film_is_begun_later_and_timed_anew(tmp_path: Path) -> None:
+    path, told = film(tmp_path / "a.mkv", "FFV1", 7), list[Event]()
+    with open_camera(f"video:{path}") as camera:
+        whole = list(camera)
+    with open_camera(f"video:{path}?first=3&fps=1000", told.append) as camera:
+        assert (camera.info.fps, camera.info.controls["frames"]) == (1000, 5)
+        frames = list(camera)
+    assert [f.t for f in frames] == [k / 1000 for k in range(5)] and told == []
+    assert all((a.image == b.image).all() for a, b in zip(frames, whole[2:], strict=True))
+    with pytest.raises(DataError, match="has 7 pictures, none with number 8"):
+        open_camera(f"video:{path}?first=8")
+
+
 def test_a_film_that_is_cut_off_is_told(tmp_path: Path) -> None:
     path = film(tmp_path / "a.mkv", "FFV1", 12)
     path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])

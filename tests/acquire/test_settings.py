@@ -35,7 +35,7 @@ ALLOWED: Mapping[str, Mapping[str, str]] = {
         "width": "a number from 1", "height": "a number from 1", "fps": "a number from 0.001", "exposure": "a number",
         "gain": "a number",
     },
-    "video": GRAY, "session": {},
+    "video": GRAY | {"fps": "a number from 1e-06 to 1e+06", "first": "a whole number from 1"}, "session": {},
     "files": GRAY | {
         "fps": "a number from 1e-06 to 1e+06", "bits": "a whole number from 1 to 16", "white": SIDE,
         "order": "one of auto, name, time",
@@ -101,6 +101,8 @@ def test_those_of_another_package_are_listed_behind_ours(
     assert main(["devices", "--settings"]) == 0
     told = capsys.readouterr().out
     film = "  film:\n    gray: what is grey in a colour picture (one of luma, r, g, b; default luma)\n"
+    film += "    fps: of the camera, where the film is played slower (a number from 1e-06 to 1e+06; 1/s)\n"
+    film += "    first: number of the first picture; those before it are left out (a whole number from 1; default 1)\n"
     assert f"{film}load cells:\n  sim:\n" in told
     assert "    timeout: silence that is reported (a number from 0.05 to 3600; s; default 2.0)\n" in told
     assert (

@@ -51,6 +51,17 @@ def test_pictures_share_the_memory_of_their_coefficients(monkeypatch: pytest.Mon
         np.testing.assert_array_equal(kernel.measure(image).parameters, values)
 
 
+def test_masked_pixels_are_refused_and_not_measured() -> None:
+    whole, dark = np.ma.masked_array(picture(u=0.1), False), np.ma.masked_less(picture(), 1500)
+    assert dark.mask.any()
+    kernel = PhaseKernel(picture(), GRID)
+    np.testing.assert_array_equal(kernel.measure(whole).parameters, kernel.measure(whole.data).parameters)
+    with pytest.raises(ValueError, match="the deformed image has masked pixels: give its data"):
+        kernel.measure(dark)
+    with pytest.raises(ValueError, match="the reference has masked pixels"):
+        PhaseKernel(dark, GRID)
+
+
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_values_that_are_not_finite_are_refused(value: float) -> None:
     kernel, bad = PhaseKernel(picture(), GRID), picture(u=0.1).astype(np.float32)

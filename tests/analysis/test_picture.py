@@ -10,7 +10,6 @@ import pytest
 from scipy import ndimage
 from scipy.optimize import brentq
 
-from analysis.compiled.convolution import GROUP, REACH
 from analysis.compiled.vectors import LANES
 from analysis.fit.iteration import compose, warp_zois
 from analysis.fit.kernel_args import PictureArgs
@@ -26,7 +25,7 @@ from analysis.picture.pattern import (
     resolution_length,
 )
 from analysis.picture.prefilter import PART, coefficients, room_for
-from analysis.picture.splines import PAD, Box, basis, prefilter_taps, tap_table
+from analysis.picture.splines import PAD, Box, basis, prefilter_poles, tap_table
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 
@@ -37,7 +36,7 @@ def filtered(image: np.ndarray, offset: float, box: Box, degree: int = 5) -> np.
     """The coefficients of an image, in memory that held something else."""
     out = room_for(image.shape)
     out.fill(np.nan)
-    coefficients(image, np.float32(offset), prefilter_taps(degree), box, out)
+    coefficients(image, np.float32(offset), prefilter_poles(degree), box, out)
     return out
 
 
@@ -153,7 +152,7 @@ def test_taps_need_no_linear_algebra(monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(np.array_equal(tap_table(d), e) for d, e in zip((1, 3, 5), expected, strict=True))
 
 
-@pytest.mark.parametrize("shape", [(70, 90), (9, 11), (2 * PART + 33, 40), (PART, 2 * GROUP)])
+@pytest.mark.parametrize("shape", [(70, 90), (9, 11), (2 * PART + 33, 40), (PART, 8 * LANES)])
 @pytest.mark.parametrize("kind", [np.float32, np.uint8, np.uint16])
 @pytest.mark.parametrize("degree", [3, 5])
 def test_prefilter_is_that_of_scipy(degree: int, kind: type, shape: tuple[int, int]) -> None:
@@ -165,8 +164,10 @@ def test_prefilter_is_that_of_scipy(degree: int, kind: type, shape: tuple[int, i
     assert np.max(np.abs(found - expected)) < 1e-4 * np.abs(expected).max()
 
 
-def test_the_filter_has_as_many_taps_as_are_put_down() -> None:
-    assert len(prefilter_taps(5)) == REACH + 1
+@pytest.mark.parametrize("degree", [1, 3, 5])
+def test_an_even_picture_is_its_own_coefficients(degree: int) -> None:
+    found = filtered(np.full((70, 90), 150, np.uint8), 100, Box(0, 70, 0, 90), degree)[:-LANES]
+    assert found == pytest.approx(50, rel=2e-6)
 
 
 @pytest.mark.parametrize("box", [Box(0, 300, 33, 290), Box(70, 260, 0, 150), Box(17, 200, 120, 400)])
@@ -193,7 +194,7 @@ def test_the_prefilter_sees_values_that_are_not_finite(
     if place is not None and kind is np.float32:
         image[place] = value
     box, room = Box(75, 200, 65, 300), room_for(image.shape)
-    seen = coefficients(image, np.float32(100), prefilter_taps(5), box, room)
+    seen = coefficients(image, np.float32(100), prefilter_poles(5), box, room)
     assert seen is (finite or kind is np.uint8)
 
 

@@ -6,7 +6,7 @@ limit_resources()  # as the program does, before numpy is loaded
 try:
     import cv2
 
-    cv2.DISOpticalFlow_create  # noqa: B018 - an OpenCV torn by its neighbours still imports, empty
+    cv2.DISOpticalFlow_create  # type: ignore[attr-defined]  # noqa: B018 - an OpenCV torn by its neighbours still imports, empty
 except (ImportError, AttributeError) as error:
     raise SystemExit(
         f"OpenCV does not work here ({error}). pyvale and SUN-DIC bring builds of their own which overwrite ours; "

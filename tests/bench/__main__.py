@@ -192,7 +192,7 @@ def other_engines(report: Report) -> None:
         grid = zois(size, margin=32)
         kernel = PhaseKernel(frames[0], grid, None, SIGMA)
         seconds, now, before = track(kernel, frames)
-        cpu = machine.processor_s(lambda k=kernel, b=before: k.measure(frames[-1], start=b, noise=SIGMA), 9)
+        cpu = machine.processor_s(lambda k=kernel, b=before: k.measure(frames[-1], start=b, noise=SIGMA), 9)  # type: ignore[misc]
         _engine(
             report, f"phasedic, ZOI {size}", note, (seconds, cpu), Points(*np.meshgrid(grid.x, grid.y), now.u)
         )

@@ -33,6 +33,7 @@ from tests.bench import machine
 from tests.bench.soak import children, status
 from tests.live.replay.batch.running import running
 
+assert sys.platform != "win32"  # no getrusage there
 SESSIONS = 4
 CAMERA = "sim:hole?lockstep=yes&fps=20&width=1280&height=1024&bits=12"
 RUN = ["--load", "sim:", "--burst", "2", "--reference-burst", "8", "--no-view", "--no-rrd", "--roi", "all"]

@@ -37,6 +37,7 @@ from live.ui.terminal.screen import TerminalScreen
 from tests.bench.live_case import PORT, Watch, attached
 from tests.bench.soak import children, status
 
+assert sys.platform != "win32"  # no SIGSTOP there
 BEGIN_S, SECONDS, FPS = 8.0, 24.0, 30.0
 IN_TIME_S = 3 / FPS
 
@@ -104,7 +105,7 @@ class SlowDisk:
                 time.sleep(2 / FPS)
             return plain(writer, frame)
 
-        SessionWriter.write_frame = slow  # type: ignore[method-assign]
+        SessionWriter.write_frame = slow  # type: ignore[method-assign,assignment]
 
     def __call__(self) -> None:
         self._until = time.monotonic() + 10.0
@@ -137,13 +138,13 @@ class FloodedCell:
 
 def flood() -> Callable[[], object]:
     """The next rig opened has such a cell."""
-    told, opened = threading.Event(), live_run.open_rigs
+    told, opened = threading.Event(), vars(live_run)["open_rigs"]
 
     def open_flooded(*given: Any) -> Any:
         (rig,) = opened(*given)
-        return (replace(rig, load=FloodedCell(rig.load, told)),)  # type: ignore[arg-type]
+        return (replace(rig, load=FloodedCell(rig.load, told)),)
 
-    live_run.open_rigs = open_flooded
+    vars(live_run)["open_rigs"] = open_flooded
     return told.set
 
 
@@ -157,7 +158,7 @@ def slower(factor: float) -> Disturbed:
         time.sleep(max(0.0, factor * rng.normal(1.0, 0.1) / FPS - (time.monotonic() - begin)))
         return field
 
-    Tracker.measure = slow  # type: ignore[method-assign]
+    Tracker.measure = slow  # type: ignore[method-assign,assignment]
     return Disturbed(lambda: None)
 
 

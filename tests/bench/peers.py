@@ -62,7 +62,7 @@ def pyramidal_lucas_kanade(reference: NDArray, deformed: NDArray, points: NDArra
 
 
 def dis_flow(reference: NDArray, deformed: NDArray, points: NDArray) -> Flow:
-    engine = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    engine = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)  # type: ignore[attr-defined]
 
     def run() -> NDArray[np.floating]:
         flow = engine.calc(reference, deformed, None)

@@ -162,7 +162,7 @@ def run(case: argparse.Namespace, folder: Path) -> tuple[dict[str, object], Curv
     thread.start()
     screen = TerminalScreen(quiet=True)
     with PageController(None) as page, beside(read_page, page.address), beside(read_strain):
-        consumers = standard_consumers(screen, [watch, page.begin(config)])
+        consumers = standard_consumers(screen, [watch, page.begin({"": config})[""]])
         outcome = run_live(config, screen, consumers=consumers, on_start=page.attach)
         ended.set()
         thread.join()

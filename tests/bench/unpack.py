@@ -25,7 +25,8 @@ def took_s(content: bytes, pixel_format: MonoFormat, padding: int) -> float:
 
 def main() -> None:
     """A line a format, then those with padding after each row."""
-    rng, cases, best = np.random.default_rng(0), {}, {}
+    rng, cases = np.random.default_rng(0), {}
+    best: dict[str, float] = {}
     for name, one in FORMATS.items():
         cases[name] = rng.bytes(one.size(WIDTH * HEIGHT)), one, 0
         cases[f"{name}, padded"] = rng.bytes((one.size(WIDTH) + PADDING) * HEIGHT), one, PADDING

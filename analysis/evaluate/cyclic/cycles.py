@@ -5,9 +5,9 @@ standard deviations of its noise; so has a valley (``reversals``). A cycle lies 
 of its mean level beside the peak, which the noise of a flat peak does not move, and is as long as the distance from the
 middle before, after a pause as that to the next. Without a load the strain itself is what turns.
 
-Noise and drift turn at random: cycles are there from ``MIN_CYCLES`` on, of which ``_SHARE`` must be as long and as high
-as the one before, within a factor. Memory is bounded: what lies before the last whole cycle is forgotten, a cycle of
-more than ``_KEPT`` readings is thinned.
+Noise and drift turn at random: cycles are there from ``MIN_CYCLES`` on, most of which must be as long and as high as
+the one before, within a factor (``is_cyclic``). Memory is bounded: what lies before the last whole cycle is forgotten,
+a cycle of more than ``_KEPT`` readings is thinned.
 """
 
 from __future__ import annotations
@@ -32,10 +32,15 @@ MIN_CYCLES = 4
 # Standard deviations of the noise, and share of the whole range: what a cycle exceeds
 _SURE, _LEAST = 12.0, 0.1
 _SHARE, _FACTOR = 0.8, 1.2  # of the cycles that must be like the one before, and how like
+_FIGURES, _CERTAIN = (
+    1.3,
+    5,
+)  # or of their durations and ranges, that many a cycle and as many beyond: of blocks
+_PAUSE = 1.5  # of the distance to the next cycle
 _KEPT = 16_384  # readings, of a cycle that goes on
 _BLOCK = 32_768  # readings and bursts that are taken at once, of a test that is over
 _WAIT = 16  # of the readings that are kept, as a share of 1: so many new ones are looked at together
-_LACKING = 1 / 16  # of a cycle: what may lack at the end of the test
+_LACKING = 1 / 16  # of a cycle: what may lack at the end of the test, and since when a load falls no longer
 
 
 class Cycle(NamedTuple):
@@ -86,14 +91,17 @@ class CycleCounter:
         self._loaded = loaded
         self._load, self._bursts = Track.joined(()), BurstStrains(*np.empty((3, 0)))
         self._low, self._high, self._middle = math.inf, -math.inf, math.nan
-        self._last: tuple[float, float] | None = None  # duration and range
-        self._alike = self.count = 0
+        self._last: tuple[float, float, float] | None = None  # duration, range seen, and range at least
+        self._alike = self._figures = self.count = 0
         self._waiting: list[tuple[Track, BurstStrains]] = []
 
     @property
     def is_cyclic(self) -> bool:
         """Whether what was counted are cycles, and not noise that turns at random."""
-        return self.count >= MIN_CYCLES and self._alike >= _SHARE * (self.count - 1)
+        steps = self.count - 1
+        return self.count >= MIN_CYCLES and (
+            self._alike >= _SHARE * steps or self._figures >= _FIGURES * steps + _CERTAIN
+        )
 
     def add(self, load: Track, bursts: BurstStrains, *, ended: bool = False) -> list[Cycle]:
         """The cycles that are complete with these; one of number 1 says that those before were none.
@@ -128,33 +136,37 @@ class CycleCounter:
             return []
         until = float(self._load.t[-1] if ended else min(self._load.t[-1], self._bursts.t[-1]))
         sigma = noise(self._load.values, 4)
-        middle = np.array(self._middles(sigma))
+        middle, least, lowest = np.array(self._middles(sigma)).reshape(-1, 3).T
         if not len(middle) or (len(middle) < 2 and math.isnan(self._middle)):
             return []
         before = 2 * middle[0] - middle[1] if math.isnan(self._middle) else self._middle
         duration, after = np.diff(middle, prepend=before), np.append(np.diff(middle), math.inf)
-        duration = np.where(duration > 2 * after, after, duration)  # a pause is no part of a cycle
-        n = int(np.count_nonzero(np.cumprod(middle + duration * (0.5 - _LACKING * ended) <= until)))
+        duration = np.where(duration > _PAUSE * after, after, duration)  # a pause is no part of a cycle
+        over = middle + duration * (0.5 - _LACKING * ended) <= until
+        over &= ended | (lowest + duration * _LACKING <= self._load.t[-1])  # it falls no longer
+        n = int(np.count_nonzero(np.cumprod(over)))
         middle, duration = middle[:n], duration[:n]
         if not n:
             return []
         self._middle = float(middle[-1])
-        return list(self._counted(Waves(self._load, middle, duration, sigma)))
+        return list(self._counted(Waves(self._load, middle, duration, sigma, least[:n])))
 
-    def _middles(self, sigma: float) -> list[float]:
-        """The middles of the upper halves that have a fall on either side, s."""
+    def _middles(self, sigma: float) -> list[tuple[float, float, float]]:
+        """Middles of the upper halves with a fall on either side (s), the smaller fall, and when the load is lowest."""
         t, y = self._load.t, self._load.values
         least = max(_LEAST * (self._high - self._low), _SURE * sigma)
         turns = reversals(y, least) if least > 0 else []
         falls = len(turns) > 0 and y[turns[0]] > y[turns[0] : turns[1] + 1 if len(turns) > 1 else None].min()
         peaks = turns[0 if falls else 1 :: 2]
-        found = []
+        found = list[tuple[float, float, float]]()
         for before, k, after in zip([0, *peaks], peaks, [*peaks[1:], len(y)], strict=False):
-            level = (y[k] + max(y[before : k + 1].min(), y[k:after].min())) / 2
+            low = max(y[before : k + 1].min(), y[k:after].min())
+            level = (y[k] + low) / 2
             up, down = np.flatnonzero(y[before:k] < level), np.flatnonzero(y[k:after] < level)
             if len(up) and len(down):
                 rise, fall = before + int(up[-1]), k + int(down[0]) - 1
-                found.append((_crossing(t, y, rise, level) + _crossing(t, y, fall, level)) / 2)
+                middle = (_crossing(t, y, rise, level) + _crossing(t, y, fall, level)) / 2
+                found.append((middle, float(y[k] - low), float(t[k + y[k:after].argmin()])))
         return found
 
     def _counted(self, waves: Waves) -> Iterator[Cycle]:
@@ -166,12 +178,14 @@ class CycleCounter:
         ]
         start = waves.middle - waves.duration / 2
         rows = np.array([start, waves.duration, loops.bursts, *swings[0], *swings[1], *loops.figures[3:]]).T
-        for row, size, why in zip(rows.tolist(), waves.size.tolist(), loops.why, strict=True):
-            if self._last is not None and self._last[1] < _LEAST * whole:
-                self.count, self._alike, self._last = 0, 0, None
+        sizes = zip(waves.size.tolist(), waves.least.tolist(), strict=True)
+        for row, (size, least), why in zip(rows.tolist(), sizes, loops.why, strict=True):
+            if self._last is not None and self._last[2] < _LEAST * whole:
+                self.count, self._alike, self._figures, self._last = 0, 0, 0, None
             steps = () if self._last is None else (row[1] / self._last[0], size / self._last[1])
-            self._alike += bool(steps) and all(1 / _FACTOR < step < _FACTOR for step in steps)
-            self.count, self._last = self.count + 1, (row[1], size)
+            alike = [1 / _FACTOR < step < _FACTOR for step in steps]
+            self._alike, self._figures = self._alike + (alike == [True, True]), self._figures + sum(alike)
+            self.count, self._last = self.count + 1, (row[1], size, least)
             yield Cycle._make((self.count, *row, why))
 
     def _forget(self) -> None:

@@ -1,6 +1,5 @@
 """Many tests replayed by worker processes or a Dask cluster.
 
-``test_list`` finds the tests, ``scheduler`` sorts tasks and cuts long sessions into chunks,
-``worker_processes`` and ``cluster`` run a ``worker``, ``task`` is one replay, ``row`` its line in the table,
-``campaign`` joins all.
+``test_list`` finds the tests, ``scheduler`` cuts long sessions into chunks and gives tasks to the ``worker`` processes
+of this machine or to a ``cluster``, ``task`` is one replay, ``row`` its line in the table, ``campaign`` joins all.
 """

@@ -30,7 +30,8 @@ Outcome = Literal["good", "doubt", "not checked"]
 # Of a strain or stress that has changed: in its noise; and a strain at least
 _CLEAR, _CLEAR_STRAIN = 10.0, 1e-4
 _FOLLOWS = 0.5  # correlation of stress and strain from which on one follows the other
-_MODULUS_GPa = (0.1, 1000.0)  # of solids
+_MODULUS_GPa = (1e-6, 1000.0)  # of solids, from gels to diamond
+_STIFF_GPa, _SOFT_STRAIN = 0.1, 0.005  # what is softer is elastic beyond this strain, a metal is not
 _MODULUS_OFF = 0.2
 _SIGMAS = 3.0
 _UNCOVERED_S, _UNCOVERED = 2.0, 5.0  # that forces and pictures may differ by at an end: seconds, bursts
@@ -101,11 +102,34 @@ def _sign_of_force(test: FinishedTest) -> str | None:
 
 
 def _modulus(test: FinishedTest) -> str | None:
-    """E in the range of solids, and near what was expected."""
-    e, expected = test.figures.E.value * 1e-9, test.specimen.modulus_GPa
-    if not test.figures.E.known or test.specimen.area_m2 is None:
+    """E, or where it is not known stress over strain, in the range of solids; and E near what was expected.
+
+    What is softer than 0.1 GPa (rubber, foam) has an elastic line beyond 0.5 %; a metal with a wrong section has not.
+    """
+    if test.specimen.area_m2 is None:
         return None
-    ask = Message("is the section in mm2 and the force in N (--section, --load-unit)?")
+    e, expected, span = test.figures.E.value * 1e-9, test.specimen.modulus_GPa, test.figures.span
+    ask = Message(
+        "is the section of {section} that of the specimen and the force in N (--section, --load-unit)?",
+        test.specimen.section_text,
+    )
+    low, high = _MODULUS_GPa
+    if not test.figures.E.known or span is None:
+        strain, stress = _both_known(test)
+        if not (changes(strain, _CLEAR_STRAIN) and changes(stress, 0.0)):
+            return None
+        most = int(np.argmax(np.abs(stress)))
+        over = abs(stress[most]) > high * 1e9 * np.abs(strain).max()
+        return (
+            Message(
+                "a stress of {stress} at a strain of {strain} is not that of a solid: {ask}",
+                Amount.rough("stress", float(stress[most]), 3),
+                Amount.rough("strain", float(strain[most]), 3),
+                ask,
+            )
+            if over
+            else None
+        )
     if expected is not None:
         off = abs(e / expected - 1) > _MODULUS_OFF
         return (
@@ -113,14 +137,17 @@ def _modulus(test: FinishedTest) -> str | None:
             if off
             else ""
         )
-    low, high = _MODULUS_GPa
-    return (
-        ""
-        if low <= e <= high
-        else Message(
-            "E = {e:.3g} GPa is not that of a solid, {low:g} to {high:g} GPa: {ask}", e, low, high, ask
+    text = Amount.rough("stress", e * 1e9, 3)
+    if not low <= e <= high:
+        return Message("E = {e} is not that of a solid: {ask}", text, ask)
+    if e < _STIFF_GPa and span.strain[1] < _SOFT_STRAIN:
+        return Message(
+            "E = {e} is soft for a line that ends at {strain}: {ask}",
+            text,
+            Amount.rough("strain", span.strain[1], 2),
+            ask,
         )
-    )
+    return ""
 
 
 def _coverage(test: FinishedTest) -> str | None:

@@ -262,12 +262,7 @@ def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
 def _rig(run: RunFolder, pictures: MapPictures) -> dict[str, object]:
     s, camera, grid = run.specimen, pictures.camera, run.strain.grid
     found: dict[str, object] = {str(key): value for key, value in run.strain.metadata.items()}
-    known = s.width_mm is not None and s.thickness_mm is not None
-    found[Message("section")] = (
-        Message("{width:g} mm x {thickness:g} mm", s.width_mm, s.thickness_mm)
-        if known
-        else Message("not known: forces, no stresses")
-    )
+    found[Message("section")] = s.section_text or Message("not known: forces, no stresses")
     found[Message("load along")] = Message("{axis} of the picture", run.load_axis.axis)
     if direction := axis_text(run.load_axis):
         found[Message("direction of the load")] = direction

@@ -14,11 +14,12 @@ from hypothesis import strategies as st
 
 from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError
-from live.config.loading import Config, from_dict, load_config, settings_in
+from live.config.loading import Config, from_dict, laid_over, load_config, settings_in
 from live.config.rig_file import new_rig, write_rig
 from live.config.sections import SpecimenConfig
 from live.config.values import COVARIANCE, LENS_PARAMETERS
 from live.setup.grid import grid_for
+from live.ui.web.setup.config_draft import ConfigDraft
 
 
 def written(folder: Path, text: str) -> Path:
@@ -326,3 +327,45 @@ def test_an_alarm_has_one_limit(tmp_path: Path) -> None:
 def test_no_load_cell_is_said_with_and_without_a_colon(tmp_path: Path, given_as: str, address: str) -> None:
     assert load_config(None, {"load.address": given_as}).load.address == address
     assert load_config(written(tmp_path, f'[load]\naddress = "{given_as}"'), {}).load.address == address
+
+
+@pytest.mark.parametrize(
+    "shape", [{"area_mm2": 400.0}, {"diameter_mm": 30.0}, {"width_mm": 5.0, "thickness_mm": 5.0}]
+)
+def test_a_section_given_in_another_way_replaces_that_of_the_file(
+    shape: dict[str, float], tmp_path: Path
+) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text("[specimen]\n" + "".join(f"{key} = {value}\n" for key, value in shape.items()))
+    flat = {"specimen.width_mm": 20.0, "specimen.thickness_mm": 2.0}
+    for new, area in (
+        (flat, 40e-6),
+        ({"specimen.area_mm2": 7.0}, 7e-6),
+        ({}, load_config(rig, {}).specimen.area_m2),
+    ):
+        assert load_config(rig, new).specimen.area_m2 == pytest.approx(area)
+        draft = ConfigDraft(load_config(rig, {}), rig, {})
+        draft.change_all(new)
+        assert draft.config.specimen.area_m2 == pytest.approx(area)
+        saved = ConfigDraft(load_config(rig, new), rig, new)
+        assert from_dict(
+            draft.config.as_dict(), laid_over(settings_in(rig), new), ""
+        ).specimen.area_m2 == pytest.approx(area)
+        before = rig.read_text()
+        saved.save(None)
+        assert load_config(rig, {}).specimen.area_m2 == pytest.approx(area)
+        rig.write_text(before)
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ({"width_mm": 12.0, "thickness_mm": 5.0}, "12 mm x 5 mm"),
+        ({"diameter_mm": 7.14}, "diameter 7.14 mm"),
+        ({"area_mm2": 40.0, "diameter_mm": 9.0}, "40 mm2"),
+        ({"width_mm": 12.0}, ""),
+    ],
+)
+def test_a_section_in_words(given: dict[str, float], text: str) -> None:
+    specimen = SpecimenConfig(**given)
+    assert specimen.section_text == text and bool(text) == (specimen.area_m2 is not None)

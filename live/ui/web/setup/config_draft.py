@@ -17,7 +17,7 @@ from acquire.files.picture import write_picture
 from acquire.text import Message
 from live.config.cameras import camera_configs, other_cameras
 from live.config.gauges import GaugeTable
-from live.config.loading import Config, from_dict, load_config, settings_in
+from live.config.loading import Config, from_dict, load_config, other_shapes, settings_in
 from live.config.new_files import free_name
 from live.config.rig_file import write_rig
 
@@ -64,6 +64,7 @@ class ConfigDraft:
         self._transient = {key: value for key, value in overrides.items() if key.startswith(TRANSIENT)}
         in_file = settings_in(path) if path.exists() else {}
         permanent = {key: value for key, value in overrides.items() if key not in self._transient}
+        permanent |= {key: None for key in other_shapes(permanent) if key in in_file}
         self.changes: dict[str, Any] = {key: v for key, v in permanent.items() if in_file.get(key) != v}
         self._config = given
         # The page and the check change it, each in a thread of its own.
@@ -93,6 +94,7 @@ class ConfigDraft:
 
     def _change_all(self, changes: Mapping[str, Any], gauges: Mapping[str, GaugeTable] | None = None) -> None:
         tree: dict[str, Any] = json.loads(json.dumps(self._config.as_dict()))
+        changes = dict.fromkeys(other_shapes(changes)) | dict(changes)
         if gauges is not None:
             tree["gauges"] = json.loads(json.dumps(dict(gauges)))
         for dotted, value in changes.items():

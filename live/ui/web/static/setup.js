@@ -41,8 +41,10 @@ function showStep(name, kind) {
 }
 
 export function sectionOf(s) {
-  if (s.diameter_mm) return `⌀ ${short(s.diameter_mm)} mm`;
-  return s.width_mm && s.thickness_mm ? `${short(s.width_mm)} × ${short(s.thickness_mm)} mm` : s.area_mm2 ? `${short(s.area_mm2)} mm²` : "";
+  const isArea = (mm2) => Math.abs(mm2 / s.area_mm2 - 1) < 1e-6; // the file may give several
+  if (isArea(s.width_mm * s.thickness_mm)) return `${short(s.width_mm)} × ${short(s.thickness_mm)} mm`;
+  if (isArea((Math.PI / 4) * s.diameter_mm ** 2)) return `⌀ ${short(s.diameter_mm)} mm`;
+  return s.area_mm2 ? `${short(s.area_mm2)} mm²` : "";
 }
 
 function showSteps(value) {

@@ -162,8 +162,8 @@ def test_a_cyclic_test_is_neither() -> None:
 @pytest.mark.parametrize(
     ("factor", "expected", "words"),
     [
-        (1e-3, None, "E = 0.07 GPa is not that of a solid"),
-        (1e3, None, "GPa is not that of a solid"),
+        (1e-3, None, "MPa is soft for a line that ends at"),
+        (1e3, None, "GPa is not that of a solid: is the section of 10 mm x 2 mm"),
         (0.7, 70.0, "where specimen.modulus_GPa is 70"),
         (1.25, 70.0, "where specimen.modulus_GPa is 70"),
         (0.85, 70.0, ""),
@@ -176,6 +176,22 @@ def test_a_modulus_of_no_solid_or_not_that_expected(
     specimen = replace(FLAT, modulus_GPa=expected)
     found = doubts(findings(test_of(force=factor * stress_of(STRAINS) * 20e-6, specimen=specimen)))
     assert bool(found) == bool(words) and (not words or (words in found[0] and "N" in found[0]))
+
+
+def test_a_soft_solid_that_is_strained_far_is_none_of_a_wrong_section() -> None:
+    strains = np.r_[np.zeros(20), np.linspace(0, 0.4, 120)]
+    test = test_of(strains, force=1e6 * strains * 20e-6)
+    assert test.figures.E.value == pytest.approx(1e6, rel=0.01) and outcomes(test)["modulus"] == "good"
+
+
+def test_a_stress_that_no_solid_bears_is_named_without_an_elastic_line() -> None:
+    strains = 0.06 * np.maximum(np.linspace(-0.4, 1, 100), 0)
+    force = np.interp(strains, (0, 2.5e-3, 0.06), (0, 3500, 6000))
+    specimen = replace(FLAT, width_mm=0.02, thickness_mm=0.002)
+    test = test_of(strains, force=force, specimen=specimen)
+    assert not test.figures.E.known and "at a strain of 6" in first_doubt(test)
+    assert "is the section of 0.02 mm x 0.002 mm that of the specimen" in first_doubt(test)
+    assert outcomes(test_of(strains, force=force))["modulus"] == "not checked"
 
 
 def test_a_force_without_a_section_has_no_modulus() -> None:
