@@ -1,10 +1,11 @@
 """Figures from fields: what a test engineer or a map needs.
 
-``gauges`` are virtual gauges and extensometers on a field, by the extension of two ends. ``tensile`` evaluates a test:
-a ``curve`` by one of the standards (``tensile_figures``), its ``elastic`` line, its ``strengths``, its plastic ``flow``, each a
-``figure`` with an interval; ``programme`` finds what kind of test it is, ``seen`` what of the force was seen. ``lag``
-is the delay of the load beside the frames. ``floor`` has the still phase of a test and the noise floor in it.
-``deconvolution`` removes the blur of the ZOI from a map. ``response`` has what each place does over all instants.
+``gauges`` are virtual gauges and extensometers on a field, by the extension of two ends. ``tensile`` evaluates a
+test: a ``curve`` by one of the standards (``tensile_figures``), its ``elastic`` line, its ``strengths``, its plastic
+``flow``, each a ``figure`` with an interval; ``programme`` finds what kind of test it is, ``seen`` what of the force
+was seen. ``lag`` is the delay of the load beside the frames. ``floor`` has the still phase of a test and the noise
+floor in it. ``deconvolution`` removes the blur of the ZOI from a map. ``response`` has what each place does over all
+instants.
 """
 
 from analysis.evaluate.area.strain import AreaStrain, Unevenness

@@ -1,7 +1,7 @@
 """What the camera adds to the motion of a plane, and how it is removed.
 
-``plane`` is the apparent motion of a rigid plane in pictures, and names what motion off it shows; ``layout`` places the ZOIs of plates beside those of the
-specimen, ``plates`` measures the apparent motion on them. ``shutter`` removes
+``plane`` is the apparent motion of a rigid plane in pictures, and names what motion off it shows; ``layout`` places
+the ZOIs of plates beside those of the specimen, ``plates`` measures the apparent motion on them. ``shutter`` removes
 what reading line by line adds, for the time that ``readout`` finds; ``burst_motion`` is the error of an uneven motion
 during a burst; ``lens`` the distortion, which ``shifts`` finds.
 """

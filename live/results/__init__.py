@@ -1,8 +1,8 @@
 """The files of a run: ``strain.h5`` and ``strain.csv`` written row by row, and read back.
 
 ``writer`` writes a ``row`` to ``strain.csv`` and by ``strain_h5`` in the ``layout``; ``quantities`` defines each
-number, ``reader`` opens the file (``Strain``), ``run_folder`` a whole run, ``pictures`` its images. ``figures`` is the
-table of tensile figures, ``summary`` the text at the end, ``noise_floor`` the still phase. Packages: ``maps``,
+number, ``reader`` opens the file (``Strain``), ``run_folder`` a whole run, ``pictures`` its images. ``figures`` is
+the table of tensile figures, ``summary`` the text at the end, ``noise_floor`` the still phase. Packages: ``maps``,
 ``report``, ``export``. ``python -m live.results`` reads an unfinished file in a child process.
 """
 
