@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from acquire.text import Message
 from acquire.text.quantity import Amount
-from analysis.evaluate import CONFIDENCE, Figure
+from analysis.evaluate import CONFIDENCE, Figure, Track
 from analysis.evaluate.curve import noise
-from analysis.evaluate.seen import LEAPS_NEED, leap, leap_alike, without_stopped
+from analysis.evaluate.seen import LEAPS_NEED, leap, leap_alike, renewal_s, without_stopped
 from live.results.figures import LAG_MATTERS_S, figure_text
 from live.results.finished.finished_test import FinishedTest
 
@@ -36,6 +36,7 @@ _MODULUS_OFF = 0.2
 _SIGMAS = 3.0
 _UNCOVERED_S, _UNCOVERED = 2.0, 5.0  # that forces and pictures may differ by at an end: seconds, bursts
 _OFF_AXIS = math.radians(10)
+_STEP = 0.001  # of the highest force: half of what it changes by from one value to the next
 _PRELOAD = 0.002  # of the highest force, below which a force at the reference is the zero of a load cell
 
 
@@ -203,6 +204,22 @@ def _leaps(test: FinishedTest) -> str | None:
     )
 
 
+def _renewal(test: FinishedTest) -> str | None:
+    """No value of the force that many lines repeat while the specimen is pulled on."""
+    samples = test.samples.first()
+    if len(samples.known().t) < 2:
+        return None
+    every, change = renewal_s(samples, Track(test.curve.t, test.curve.strain))
+    if every / 2 < LAG_MATTERS_S or change / 2 < _STEP * float(np.nanmax(np.abs(samples.values))):
+        return ""
+    return Message(
+        "the load cell sends each value again and again, a new one every {every:.2g} s: forces are of up to {change} "
+        "before; raise its rate of measuring, or lower its filter",
+        every,
+        Amount.rough("force", change, 2),
+    )
+
+
 def _leaps_of_strain(test: FinishedTest) -> str | None:
     """No leap of the strains along and across the load the same way."""
     found = leap_alike(test.curve)
@@ -300,6 +317,7 @@ _CHECKS: dict[str, Callable[[FinishedTest], str | None]] = {
     "sign of the force": _sign_of_force,
     "modulus": _modulus,
     "forces and pictures": _coverage,
+    "renewal of the force": _renewal,
     "leaps of the force": _leaps,
     "leaps of the strain": _leaps_of_strain,
     "lag": _lag,
