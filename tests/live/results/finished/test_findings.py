@@ -133,6 +133,24 @@ def test_a_display_that_is_renewed_slowly_is_named() -> None:
     assert outcomes(live)["renewal of the force"] == "good"
 
 
+@pytest.mark.parametrize("per_s", [40.0, -40.0])
+def test_a_zero_that_drifts_is_named(per_s: float) -> None:
+    whole, t = stress_of(STRAINS) * 20e-6, np.arange(len(STRAINS)) / FPS
+    found = {one.name: one for one in findings(test_of(force=whole + per_s * t))}["leaps of the force"]
+    assert found.outcome == "doubt" and "of rest at first, and the strain does not" in found.text
+    real = test_of(force=whole + per_s * t)
+    off = real.figures.E.value / test_of(force=whole).figures.E.value - 1
+    named = float(found.text.partition("changes E by ")[2].partition("%")[0].replace("\u2212", "-"))
+    assert abs(off) > 0.05 and named == pytest.approx(100 * off, abs=1.5)
+    assert outcomes(test_of(force=whole + 0.05 * per_s * t))["leaps of the force"] == "good", "less than 1 %"
+
+
+def test_a_force_that_strains_the_specimen_before_the_pull_is_no_drift() -> None:
+    """Grips that are closed, or a specimen that warms up between them."""
+    strains = np.r_[np.linspace(0, 8e-6, 20), 8e-6 + STRAINS[20:]]
+    assert outcomes(test_of(strains, force=stress_of(strains) * 20e-6))["leaps of the force"] == "good"
+
+
 def test_an_elastic_part_of_few_pictures_is_no_leap_of_the_force() -> None:
     strains = 0.06 * np.maximum(np.linspace(-0.4, 1, 100), 0)
     test = test_of(strains, force=np.interp(strains, (0, 2.5e-3, 0.06), (0, 3500, 6000)))
