@@ -197,11 +197,11 @@ class CycleCounter:
 
 def _lone(y: Floats, least: float) -> NDArray[np.bool_]:
     """Which readings are off their four neighbours by ``least`` and four times what those differ by: no peaks, (N,)."""
-    lone = np.zeros(len(y), np.bool_)
-    if len(y) >= 5:
-        around = np.delete(np.lib.stride_tricks.sliding_window_view(y, 5), 2, axis=1)
-        off = np.abs(y[2:-2] - np.median(around, axis=1))
-        lone[2:-2] = (off > least) & (off > 4 * np.ptp(around, axis=1))
+    lone, far = np.zeros(len(y), np.bool_), np.abs(np.diff(y)) > 0.75 * least  # from a neighbour as well
+    k = np.flatnonzero(far[1:-2] & far[2:-1]) + 2
+    around = y[k[:, None] + np.array([-2, -1, 1, 2])]
+    off = np.abs(y[k] - np.median(around, axis=1))
+    lone[k] = (off > least) & (off > 4 * np.ptp(around, axis=1))
     return lone
 
 
