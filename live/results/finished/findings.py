@@ -188,13 +188,13 @@ def _coverage(test: FinishedTest) -> str | None:
 
 
 def _leaps(test: FinishedTest) -> str | None:
-    """No leap of the force to another level that the strain does not follow; without an elastic line none is told.
+    """No leap of the force to another level that the strain does not follow; without an elastic line only falls.
 
-    Where the pictures are too few for one, a step of the force may be the elastic part.
+    Where the pictures are too few for one, a rise of the force may be the elastic part.
     """
-    if not test.figures.E.known:
-        return None
     found = leap(test.curve)
+    if not test.figures.E.known and (found is None or found[1] > 0):
+        return None
     if found is None:
         return _drift_at_rest(test) or ("" if len(test.curve.t) >= LEAPS_NEED else None)
     return Message(

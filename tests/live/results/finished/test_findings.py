@@ -151,6 +151,28 @@ def test_a_force_that_strains_the_specimen_before_the_pull_is_no_drift() -> None
     assert outcomes(test_of(strains, force=stress_of(strains) * 20e-6))["leaps of the force"] == "good"
 
 
+@pytest.mark.parametrize("at", [40, 60])
+@pytest.mark.parametrize("tared", [False, True])
+def test_a_force_that_is_tared_or_gets_another_unit_in_the_test_is_named_without_e(
+    at: int, tared: bool
+) -> None:
+    """Its highest is no strength."""
+    whole, k = stress_of(STRAINS) * 20e-6, np.arange(len(STRAINS))
+    test = test_of(force=np.where(k >= at, whole - whole[at] if tared else whole / 9.80665, whole))
+    found = {one.name: one for one in findings(test)}["leaps of the force"]
+    assert not test.figures.E.known and test.figures.Rm.value < 0.8 * stress_of(STRAINS).max()
+    assert found.outcome == "doubt" and "leaps by \u2212" in found.text
+
+
+def test_a_specimen_that_breaks_or_yields_is_no_leap_of_the_force() -> None:
+    strains = np.r_[np.zeros(20), np.linspace(0, 0.02, 100), np.linspace(0.02, 0.08, 10), np.full(10, 0.08)]
+    stress = np.r_[np.minimum(E_PA * strains[:120], 2e8), 2e8 * np.linspace(1, 0.55, 10), np.zeros(10)]
+    yielding = np.where(strains < 0.0015, E_PA * strains, 0.75 * 105e6)
+    for one in (stress, yielding):
+        test = test_of(strains, force=one * 20e-6)
+        assert not test.figures.E.known and outcomes(test)["leaps of the force"] == "not checked"
+
+
 def test_an_elastic_part_of_few_pictures_is_no_leap_of_the_force() -> None:
     strains = 0.06 * np.maximum(np.linspace(-0.4, 1, 100), 0)
     test = test_of(strains, force=np.interp(strains, (0, 2.5e-3, 0.06), (0, 3500, 6000)))
