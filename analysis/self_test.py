@@ -34,7 +34,7 @@ MAX_SIZE = {"spectral": 128, "phase": 64}
 """Sides of ZOIs, px. The estimator by phases needs much more time for large ones."""
 NOISE_GL = {1: 6.0, 3: 0.07, 5: 0.0045}
 """Largest noise that is found in the pattern, which has none, by the degree of the spline, for ZOIs of ``USUAL`` px and
-more. A machine that works shows up to half of it, and a prefilter whose first pole is 2 % off twice as much."""
+more. A machine that works shows up to half of it."""
 USUAL = 30
 GRADIENT = 0.005
 """Largest share by which a gradient of the reference, or sigma for a known noise, is off; a machine that works: 0.0001

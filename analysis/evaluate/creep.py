@@ -2,7 +2,7 @@
 
 The hold is found from the force (``programme``). About an instant of it, with t the time since it began, the strain is
 by least squares e = a + b ln t + c t: logarithmic and steady creep (ISO 204:2018 calls them primary and secondary). The
-standard uncertainties are of the scatter about that.
+standard uncertainties are of the scatter about that, of single bursts or of means of a twelfth, whichever is more.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.text import Message
-from analysis.evaluate.curve import Curve, smoothed
+from analysis.evaluate.curve import Curve, noise, smoothed
 from analysis.evaluate.figure import Figure
 from analysis.evaluate.programme import HELD, KindOfTest
 
 Floats = NDArray[np.float64]
 _FEWEST, _MOST = 12, 3  # bursts of a fit; strains to which the times are given
+_CLEAR = 5.0  # standard uncertainties
 _ABOUT = 1.4  # of the time at which a strain is reached: the fit goes from that part of it to that multiple
 
 
@@ -76,8 +77,10 @@ class _Hold:
         design, strain = _design(self.t[part] / high), self.strain[part]
         inverse = np.linalg.pinv(design.T @ design, hermitian=True)
         found = inverse @ design.T @ strain
-        scatter = np.sum((strain - design @ found) ** 2) / (len(strain) - 3)
-        return found, inverse * scatter
+        rest = strain - design @ found
+        # What neighbours have in common, of a creep of another law or of a drift, averages out by its means alone.
+        common = sum(part.sum() ** 2 / len(part) for part in np.array_split(rest, _FEWEST)) / (_FEWEST - 3)
+        return found, inverse * max(np.sum(rest**2) / (len(strain) - 3), common)
 
     def rate(self) -> Figure:
         end = float(self.t[-1]) if len(self.t) else math.nan
@@ -87,10 +90,19 @@ class _Hold:
         along = (_design(np.ones(1)) - _design(np.full(1, 0.5)))[0] / (end / 2)
         return Figure.about(float(along @ fit[0]), math.sqrt(along @ fit[1] @ along))
 
+    def _moves(self) -> bool:
+        """Whether the last tenth of the strains is clearly off the first."""
+        n = len(self.strain) // 10
+        if not n:
+            return False
+        return bool(
+            abs(np.mean(self.strain[-n:]) - np.mean(self.strain[:n])) > _CLEAR * noise(self.strain) / n**0.5
+        )
+
     def times(self) -> list[tuple[float, Figure]]:
         course = smoothed(self.strain, max(1, len(self.strain) // 200))
         found = []
-        for mark in _round_between(float(course[0]), float(course[-1])) if len(course) else ():
+        for mark in _round_between(float(course[0]), float(course[-1])) if self._moves() else ():
             above = course >= mark if course[-1] > course[0] else course <= mark
             at = float(self.t[np.argmax(above)])
             for _ in range(3):  # the fit moves with the instant that it gives

@@ -1,4 +1,9 @@
-"""What of the force was seen: of a load cell that lives, confirmed by neighbours; gaps that may hide the highest."""
+"""What of the force was seen: of a load cell that lives, confirmed by neighbours; gaps that may hide the highest.
+
+A load cell may renew its value more slowly than it sends lines: each is the force of up to one renewal ago. A display
+of a coarse last digit repeats values too, but then a change is of a digit or two, and the runs are as long as the force
+is slow. A force that truly goes by steps moves the specimen with it.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +15,7 @@ from numpy.typing import NDArray
 
 from acquire.text import Message
 from analysis.evaluate.curve import Curve, Floats, broken_at, noise
+from analysis.evaluate.lag import Track
 
 _USUAL, _STEEP = 75, 3.0  # percentile of the rises, and times those
 _SURE = 8.0  # standard deviations of the noise
@@ -31,6 +37,12 @@ LEAPS_NEED = 2 * _AROUND + _FEWEST
 """Instants of a test that shows leaps."""
 _YIELDS = 0.3  # of the stress: a fall by more is no yield point
 _KINK = 1.75  # of a rate a reading: what a kink in it may look like beside a leap (1.61 at most over _AROUND)
+
+_LINES, _VALUES = 3, 12  # of one value in a row; such runs
+_DIGITS, _ROUNDING = 5.0, 1e-9  # of the last digit: a large change; of the highest force: none
+_ALIKE, _LONG = 0.8, 0.1  # of the runs that are as long as usual, and by how much they differ
+_FAST_S = 0.6  # what a display takes at most, without another sign
+_MOVES = 0.3  # of the strain with a change of the force: what it moves by without one
 
 
 def without_stopped(curve: Curve) -> tuple[Curve, tuple[str, ...]]:
@@ -327,3 +339,38 @@ def unseen(curve: Curve, measured: Curve) -> Unseen | None:
     return Unseen(
         int(known[k]), after, Message("no force is known from {t:.4g} s {until}", t[k] - curve.t[0], until)
     )
+
+
+def renewal_s(force: Track, strain: Track) -> tuple[float, float]:
+    """Usual time between two values of a force that is sent more often, s, and its change then (N); 0 where it is not.
+
+    ``strain`` shows whether the specimen moves while the force is said to stand still; both on one clock.
+    """
+    force, strain = force.known(), strain.known()
+    new = np.flatnonzero(np.diff(force.values)) + 1
+    steps, lines = np.abs(force.values[new] - force.values[new - 1]), np.diff(new)
+    apart = np.concatenate([np.diff(np.sort(one)) for one in (force.values, steps)])
+    digits = apart[apart > _ROUNDING * np.abs(force.values).max(initial=0.0)]
+    if len(new) <= _VALUES or not len(digits):
+        return 0.0, 0.0
+    large = steps > _DIGITS * digits.min()
+    runs = lines[large[:-1] & large[1:]]
+    if len(runs) < _VALUES:
+        return 0.0, 0.0
+    usual = float(np.median(runs))
+    alike = np.mean(np.abs(runs - usual) <= max(1.0, _LONG * usual)) >= _ALIKE
+    if usual < _LINES or not alike or not _moves(force, strain, new):
+        return 0.0, 0.0
+    return float(np.median(np.diff(force.t[new]))), float(np.median(steps[large]))
+
+
+def _moves(force: Track, strain: Track, new: NDArray[np.intp]) -> bool:
+    """Whether the strain goes the way of the force between instants that have the same value, too."""
+    first, last = force.t[new[0]], force.t[new[-1]]
+    inside = (strain.t >= first) & (strain.t <= last)
+    t, moved = strain.t[inside], np.diff(strain.values[inside])
+    way = np.sign(np.diff(np.interp(t, force.t[new], force.values[new])))
+    changed = np.searchsorted(force.t[new - 1], t[1:]) > np.searchsorted(force.t[new], t[:-1])
+    if changed.all():  # fewer pictures than values: a force seldom goes by so many steps so fast
+        return bool((last - first) / len(new) < _FAST_S and len(np.unique(force.values)) > len(new) / 2)
+    return bool(np.mean((way * moved)[~changed]) > _MOVES * np.mean((way * moved)[changed]))

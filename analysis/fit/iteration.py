@@ -290,7 +290,9 @@ def _track_some(
         begun = np.intp(iterations[i])
         state[i] = RUNNING
         if begun == 0:
-            _know_nothing(out, i)
+            out.left[i] = out.bending[i] = np.nan
+            out.cubic[i, :] = np.nan
+            out.nuisance[i, :] = np.nan
         for iteration in range(begun, stop.max_iterations):
             if not _within(picture, q, fit.order, first + reach, top + reach, reach):
                 state[i] = LEFT_IMAGE
@@ -302,15 +304,6 @@ def _track_some(
             take(fit, stop, out, i, z, q, step, step, bent_by, known, solved)
             if state[i] != RUNNING:
                 break
-
-
-@part
-def _know_nothing(out: Any, i: int) -> None:
-    out.left[i] = out.bending[i] = np.nan
-    for k in range(2):
-        out.cubic[i, k] = np.nan
-    for k in range(3):
-        out.nuisance[i, k] = np.nan
 
 
 @inlined

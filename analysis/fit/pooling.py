@@ -53,6 +53,8 @@ AS_STATED = 1.1
 """... leave no more than this of what the noise as stated explains, what the others leave more is their own: blur or
 glare on a part of the picture."""
 MAD = 1.4826
+COUNTED = 4000
+"""ZOIs that a median is of, about."""
 SAMPLE, AROUND = 512, 0.1
 """Of many values so many show where their median is, to this share of them on either side."""
 
@@ -106,11 +108,10 @@ def _between(a: PooledError | None, b: PooledError, part: float) -> PooledError:
 def _common(out: Floats, known: ReferenceArgs, every: int, given: bool) -> PooledError | None:
     """The common error of the ZOIs shown, (SHOWN, N), one in ``every``; None where the picture is its own reference."""
     count = out.shape[1]
-    contrast, ratio, spread, bare, *cubic, _, bends = out[:, np.argsort(out[0], kind="stable")]
+    contrast, ratio, spread, bare, *cubic, _, bends = np.take(out, np.argsort(out[0]), axis=1)
     if np.count_nonzero(bare < SAME) > count / 2:
         return None
-    groups = _alike(count)
-    middle, usual = medians(contrast[groups]), medians(ratio[groups])
+    middle, usual = medians(_alike(contrast)), medians(_alike(ratio))
     number, shares = count * min(1.0, every * known.independent), np.array(cubic) / known.white[:, None]
     usual_bend = medians(bends[None]) / (WHITE_BENT * known.bends)
     bent = max(1.0, float(_shrunk(usual_bend, number)[0]))
@@ -123,12 +124,14 @@ def _common(out: Floats, known: ReferenceArgs, every: int, given: bool) -> Poole
         return stated if np.abs(np.log(colour)).max() < np.log(COLOURED) else stated._replace(colour=colour)
     trend, of_each = _at(known.signal, middle, usual), _at(contrast, middle, usual)
     scatter = MAD * median(np.abs(ratio / of_each - 1))
-    lowest = _lowest(ratio[groups], spread[groups])
+    lowest = _lowest(_alike(ratio), _alike(spread))
     as_stated = (lowest < AS_STATED) | (np.median(lowest) < AS_STATED)
     common = np.where(as_stated, np.minimum(usual, 1.0), usual)
     forgiven = trend if np.array_equal(common, usual) else _at(known.signal, middle, common)
     colour = _shrunk(medians(shares / of_each), number)
-    return PooledError(trend, forgiven, median(trend), scatter, colour, bent, False)
+    return PooledError(
+        trend, forgiven, median(trend[:: 1 + len(trend) // COUNTED]), scatter, colour, bent, False
+    )
 
 
 def median(values: Floats) -> float:
@@ -241,11 +244,11 @@ def interpolate(x: Any, at: Any, values: Any, out: Any) -> None:
             out[n] = values[k] + slope * (x[n] - at[k]) if x[n] >= at[k] else out[n]
 
 
-def _alike(count: int) -> NDArray[np.intp]:
-    """Groups of ZOIs of like contrast, in whose order they are, (G, N); a few of the highest are left over."""
-    groups = max(1, min(MAX_GROUPS, count // GROUP))
-    size = count // groups
-    return np.arange(groups * size).reshape(groups, size)
+def _alike(values: Floats) -> Floats:
+    """Those of groups of ZOIs of like contrast, in whose order they are, (G, N); a few of the highest are left over."""
+    groups = max(1, min(MAX_GROUPS, len(values) // GROUP))
+    size = len(values) // groups
+    return values[: groups * size].reshape(groups, size)
 
 
 def _lowest(ratio: Floats, spread: Floats) -> Floats:

@@ -12,7 +12,7 @@ JPEG at quality 50 makes mean strains of 700 um/m too much, and a blur of 0.6 px
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,9 @@ from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.solve import Solution
 from analysis.kernel.white_noise import halves
 from analysis.picture.pattern import BLOCKS, blockiness
+
+if TYPE_CHECKING:
+    from analysis.fit.assembly import ExpectedNoise
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.float32]
@@ -62,7 +65,7 @@ def error_cause(solution: Solution, ok: NDArray[np.bool_], left: Pixels) -> Caus
     return "noise" if _is_white(left) else "filter"
 
 
-def beside_strain(solution: Solution, ok: NDArray[np.bool_]) -> float | None:
+def beside_strain(solution: Solution, ok: NDArray[np.bool_], expected: ExpectedNoise) -> float | None:
     """What the fits leave beside a strain that varies within the ZOIs, over what noise as stated leaves (variances).
 
     Such a strain shifts the pattern a little otherwise in each part of a ZOI. Where shifts of its parts explain most
@@ -74,6 +77,8 @@ def beside_strain(solution: Solution, ok: NDArray[np.bool_]) -> float | None:
     solution : Solution
     ok : (A,) bool
         ZOIs that have a value.
+    expected : ExpectedNoise
+        Of all ZOIs.
 
     Returns
     -------
@@ -83,7 +88,7 @@ def beside_strain(solution: Solution, ok: NDArray[np.bool_]) -> float | None:
     size = solution.reference.grid.size
     which = some(ok, max(FEWEST, SAMPLE * 32**2 // size**2))
     left = _in_parts(left_by_fit(solution, which))
-    noise = float(np.median(solution.expected(which, solution.found.nuisance[which]).felt))
+    noise = float(np.median(expected.felt[which]))
     excess = np.sum(left**2) - left.size * noise
     by_chance = 3 * noise * (2 * left.size) ** 0.5
     agrees = solution.is_given and AGREES[0] < 1 + excess / (left.size * noise) < AGREES[1]

@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from analysis.field import Status
@@ -101,7 +100,10 @@ def left_by_fit(solution: Solution, which: Places) -> Pixels:
 
 def zois_of(image: Pixels, origins: Places, size: int) -> Pixels:
     """The ZOIs of an image whose first pixels are ``origins`` (N, 2: row, column), (N, n, n)."""
-    return np.asarray(sliding_window_view(image, (size, size))[origins[:, 0], origins[:, 1]])
+    out = np.empty((len(origins), size, size), image.dtype)
+    for to, (y, x) in zip(out, origins.tolist(), strict=True):
+        to[:] = image[y : y + size, x : x + size]
+    return out
 
 
 def _profile(solution: Solution, which: Places, left: Floats, axis: int) -> Floats:

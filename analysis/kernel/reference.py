@@ -88,7 +88,7 @@ class ReferencePicture:
     kept : dict
         By ZOIs, spectra of what they recorded (``coloured``).
     made_later : dict
-        By name, what only some pictures need.
+        By name, what only some pictures need, and what the next one may (``solve.Stated``).
     """
 
     grid: ZoiGrid
@@ -112,7 +112,7 @@ class ReferencePicture:
     cleaned: bool
     repetition: Repetition
     kept: dict[bytes, NDArray[np.complex64]] = field(default_factory=dict, repr=False)
-    made_later: dict[str, Floats] = field(default_factory=dict, repr=False)
+    made_later: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
     def first(
@@ -160,7 +160,8 @@ class ReferencePicture:
         """``white_noise.responses``, (8, n, n // 2 + 1)."""
         if "response" not in self.made_later:
             self.made_later["response"] = responses(self.prepared, self.grid.size, self.settings.order)
-        return self.made_later["response"]
+        response: Floats = self.made_later["response"]
+        return response
 
     @property
     def period(self) -> Floats:

@@ -135,7 +135,7 @@ def settle(solution: Solution, expected: Floats) -> Bools:
     (A,) bool
         Which may have changed.
     """
-    repeats = np.isfinite(solution.reference.period)
+    repeats = np.asarray(solution.reference.repetition.has.any(axis=1))
     if not repeats.any():
         return repeats
     neighbours = Neighbours.of(solution.reference)

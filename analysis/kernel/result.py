@@ -22,6 +22,7 @@ from analysis.kernel.coloured import (
     left_of_some,
     own_error,
 )
+from analysis.kernel.lines import some
 from analysis.kernel.solve import Solution
 
 if TYPE_CHECKING:
@@ -77,13 +78,14 @@ def field_of(solution: Solution, predicted: PredictedMotion | None = None) -> St
         None: the field has no motion.
     """
     from analysis.fit.assembly import weigh, weigh_blur
-    from analysis.fit.pooling import median
+    from analysis.fit.pooling import COUNTED, median
 
     reference, found = solution.reference, solution.found
     ok = solution.status == Status.OK
-    gain = found.nuisance[:, 0]
-    expected = solution.expected(np.s_[:], found.nuisance)
-    noise = _noise_parts(solution, ok, expected)
+    gain = np.ascontiguousarray(found.nuisance[:, 0])
+    expected = solution.expected_of_all
+    shown = some(ok, COUNTED)
+    noise = _noise_parts(solution, ok, shown, gain, expected)
     residual, first, whole = np.empty((3, len(ok)), np.float32)
     weigh(
         ok,
@@ -101,13 +103,15 @@ def field_of(solution: Solution, predicted: PredictedMotion | None = None) -> St
     error, local, growth, attenuation = _corrected(solution, ok, noise)
     noise = noise._replace(colour=noise.colour / attenuation.repeat(3) ** 2)
     parts = _covariances(solution, ok, noise, first, whole)
-    blur = np.stack([growth, growth]).astype(np.float32)
-    blur[0, ~ok] = np.nan
+    blur = np.empty((2, len(ok)), np.float32)
+    blur[0] = growth
     weigh_blur(reference.prepared.blur, whole, blur[1])
     values = reference.total(local)
     if not ok.all():
         values = np.where(ok[:, None], values, np.nan)
-    covariance_reference, covariance = stretched(parts, reference.spread(values[:, reference.affine]))
+        blur[0, ~ok] = np.nan
+    affine = values if reference.modes == 6 else values[:, reference.affine]
+    covariance_reference, covariance = stretched(parts, reference.spread(affine))
     return StrainField(
         grid=reference.grid,
         parameters=reference.spread(values),
@@ -117,7 +121,7 @@ def field_of(solution: Solution, predicted: PredictedMotion | None = None) -> St
         status=reference.spread(solution.status[:, None], Status.NOT_MEASURED)[0],
         iterations=reference.spread(found.iterations[:, None], 0)[0],
         gain=reference.spread(gain[:, None].astype(np.float32))[0],
-        noise=math.sqrt(median(noise.current[ok])) if ok.any() else float("nan"),
+        noise=math.sqrt(median(noise.current[shown])) if len(shown) else float("nan"),
         window=reference.settings.window,
         motion=None if predicted is None else _motion(solution, values, predicted),
         sums=reference.sums,
@@ -156,33 +160,35 @@ def _motion(solution: Solution, values: Floats, expected: PredictedMotion) -> Mo
     from analysis.follow.prediction import motion_after
 
     lever = solution.reference.grid.size / 6
-    return motion_after(expected.motion, values, expected.values, solution.tolerance.trust, lever)
+    return motion_after(expected.motion, values, expected.values, solution.stated.tolerance.trust, lever)
 
 
-def _noise_parts(solution: Solution, ok: NDArray[np.bool_], expected: ExpectedNoise) -> _Noise:
+def _noise_parts(
+    solution: Solution, ok: NDArray[np.bool_], shown: NDArray[np.intp], gain: Floats, expected: ExpectedNoise
+) -> _Noise:
     """The noise of the two images: together what the fits leave, of which the reference has what was given.
 
-    ``expected`` is the noise as stated.
+    ``expected`` is the noise as stated. Medians are of the ZOIs ``shown`` (B,).
     """
     from analysis.fit.pooling import median
 
-    gain, white = solution.found.nuisance[:, 0], np.ones(6)
+    white = np.ones(6)
     reference, current = solution.variances(np.s_[:], solution.found.nuisance)
     common = solution.common
     if common is None or solution.retried or np.count_nonzero(ok) < FEW_REFUSED * len(ok):
         common = solution.pooled(np.flatnonzero(ok))
     if common is not None:
         share = _left_of_felt(solution, common, expected)
-        ratio, usual, some_left = common.ratio / share, median(share[ok]), None
+        ratio, usual, some_left = common.ratio / share, median(share[shown]), None
         seen = common.colour * usual
-        colour, over = seen.repeat(3), common.usual / usual if ok.all() else median(ratio[ok])
+        colour, over = seen.repeat(3), common.usual / usual if ok.all() else median(ratio[shown])
         doubtful = max(colour.max(), over) > DOUBTFUL and not (common.apart or solution.had_lines)
-        rest = beside_strain(solution, ok) if doubtful else None
+        rest = beside_strain(solution, ok, expected) if doubtful else None
         if rest is not None:
             over = 1.0 if solution.is_given and AGREES[0] < rest < AGREES[1] else rest
             seen = np.minimum(seen, 1)  # what bends adds to the shapes
             colour, ratio = seen.repeat(3), np.full(len(ok), over)
-        if colour.min() < 1 and abs(median(solution.found.nuisance[ok, 2])) > SOME_BLUR:
+        if colour.min() < 1 and abs(median(solution.found.nuisance[shown, 2])) > SOME_BLUR:
             # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
             colour = np.maximum(colour, 1)
         elif np.abs(np.log(seen)).max() > np.log(COLOURED):
@@ -191,10 +197,10 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_], expected: ExpectedNo
         whole = ratio * expected.felt
         parts = _parted(whole, reference * gain**2, gain, solution)
         return _Noise(*parts, colour, math.sqrt(over), seen, some_left)
-    if solution.noise is not None or not ok.any():
+    if solution.noise is not None or not len(shown):
         return _Noise(reference, current, white, float("nan"), white[:2])
     left = solution.found.left / solution.reference.prepared.freedom
-    found = max(median(left[ok]), solution.rounding)
+    found = max(median(left[shown]), solution.rounding)
     whole = np.full(len(ok), found)
     return _Noise(*_parted(whole, reference, np.ones(len(ok)), solution), white, float("nan"), white[:2])
 

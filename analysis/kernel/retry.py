@@ -92,6 +92,9 @@ def _retry_from_features(solution: Solution) -> None:
 
 
 def _lost(solution: Solution) -> Bools:
+    refused = np.asarray(solution.status != Status.OK)
+    if not refused.any():
+        return refused
     return np.asarray(_WORTH_RETRYING[solution.status] & (solution.reference.prepared.status == Status.OK))
 
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from analysis.fit.kernel_args import (
     PictureArgs,
     PooledError,
     ReferenceArgs,
+    StopArgs,
     VerdictArgs,
 )
 from analysis.fit.validity import CENTRE_VARIANCE, CLIPPED_SHARE, CORNER_STEPS
@@ -38,6 +39,30 @@ SAME_LIGHT = 1.0, 0.0
 DISTURBED_RATIO, DISTURBED_SHARE = 2.0, 0.02
 """Of what is left over what the noise explains, and of the ZOIs that are refused: from here on wild pixels of the
 image are looked for."""
+
+
+class Stated(NamedTuple):
+    """What follows of a reference and of the noise of images as stated; A active ZOIs.
+
+    Attributes
+    ----------
+    tolerance : StopArgs
+        Where the iteration may stop.
+    fit : FitArgs
+        Of all ZOIs.
+    known : ReferenceArgs
+        What the verdict needs of each ZOI.
+    able : (A,) bool
+        Which ZOIs have a pattern, ...
+    which : (B,)
+        ... and their places.
+    """
+
+    tolerance: StopArgs
+    fit: FitArgs
+    known: ReferenceArgs
+    able: NDArray[np.bool_]
+    which: NDArray[np.intp]
 
 
 class Solution:
@@ -59,8 +84,7 @@ class Solution:
     found : OutArgs
         Of the iteration, for all A ZOIs; NaN where there was none.
     status : (A,) uint8
-    tolerance : StopArgs
-        Where the iteration may stop.
+    stated : Stated
     common : PooledError or None
         What the fits leave in common; None: of too few ZOIs to be taken.
     retried : bool
@@ -85,20 +109,29 @@ class Solution:
         self.guess = guess
         self._room = room_for(prepared.shape) if room is None else room
         self.common: PooledError | None = None
+        self._expected: tuple[OutArgs, ExpectedNoise] | None = None
         self.retried = False
         self.had_lines = False
         self._take(_cleaned(image) if reference.cleaned else image)
         self.rounding = reference.rounding + rounding_variance(image)
         self.table = tap_table(reference.settings.interpolant)
-        self.tolerance = reference.tolerance(self._current_std())
-        self._noise, current = self.variances(np.s_[:], np.tile(SAME_LIGHT, (len(guess), 1)))
-        self._noise_left = np.maximum(prepared.freedom * (self._noise + current), 1e-9)
-        self._later = float(current.sum() / max((self._noise + current).sum(), 1e-9))
-        able = prepared.status == Status.OK
-        known = np.isfinite(guess.sum()) or np.isfinite(guess @ np.ones(guess.shape[1]))  # as a rule all
-        which = np.flatnonzero(able & known)
-        self._places = which, able & ~known
+        self.stated = self._kept()
+        if np.isfinite(guess.sum()):  # as a rule
+            self._places = self.stated.which, np.zeros((), np.bool_)
+        else:
+            known = np.isfinite(guess @ np.ones(guess.shape[1]))
+            self._places = np.flatnonzero(self.stated.able & known), self.stated.able & ~known
         self._solve(*self._places)
+
+    def _kept(self) -> Stated:
+        """What the last picture was measured with, where its noise was stated the same."""
+        reference = self.reference
+        key, kept = (self.noise, reference.noise_model, reference.settings), reference.made_later
+        found = kept.get("stated")  # another thread may measure with this reference
+        if found is None or found[0] != key:
+            found = kept["stated"] = key, self._as_stated()
+        stated: Stated = found[1]
+        return stated
 
     def _take(self, image: NDArray[Any]) -> None:
         """Measure in ``image``."""
@@ -190,26 +223,40 @@ class Solution:
         from analysis.fit.iteration import track
         from analysis.fit.shared import share_warps
 
-        out, stop, fit = OutArgs.starting(guess), self.tolerance, self._fit(which)
+        out, stop, fit = OutArgs.starting(guess), self.stated.tolerance, self.stated.fit
+        fit = fit._replace(which=fit.which[which])
         if max_iterations is not None:
             stop = stop.after(max_iterations)
         elif fit.order == 1 and 2 * len(guess) > len(self.guess):
             share_warps(self.picture, self.table, fit, stop, out, self.reference.tiles)
         todo = np.flatnonzero(out.state != CONVERGED)
+        if 2 * len(todo) < len(guess):  # nothing of one is in the cache from the one before
+            fit = fit._replace(spacing=fit.size)
         if len(todo):
             track(self.picture, self.table, fit, stop, out, todo)
         return out
 
-    def _fit(self, which: Places) -> FitArgs:
+    def _as_stated(self) -> Stated:
         from analysis.fit.sensitivity import parameter_scale
 
-        ready, grid, order = self.reference.prepared, self.reference.grid, self.reference.settings.order
-        return FitArgs(
-            ready.images.ravel(), ready.images[0].size, ready.images.shape[2], np.arange(len(self.guess))[which],
-            ready.origins, grid.size, self.reference.spacing, order, ready.shapes.rows, ready.shapes.mix,
+        reference, ready, grid = self.reference, self.reference.prepared, self.reference.grid
+        order, every = reference.settings.order, np.arange(len(ready.origins))
+        noise, current = self.variances(np.s_[:], np.tile(SAME_LIGHT, (len(every), 1)))
+        both = noise + current
+        fit = FitArgs(
+            ready.images.ravel(), ready.images[0].size, ready.images.shape[2], every,
+            ready.origins, grid.size, reference.spacing, order, ready.shapes.rows, ready.shapes.mix,
             ready.inverse, ready.cross, ready.weight * ready.energy, parameter_scale(order, grid.size), ready.bias,
-            self._noise, self._noise_left,
+            noise, np.maximum(ready.freedom * both, 1e-9),
         )  # fmt: skip
+        known = ReferenceArgs(
+            ready.signal, ready.freedom * reference.sharpness, reference.share_variance, reference.unit_sigma[2],
+            reference.white, float(ready.shapes.noise[0]), min(1.0, (2 * grid.step / grid.size) ** 2),
+            ready.information / np.maximum(noise, max(reference.rounding, 1e-9)),
+            float(current.sum() / max(both.sum(), 1e-9)),
+        )  # fmt: skip
+        able = ready.status == Status.OK
+        return Stated(reference.tolerance(self._current_std()), fit, known, able, np.flatnonzero(able))
 
     def _by_phases(self, sensors: Sensors, which: Places, guess: Floats) -> OutArgs:
         """The same by phases alone; one step of the spectral fit gives gain and residual."""
@@ -218,7 +265,7 @@ class Solution:
         ready = self.reference.prepared
         values, state, iterations = iterate(
             sensors.weights[which], ready.images[3], ready.origins[which], self.picture, self.table,
-            guess, self.tolerance.at(which),
+            guess, self.stated.tolerance.at(which),
         )  # fmt: skip
         seen = self._iterated(which, values, max_iterations=1)
         return seen._replace(p=values, state=state, iterations=iterations)
@@ -228,7 +275,10 @@ class Solution:
         from analysis.fit.verdict import judge
 
         reference, ready, settings = self.reference, self.reference.prepared, self.reference.settings
-        known, expected = self._known, self.expected(which, found.nuisance).felt
+        known, noise = self.stated.known, self.expected(which, found.nuisance)
+        expected = noise.felt
+        if isinstance(which, slice):
+            self._expected = found, noise
         far = CENTRE_VARIANCE[settings.order - 1]
         corner_steps = math.inf if settings.estimator == "phase" else CORNER_STEPS
         rule = VerdictArgs(
@@ -247,7 +297,7 @@ class Solution:
         """What the fits of the ZOIs ``which``, as they are kept, leave in common."""
         found = self.found.at(which)
         expected = self.expected(which, found.nuisance).felt
-        return self._pooled(which, found, self._left(which, found), expected, self._known)
+        return self._pooled(which, found, self._left(which, found), expected, self.stated.known)
 
     def _pooled(
         self, which: Places, found: OutArgs, left: Floats, expected: Floats, known: ReferenceArgs
@@ -260,33 +310,24 @@ class Solution:
     @property
     def noise_taken(self) -> Floats:
         """Variance a pixel of the reference, (A,), whose bias the fits have taken off (``noise_bias``), GL^2."""
-        return np.asarray(self._noise * np.minimum(np.maximum(self.found.left, 0) / self._noise_left, 1))
+        fit = self.stated.fit
+        return np.asarray(fit.noise * np.minimum(np.maximum(self.found.left, 0) / fit.expected, 1))
 
     @property
     def is_given(self) -> bool:
         """Whether the noise of both images was given."""
         return self.noise is not None and self.reference.noise_model is not None
 
-    @property
-    def _known(self) -> ReferenceArgs:
-        """What the verdict needs of each ZOI."""
-        reference, ready = self.reference, self.reference.prepared
-        pixels = ready.freedom * reference.sharpness
-        return ReferenceArgs(
-            ready.signal,
-            pixels,
-            reference.share_variance,
-            reference.unit_sigma[2],
-            reference.white,
-            float(ready.shapes.noise[0]),
-            min(1.0, (2 * reference.grid.step / reference.grid.size) ** 2),
-            ready.information / np.maximum(self._noise, max(reference.rounding, 1e-9)),
-            self._later,
-        )
-
     def _left(self, which: Places, found: OutArgs) -> Floats:
         """Variance a pixel that the fit leaves, GL^2; rounding leaves something where the images are equal, too."""
         return np.maximum(found.left / self.reference.prepared.freedom[which], self.rounding)
+
+    @property
+    def expected_of_all(self) -> ExpectedNoise:
+        """``expected`` of all ZOIs as they were found."""
+        if self._expected is not None and self._expected[0] is self.found and not self.retried:
+            return self._expected[1]
+        return self.expected(np.s_[:], self.found.nuisance)
 
     def expected(self, which: Places, light: Floats) -> ExpectedNoise:
         """What noise alone makes of the difference of the images in ``light``, as in ``variances``."""

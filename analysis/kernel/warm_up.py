@@ -234,8 +234,7 @@ def _rest() -> None:
     weigh_blur(single, single, single)
     expected = ExpectedNoise(np.empty(2), np.empty(2))
     expect(np.ones(2), (0.5, 0.5), np.ones(2), np.ones(2), 0.0, expected)
-    p, gain = np.empty((0, 6)), np.empty((2, 2))[:, 0]
-    weigh(np.empty(0, np.bool_), none, none, gain, none, none, none, p, single, single, single)
+    weigh(np.empty(0, np.bool_), none, none, none, none, none, none, np.empty((0, 6)), single, single, single)
     unit = np.empty((21, 0), np.float32)
     scale(unit, np.ones(21, np.float32), single, single, unit, unit)
     index, values = np.empty(0, np.intp), np.empty((0, 6))

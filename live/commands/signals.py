@@ -38,7 +38,10 @@ def signals(stop: Callable[[], None], screen: Screen | None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def ended_by_sigterm() -> Iterator[None]:
-    """SIGTERM ends a command as Ctrl-C does, where the command has no handler of its own."""
+    """SIGTERM and the loss of the terminal end a command as Ctrl-C does, where it has no handler of its own.
+
+    A loss of the terminal that is ignored (nohup) stays so.
+    """
 
     def end(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
@@ -46,7 +49,8 @@ def ended_by_sigterm() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    with signal_handler(end, signal.SIGTERM):
+    heard = [number for number in HANGUP if signal.getsignal(number) != signal.SIG_IGN]
+    with signal_handler(end, signal.SIGTERM, *heard):
         yield
 
 

@@ -69,7 +69,12 @@ def _atomic(path: Path, mark: str = "", *, replaces: bool = False) -> Iterator[P
     # The suffix decides the format of a film, so it must stay the last.
     part = path.with_name(f"{path.stem}{mark}.part{path.suffix}")
     given = () if replaces else (path,)
-    check_free(*given, part)
+    check_free(*given)
+    if part.exists() and not replaces:
+        raise ConfigError(
+            "{part} is there: another command writes it, or was killed; remove it then, or choose another --out",
+            part,
+        )
     try:
         if not replaces:
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -190,6 +190,8 @@ def _run(
     check_folder(config.output.dir)
     config = with_film(config, source.camera)
     ready = prepare_replay(source, config, request.source, screen, stopping)
+    if stopping.is_set():  # nothing is measured yet, and the first burst is the slowest
+        raise KeyboardInterrupt
     stored = StoredResults.of(request.parts, ready)
     bursts = _not_empty(stored.bursts() if stored else source.bursts, request, source.count)
     check_channel(ready.plan.config, forces=len(source.loads) > 0)

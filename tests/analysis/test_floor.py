@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -138,6 +139,26 @@ def test_intervals_hold_the_truth_as_often_as_they_say(law: str) -> None:
         margin = 3 * np.sqrt(0.683 * 0.317 / 300)
         assert abs(np.mean(np.abs(off) < 1) - 0.683) < margin
         assert abs(np.mean(off)) < 3 / np.sqrt(300)
+
+
+def test_a_drift_that_bursts_have_in_common_is_in_the_uncertainty_of_the_rate() -> None:
+    """Of a memory of 10 bursts, in a hold of 2000; of the scatter alone one in ten held it."""
+    from scipy.signal import lfilter
+
+    rng, off = np.random.default_rng(7), list[float]()
+    for seed in range(60):
+        curve = crept(LAWS["steady"], 1e-6, seed, n=2000)
+        drift = lfilter([1.0], [1.0, -0.9], rng.normal(0, 4e-6, len(curve.t)))
+        found = Creep.of(replace(curve, strain=curve.strain + drift))
+        assert found is not None
+        off.append((found.rate.value - 5e-7) / ((found.rate.high - found.rate.value) / quantile()))
+    assert np.mean(np.abs(off) < 1) > 0.4
+
+
+@pytest.mark.parametrize("noise", [3e-6, 3e-5])
+def test_a_hold_without_creep_has_no_times(noise: float) -> None:
+    found = [Creep.of(crept(lambda t: 0 * t, noise, seed)) for seed in range(60)]
+    assert sum(len(one.times) for one in found if one is not None) <= 1
 
 
 def test_values_without_noise() -> None:

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.text import Amount, Message
-from analysis.evaluate import CONFIDENCE, Figure
+from analysis.evaluate import CONFIDENCE, Figure, Track
 from analysis.evaluate.curve import noise
-from analysis.evaluate.seen import LEAPS_NEED, leap, leap_alike, without_stopped
+from analysis.evaluate.seen import LEAPS_NEED, leap, leap_alike, renewal_s, without_stopped
 from live.results.figures import LAG_MATTERS_S, figure_text
 from live.results.finished.finished_test import FinishedTest
 
@@ -33,8 +33,10 @@ _MODULUS_GPa = (1e-6, 1000.0)  # of solids, from gels to diamond
 _STIFF_GPa, _SOFT_STRAIN = 0.1, 0.005  # what is softer is elastic beyond this strain, a metal is not
 _MODULUS_OFF = 0.2
 _SIGMAS = 3.0
+_AT_REST, _REST_STRAIN, _DRIFT = 8, 1e-5, 0.01  # instants; strain that ends a rest; share of E that counts
 _UNCOVERED_S, _UNCOVERED = 2.0, 5.0  # that forces and pictures may differ by at an end: seconds, bursts
 _OFF_AXIS = math.radians(10)
+_STEP = 0.001  # of the highest force: half of what it changes by from one value to the next
 _PRELOAD = 0.002  # of the highest force, below which a force at the reference is the zero of a load cell
 
 
@@ -193,12 +195,58 @@ def _leaps(test: FinishedTest) -> str | None:
         return None
     found = leap(test.curve)
     if found is None:
-        return "" if len(test.curve.t) >= LEAPS_NEED else None
+        return _drift_at_rest(test) or ("" if len(test.curve.t) >= LEAPS_NEED else None)
     return Message(
         "the force leaps by {force} at {t:.4g} s and the strain does not: did zero, range or unit of the load cell "
         "change? All later forces are wrong by it",
         Amount.rough("force", found[1] * (test.specimen.area_m2 or 1.0), 3),
         found[0] - test.curve.t[0],
+    )
+
+
+def _renewal(test: FinishedTest) -> str | None:
+    """No value of the force that many lines repeat while the specimen is pulled on."""
+    samples = test.samples.first()
+    if len(samples.known().t) < 2:
+        return None
+    every, change = renewal_s(samples, Track(test.curve.t, test.curve.strain))
+    if every / 2 < LAG_MATTERS_S or change / 2 < _STEP * float(np.nanmax(np.abs(samples.values))):
+        return ""
+    return Message(
+        "the load cell sends each value again and again, a new one every {every:.2g} s: forces are of up to {change} "
+        "before; raise its rate of measuring, or lower its filter",
+        every,
+        Amount.rough("force", change, 2),
+    )
+
+
+def _drift_at_rest(test: FinishedTest) -> str:
+    """A force that changes before the strain does, and what it makes of E if it goes on.
+
+    A force on the specimen would strain it; where less than half of that is seen, it is the zero that drifts.
+    """
+    curve, line, e = test.curve, test.figures.span, test.figures.E.value
+    known = np.isfinite(curve.strain) & np.isfinite(curve.stress)
+    t, strain, stress = curve.t[known], curve.strain[known], curve.stress[known]
+    moved = np.abs(strain - np.median(strain[:_AT_REST])) > max(5 * noise(strain), _REST_STRAIN)
+    n = int(np.argmax(moved)) * 3 // 4  # well before the pull
+    if line is None or n < _AT_REST:
+        return ""
+    x = t[:n] - t[:n].mean()
+    (slope, level), pulled = np.polyfit(x, stress[:n], 1), float(np.polyfit(x, strain[:n], 1)[0])
+    sigma = float(np.std(stress[:n] - level - slope * x, ddof=2)) / math.sqrt(float(x @ x))
+    start, end = (t[np.argmax(strain >= limit)] for limit in line.strain)
+    added = float(slope * (end - start))
+    share = added / (line.stress[1] - line.stress[0] - added)
+    if abs(slope) < 5 * sigma or abs(share) < _DRIFT or abs(pulled * e) > abs(slope) / 2:
+        return ""
+    area = test.specimen.area_m2 or 1.0
+    return Message(
+        "the force drifts by {force} in {time:.3g} s of rest at first, and the strain does not: going on, this zero of "
+        "the load cell changes E by {share:.0%}. Let it warm up, and tare",
+        Amount.rough("force", float(slope * area * np.ptp(x)), 2),
+        float(np.ptp(x)),
+        share,
     )
 
 
@@ -299,6 +347,7 @@ _CHECKS: dict[str, Callable[[FinishedTest], str | None]] = {
     "sign of the force": _sign_of_force,
     "modulus": _modulus,
     "forces and pictures": _coverage,
+    "renewal of the force": _renewal,
     "leaps of the force": _leaps,
     "leaps of the strain": _leaps_of_strain,
     "lag": _lag,

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acquire.system import HANGUP, signal_handler
 from hw_mocks.specimen import KINDS
 from live import cli
 from live.cli import main
@@ -335,18 +336,26 @@ def test_a_browser_that_fails_costs_the_png_alone(
     assert "warning: the figures are SVG and CSV without PNG: " in capsys.readouterr().out
 
 
-def test_sigterm_ends_a_command_without_a_handler_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("number", [signal.SIGTERM, *HANGUP])
+def test_sigterm_and_hangup_end_a_command_without_a_handler_of_its_own(
+    number: signal.Signals, capsys: pytest.CaptureFixture[str]
+) -> None:
     def command(arguments: object) -> int:
-        os.kill(os.getpid(), signal.SIGTERM)
+        os.kill(os.getpid(), number)
         threading.Event().wait(60)
         return 0
 
-    before = signal.getsignal(signal.SIGTERM)
+    before = signal.signal(number, signal.SIG_DFL)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(cli, "parse", lambda words: (command, arguments_module.argparse.Namespace()))
         assert main(["devices"]) == 130
     assert capsys.readouterr().err == "phasedic: interrupted\n"
-    assert signal.getsignal(signal.SIGTERM) is before
+    assert signal.signal(number, before) is signal.SIG_DFL
+
+
+def test_nohup_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    with signal_handler(signal.SIG_IGN, *HANGUP), ended_by_sigterm():
+        os.kill(os.getpid(), *HANGUP)
 
 
 def test_sigterm_is_no_ctrl_c() -> None:

@@ -168,6 +168,20 @@ def test_a_part_is_cut_as_configured(shots: Path, tmp_path: Path) -> None:
         assert strain.grid.x[-1] < 120
 
 
+def test_one_that_is_stopped_while_it_is_prepared_measures_nothing(shots: Path, tmp_path: Path) -> None:
+    """The first burst of many ZOIs takes seconds, and the stop seemed lost."""
+
+    class Stopping(TerminalScreen):
+        def print(self, line: str) -> None:
+            stopping.set()
+
+    stopping, out = threading.Event(), tmp_path / "out"
+    request = ReplayRequest(str(shots), None, {"measure.zoi": 48, "measure.step": 24, "output.dir": str(out)})
+    with pytest.raises(KeyboardInterrupt):
+        replay(request, Stopping(quiet=True), stopping)
+    assert not out.exists()
+
+
 def test_the_results_say_which_file_each_frame_was(shots: Path, session: Path, tmp_path: Path) -> None:
     assert main(["replay", str(shots), *SMALL, "--out", str(tmp_path / "a")]) == 0
     names = list(csv.DictReader((tmp_path / "a" / "pictures.csv").read_text(encoding="utf-8").splitlines()))

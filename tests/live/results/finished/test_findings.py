@@ -17,6 +17,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.run_state import RunState
 from live.results.finished.findings import SHOWN, doubts, findings
 from live.results.finished.finished_test import FinishedTest
+from live.results.finished.readings import Readings
 from live.words.language import LANGUAGES, said
 from tests.live.made_run import finished
 from tests.live.made_up import in_ascii, make_measurement
@@ -91,6 +92,7 @@ def test_a_test_without_a_mistake_has_no_doubt() -> None:
         "sign of the force",
         "modulus",
         "forces and pictures",
+        "renewal of the force",
         "leaps of the force",
         "leaps of the strain",
         "lag",
@@ -118,6 +120,35 @@ def test_a_zero_that_moves_in_the_test_is_named_and_is_no_lag() -> None:
         "the force leaps by 399 N at 6 s and the strain does"
     )
     assert found["lag"].outcome == "not checked"
+
+
+def test_a_display_that_is_renewed_slowly_is_named() -> None:
+    t, rng = np.arange(0, 14, 1 / 80), np.random.default_rng(5)
+    values = stress_of(np.interp(np.arange(0, 14, 0.4), np.arange(len(STRAINS)) / FPS, STRAINS)) * 20e-6
+    shown = np.round(values + rng.normal(0, 1, len(values)), 1)[np.floor(t / 0.4 + 1e-9).astype(int)]
+    found = {one.name: one for one in findings(replace(test_of(), samples=Readings.of(t, shown)))}
+    words = in_ascii(found["renewal of the force"].text)
+    assert "a new one every 0.4 s: forces are of up to 210 N before" in words
+    live = replace(test_of(), samples=Readings.of(t, np.interp(t, np.arange(0, 14, 0.4), values)))
+    assert outcomes(live)["renewal of the force"] == "good"
+
+
+@pytest.mark.parametrize("per_s", [40.0, -40.0])
+def test_a_zero_that_drifts_is_named(per_s: float) -> None:
+    whole, t = stress_of(STRAINS) * 20e-6, np.arange(len(STRAINS)) / FPS
+    found = {one.name: one for one in findings(test_of(force=whole + per_s * t))}["leaps of the force"]
+    assert found.outcome == "doubt" and "of rest at first, and the strain does not" in found.text
+    real = test_of(force=whole + per_s * t)
+    off = real.figures.E.value / test_of(force=whole).figures.E.value - 1
+    named = float(found.text.partition("changes E by ")[2].partition("%")[0].replace("\u2212", "-"))
+    assert abs(off) > 0.05 and named == pytest.approx(100 * off, abs=1.5)
+    assert outcomes(test_of(force=whole + 0.05 * per_s * t))["leaps of the force"] == "good", "less than 1 %"
+
+
+def test_a_force_that_strains_the_specimen_before_the_pull_is_no_drift() -> None:
+    """Grips that are closed, or a specimen that warms up between them."""
+    strains = np.r_[np.linspace(0, 8e-6, 20), 8e-6 + STRAINS[20:]]
+    assert outcomes(test_of(strains, force=stress_of(strains) * 20e-6))["leaps of the force"] == "good"
 
 
 def test_an_elastic_part_of_few_pictures_is_no_leap_of_the_force() -> None:
