@@ -10,8 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from acquire.text import Message
-from acquire.text.message import word
+from acquire.text import Message, word
 
 DEFECT, USAGE, DEVICE, DATA, LOSS, NOT_READY, EXIT_INTERRUPTED = 1, 2, 3, 4, 5, 6, 130
 

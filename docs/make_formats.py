@@ -23,9 +23,9 @@ from acquire.settings import settings_of
 from analysis.field import Status
 from live.config.figures import FIGURES, columns
 from live.results.finished.cycles import COLUMNS as CYCLES
+from live.results.layout import COLUMNS
 from live.results.quantities import quantity_of
 from live.results.response import stored
-from live.results.writer import COLUMNS
 from live.setup.devices import camera_settings, load_settings
 
 DOCS = Path(__file__).parent

@@ -21,8 +21,7 @@ from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.record_mode import Crop, RecordMode
-from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text import Message, joined
 
 log = logging.getLogger(__name__)
 

@@ -29,8 +29,7 @@ import h5py
 
 from acquire.errors import DataError
 from acquire.system import python_command, python_environment
-from acquire.text import Message
-from acquire.text.message import word
+from acquire.text import Message, word
 
 DAMAGE = (
     OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, MemoryError, OverflowError,

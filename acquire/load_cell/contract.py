@@ -15,8 +15,7 @@ from acquire.closing import Closing
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink, ignore_event
 from acquire.load_sample import LoadCellInfo, LoadSample
-from acquire.text import Message
-from acquire.text.message import word
+from acquire.text import Message, word
 
 
 @runtime_checkable

@@ -26,8 +26,7 @@ from acquire.serial_line.link import FloodWatch, Link, LinkContext, LoadWatch, O
 from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling
 from acquire.serial_line.settings import SerialSettings, describe, read_settings
-from acquire.text import Message
-from acquire.text.quantity import counts
+from acquire.text import Message, counts
 
 log = logging.getLogger(__name__)
 

@@ -13,8 +13,7 @@ from urllib.parse import parse_qsl, urlsplit
 from acquire.errors import ConfigError, DeviceError
 from acquire.serial_line.byte_ports import WRITE_S, Port, Rfc2217Port, TcpPort, TtyPort, line_settings
 from acquire.system import TERMINAL_ERRORS, group_of
-from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text import Message, joined
 
 LINE_ERRORS: tuple[type[Exception], ...] = (OSError, *TERMINAL_ERRORS)
 PORT_ERRORS: tuple[type[Exception], ...] = (*LINE_ERRORS, TypeError, ValueError)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.text import Message
-from acquire.text.message import word
+from acquire.text import Message, word
 
 
 class Oddities:

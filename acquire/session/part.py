@@ -46,8 +46,7 @@ from acquire.record_mode import RecordMode
 from acquire.session import layout, stored
 from acquire.session.rows import LoadPiece, LoadTable, burst_from
 from acquire.session.stored import events_from, read_column, read_rows
-from acquire.text import Message
-from acquire.text.message import about
+from acquire.text import Message, about
 
 UNFINISHED = Message(
     "was not closed by its writer (killed, or still recording); everything complete in it is read. "

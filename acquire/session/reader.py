@@ -34,8 +34,7 @@ from acquire.record_mode import RecordMode
 from acquire.session.layout import SessionInfo
 from acquire.session.part import SessionPart
 from acquire.session.writer import SessionWriter
-from acquire.text import Message
-from acquire.text.message import about, word
+from acquire.text import Message, about, word
 
 _NUMBERED = re.compile(r"^(?P<stem>.+)\.(?P<number>\d{3,})$")
 

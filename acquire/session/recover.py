@@ -17,9 +17,8 @@ from acquire.events import Event, EventKind, Level
 from acquire.session.layout import SessionInfo
 from acquire.session.part import SessionPart
 from acquire.session.writer import SessionWriter
-from acquire.text import Message
+from acquire.text import Message, counts
 from acquire.text.printable import counted
-from acquire.text.quantity import counts
 
 Item = TypeVar("Item")
 

@@ -26,8 +26,8 @@ from acquire.hdf5 import (
 from acquire.load_sample import LoadCellInfo
 from acquire.session import layout
 from acquire.session.oddities import Oddities
-from acquire.text import Message
-from acquire.text.message import about, taken
+from acquire.text import Message, about
+from acquire.text.message import taken
 
 _NAMES_A_BURST = {EventKind.REFERENCE, EventKind.MEASURED}
 

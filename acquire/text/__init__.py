@@ -1,5 +1,9 @@
-"""Texts for people: ``message`` keeps what is said apart from what is filled in, ``printable`` cleans one of others."""
+"""Texts for people: ``message`` keeps what is said apart from what is filled in, ``quantity`` prints numbers with unit.
 
-from acquire.text.message import Message
+``printable`` cleans a text of others.
+"""
 
-__all__ = ["Message"]
+from acquire.text.message import Message, about, joined, word
+from acquire.text.quantity import Amount, counts
+
+__all__ = ["Amount", "Message", "about", "counts", "joined", "word"]

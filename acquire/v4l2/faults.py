@@ -9,8 +9,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text import Message, joined
 from acquire.v4l2.api import Kernel
 from acquire.v4l2.device import Identity, NotACamera, V4L2Device
 

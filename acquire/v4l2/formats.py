@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
 from acquire.frame import frozen
-from acquire.text import Message
-from acquire.text.message import about
+from acquire.text import Message, about
 
 Kind = Literal["grey", "luma", "bayer", "jpeg"]
 Plane = Literal["raw", "r", "g", "b"]

@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.text import Message
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message
 from analysis.evaluate.curve import ENOUGH, Curve, Floats, Loading, first_crossing, noise, reading, smoothed
 from analysis.evaluate.elastic import FittedLine
 from analysis.evaluate.figure import Figure, quantile

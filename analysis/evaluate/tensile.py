@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text import Message, joined
 from analysis.evaluate.curve import Curve, Floats, Loading, first_crossing, noise, reading
 from analysis.evaluate.elastic import (
     FILM,

@@ -22,8 +22,7 @@ from acquire.errors import NOT_READY, ConfigError
 from acquire.files.picture import write_picture
 from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
-from acquire.text import Message
-from acquire.text.message import about, word
+from acquire.text import Message, about, word
 from acquire.text.printable import printable
 from live.commands.options import (
     MEASURE,

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from acquire.addresses import parse_address, with_setting
 from acquire.errors import LOSS
 from acquire.frame import Frame
-from acquire.text.message import Message, word
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message, word
 from analysis import PICTURE_KINDS
 from analysis.evaluate import AreaStrain
 from analysis.field import Status, StrainField, Sums

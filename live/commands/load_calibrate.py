@@ -11,8 +11,7 @@ from acquire.addresses import parse_address, with_setting
 from acquire.errors import NOT_READY, ConfigError, DataError
 from acquire.load_cell import calibration, check, stillness
 from acquire.load_sample import LoadFlag, LoadSample
-from acquire.text import Message
-from acquire.text.message import about, word
+from acquire.text import Message, about, word
 from live.setup.devices import open_load
 from live.ui.terminal.screen import print_line
 from live.words.language import told

@@ -7,8 +7,7 @@ from collections.abc import Callable
 
 from acquire.errors import NOT_READY
 from acquire.load_cell import check
-from acquire.text import Message
-from acquire.text.message import about, word
+from acquire.text import Message, about, word
 from live.setup.devices import open_load
 from live.ui.terminal.screen import print_line
 

@@ -20,8 +20,7 @@ from acquire.addresses import parse_address, with_setting
 from acquire.bounds import NotAllowed, integer_of, number_of, positive
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError
-from acquire.text import Message
-from acquire.text.message import word
+from acquire.text import Message, word
 from analysis.evaluate import Gauge, GaugeSet
 from live.commands.arguments import HELP_ALL, bad_value, not_empty
 from live.config.gauges import gauges_for

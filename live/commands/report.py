@@ -8,8 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
-from acquire.text import Message
-from acquire.text.message import about
+from acquire.text import Message, about
 from live.commands.options import add_gauge_option, add_gauges
 from live.config.new_files import check_free, free_name, new_file
 from live.pipeline.consumer import Screen

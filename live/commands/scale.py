@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import ConfigError
-from acquire.text import Message
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message
 from live.commands.options import POSITIVE, add_options, add_verbose, configured, number
 from live.config.loading import Config
 from live.config.rig_file import write_rig

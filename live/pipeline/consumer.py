@@ -19,8 +19,7 @@ from acquire.clock import ClockPair
 from acquire.events import Event
 from acquire.frame import CameraInfo, Frame
 from acquire.load_sample import LoadSample
-from acquire.text import Message
-from acquire.text.message import about, joined
+from acquire.text import Message, about, joined
 from acquire.text.printable import counted
 from live.config.loading import Config
 from live.pipeline.measurement import Measurement, TimeStep

@@ -18,10 +18,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from acquire.events import Event, EventKind, EventSink, Level, RateLimiter, named
-from acquire.text import Message
-from acquire.text.message import about, without_name
+from acquire.text import Amount, Message, about
+from acquire.text.message import without_name
 from acquire.text.printable import brief
-from acquire.text.quantity import Amount
 
 AS_THEY_COME = 3
 """So many events alike are kept one by one; of those that follow the newest alone, with their number."""

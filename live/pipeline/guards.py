@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from acquire.events import Event, EventKind, EventSink, Level
-from acquire.text import Message
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message
 from analysis.field import Blur
 from analysis.field.uncertainty import LIMIT, PictureError
 from analysis.optics import alike, keystones

@@ -17,8 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from acquire.frame import Burst
 from acquire.load_cell.load_log import LoadLog
-from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text import Message, joined
 from analysis.evaluate import COME_APART, REGION, AreaStrain, GaugeSet, GaugeValue
 from analysis.field import StrainField, area_share, mean_blur
 from analysis.optics import ApparentMotion, LensReading

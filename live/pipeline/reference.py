@@ -16,8 +16,7 @@ from acquire.burst import BurstAccumulator, PictureMemory
 from acquire.errors import ConfigError, DataError, MachineUnfit, PhasedicError, TooLittleMemory
 from acquire.frame import Burst, Frame
 from acquire.system import available_MiB
-from acquire.text.message import Message, about, joined
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message, about, joined
 from analysis.field import Status, StrainField
 from analysis.quality.steadiness import strain_drifts
 

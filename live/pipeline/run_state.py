@@ -7,8 +7,7 @@ from dataclasses import dataclass, field, fields
 
 from acquire.events import Event, EventKind
 from acquire.load_cell import LoadLog
-from acquire.text import Message
-from acquire.text.quantity import counts
+from acquire.text import Message, counts
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import EventLog, sentence
 from live.pipeline.history import History

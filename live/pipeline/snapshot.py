@@ -12,9 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from acquire.text import Message
-from acquire.text.message import word
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message, word
 from live.config.figures import CYCLE_CHANNELS, FIGURES, LIVE, OF_SNAPSHOT, LiveFigure, attributes, figure_of
 from live.pipeline.measurement import Measurement, TimeStep
 from live.pipeline.timed.figure import FigureState, TimedFigure

@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 from typing import BinaryIO
 
 from acquire.errors import DataError
-from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text import Message, joined
 from acquire.text.printable import counted
 from live.config.sections import LoadConfig
 from live.replay.export_text import (

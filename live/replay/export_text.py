@@ -26,8 +26,7 @@ import numpy as np
 
 from acquire.errors import ConfigError, DataError
 from acquire.protocols.units import is_mass, newtons_per
-from acquire.text import Message
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message
 
 HEAD = 1 << 18
 """Bytes or characters at the beginning of a file in which its form is found."""

@@ -25,10 +25,8 @@ from acquire.frame import Burst, Frame
 from acquire.hdf5 import FolderWatch
 from acquire.load_sample import LoadSample
 from acquire.opencv.images import picture_times
-from acquire.text import Message
-from acquire.text.message import about, joined
+from acquire.text import Amount, Message, about, counts, joined
 from acquire.text.printable import counted
-from acquire.text.quantity import Amount, counts
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
 from live.pipeline.consumer import Compose, RunInfo, Screen

@@ -20,8 +20,7 @@ from acquire.events import Event
 from acquire.frame import Burst, CameraInfo, Frame
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
-from acquire.text import Message
-from acquire.text.quantity import counts
+from acquire.text import Message, counts
 from live.pipeline.measure import NewReference
 
 

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Burst
-from acquire.text import Message
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message
 from analysis.evaluate import MIN_STILL_INSTANTS, evenly, noise_floor, still_phase
 from analysis.picture.pattern import gauge_length, l10_strain
 from live.config.loading import Config

@@ -10,8 +10,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from acquire.text import Message
-from acquire.text.message import word
+from acquire.text import Message, word
 from live.config.sections import CameraConfig, ScaleConfig
 
 MOTION_MM = 0.1

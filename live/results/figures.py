@@ -10,9 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from acquire.load_cell import LoadLog
-from acquire.text import Message
-from acquire.text.message import joined, word
-from acquire.text.quantity import Amount, unit_of
+from acquire.text import Amount, Message, joined, word
+from acquire.text.quantity import unit_of
 from analysis.evaluate import (
     AT_LEAST,
     CONFIDENCE,

@@ -14,7 +14,6 @@ from analysis.field import Status
 from live.config.figures import FIGURES, columns
 from live.results.quantities import quantity_of
 from live.results.row import BLUR, GRADIENTS, STRAINS, gauge_columns
-from live.results.writer import COLUMNS
 
 FORMAT, FORMAT_VERSION = "phasedic-strain", 1
 PLAIN_MAPS = ("u", "v", *GRADIENTS, *STRAINS)
@@ -23,6 +22,9 @@ BYTES = {"status", "iterations"}  # maps of whole numbers; the others are float3
 WHOLE = {figure.name for figure in FIGURES if figure.column and figure.kind == "count"}
 """Columns of whole numbers; the others are float64."""
 ANY_COLUMN = Declared("number", (None,))  # of a gauge, or added by another version
+COLUMNS = columns()
+"""Of all valid ZOIs; strains are dimensionless. Then come those of ``ResultsInfo.extras``, and value,
+sigma and share of each virtual gauge."""
 # The columns that every file of this version has, and those that it may have.
 REQUIRED = {*COLUMNS[: COLUMNS.index("latency_s")]}
 KNOWN = {*COLUMNS, *columns(["section", "lag"])}

@@ -24,8 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.text import Message
-from acquire.text.message import joined, word
+from acquire.text import Message, joined, word
 from analysis.evaluate import (
     CONFIDENCE,
     Course,

@@ -9,10 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from acquire.load_cell import LoadLog
-from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text import Amount, Message, counts, joined
 from acquire.text.printable import brief, share_text
-from acquire.text.quantity import Amount, counts
 from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History

@@ -14,23 +14,18 @@ from typing import TYPE_CHECKING, Any, cast
 
 from acquire.closing import Closing
 from acquire.errors import DataError
-from live.config.figures import columns
 from live.config.loading import Config
 from live.pipeline.consumer import Consumer, Policy, RunInfo
 from live.pipeline.history import AxisFinder
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.results.folder import versions
+from live.results.layout import COLUMNS
 from live.results.row import ResultsInfo, StrainRow, gauge_columns
 from live.results.strain_h5 import FLUSH_S, StrainWriter
 
 if TYPE_CHECKING:
     from analysis.field import ZoiGrid
-
-COLUMNS = columns()
-"""Of all valid ZOIs; strains are dimensionless. Then come those of ``ResultsInfo.extras``, and value,
-sigma and share of each virtual gauge."""
-
 
 DEFERRED_FLUSH_S = 10.0  # in a replay, which can be run again
 

@@ -15,9 +15,7 @@ from typing import Any, ClassVar
 
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind
-from acquire.text import Message
-from acquire.text.message import word
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message, word
 from live.config.figures import OF_LOAD, OF_SECTION, figure_of, is_joint
 from live.config.loading import Config
 from live.config.sections import AlarmConfig

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
-from acquire.text import Message
-from acquire.text.message import word
+from acquire.text import Message, word
 from analysis.field import StrainField
 from analysis.optics import LensFit, LensModel, lens_of_shifts, strain_of_shift
 from live.config.loading import Config

@@ -15,9 +15,9 @@ from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from acquire.text import Message
+from acquire.text import Amount, Message
 from acquire.text.message import filled, formatted
-from acquire.text.quantity import Amount, decimal_mark
+from acquire.text.quantity import decimal_mark
 
 log = logging.getLogger(__name__)
 

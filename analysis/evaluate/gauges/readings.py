@@ -16,8 +16,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text import Message, joined
 from analysis.evaluate.area.affine import Places
 from analysis.evaluate.area.strain import GRADIENTS
 from analysis.evaluate.gauges.geometry import Mask

@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DEFECT, PhasedicError
-from acquire.text.message import Message, about, joined
+from acquire.text import Amount, Message, about, counts, joined
 from acquire.text.printable import duration
-from acquire.text.quantity import Amount, counts
 from live.pipeline.consumer import Screen
 from live.replay.batch.cluster import Cluster
 from live.replay.batch.keys import is_session, key_of_chunk

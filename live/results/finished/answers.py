@@ -15,8 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from acquire.text import Message
-from acquire.text.message import joined, word
+from acquire.text import Message, joined, word
 from live.results.figures import TensileRow
 from live.results.finished.findings import NO_FORCE, DataCheck, changes
 from live.results.finished.finished_test import FinishedTest

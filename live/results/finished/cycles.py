@@ -14,9 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.text import Message
-from acquire.text.message import joined
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message, joined
 from analysis.evaluate import Curve, Figure, Track
 from analysis.evaluate.creep import Creep
 from analysis.evaluate.curve import broken_at

@@ -14,8 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.text import Message
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message
 from analysis.evaluate import CONFIDENCE, Figure, Track
 from analysis.evaluate.curve import noise
 from analysis.evaluate.seen import LEAPS_NEED, leap, leap_alike, renewal_s, without_stopped

@@ -9,9 +9,8 @@ import math
 
 import numpy as np
 
-from acquire.text import Message
-from acquire.text.message import joined
-from acquire.text.quantity import Amount, unit_of
+from acquire.text import Amount, Message, joined
+from acquire.text.quantity import unit_of
 from analysis.evaluate import true_curve
 from analysis.evaluate.creep import Creep
 from live.config.figures import FIGURES

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text import Message, joined
 from analysis.evaluate import (
     MIN_STILL_INSTANTS,
     NoiseFloor,

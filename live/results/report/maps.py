@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import encoded
 from acquire.frame import CameraInfo
-from acquire.text import Message
-from acquire.text.message import about, word
+from acquire.text import Message, about, word
 from acquire.text.message import joined as texts
 from live.results.maps.colours import ticks
 from live.results.maps.painting import Levels, Painter, caption

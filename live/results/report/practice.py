@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from acquire.events import EventKind
 from acquire.frame import CameraInfo
-from acquire.text import Message
-from acquire.text.message import joined, word
+from acquire.text import Message, joined, word
 from analysis.evaluate import NoiseFloor
 from analysis.picture.pattern import describe_pattern
 from analysis.quality.pattern import FWHM_OF_RADIUS, SPECKLE_RADIUS_PX

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.events import named
-from acquire.text import Message
-from acquire.text.message import word
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message, word
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.consumer import Screen
 from live.pipeline.event_log import Repeats, counted_text

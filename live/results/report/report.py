@@ -10,9 +10,8 @@ import numpy as np
 
 from acquire.errors import DataError
 from acquire.hdf5 import storable
-from acquire.text import Message
+from acquire.text import Amount, Message, counts
 from acquire.text.message import joined as joined_texts
-from acquire.text.quantity import Amount, counts
 from analysis.evaluate import AT_LEAST, CONFIDENCE
 from live.pipeline.consumer import Screen
 from live.results.budget import CameraView, budget_cells

@@ -10,8 +10,7 @@ from typing import TextIO
 import numpy as np
 
 from acquire.errors import ConfigError, DataError
-from acquire.text import Message
-from acquire.text.message import word
+from acquire.text import Message, word
 from analysis.evaluate import CONFIDENCE, TensileFigures
 from live.config.cameras import BACK, FRONT
 from live.pipeline.measurement import AXIAL

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
-from acquire.text import Message
-from acquire.text.message import word
+from acquire.text import Message, word
 from analysis.evaluate import Curve, Figure, TensileFigures
 from analysis.evaluate.curve import Loading
 from analysis.evaluate.programme import KindOfTest

@@ -10,9 +10,7 @@ from functools import reduce
 from acquire.burst import sum_kind
 from acquire.hdf5 import free_bytes
 from acquire.record_mode import RecordMode
-from acquire.text import Message
-from acquire.text.message import joined, word
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message, joined, word
 from analysis.quality.steadiness import Steadiness, mains_of, strain_drifts
 from live.config.cameras import other_cameras
 from live.config.loading import Config

@@ -7,9 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from acquire.text import Message
-from acquire.text.message import joined
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message, joined
 from analysis.quality.pattern import SPECKLE_RADIUS_PX
 from analysis.quality.steadiness import aliased, mains_of
 from live.setup.check.check_list import CheckFigures, median

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
-from acquire.text import Message
-from acquire.text.message import joined, word
+from acquire.text import Amount, Message, counts, joined, word
 from acquire.text.printable import share_text
-from acquire.text.quantity import PLUS_MINUS, Amount, counts
+from acquire.text.quantity import PLUS_MINUS
 from analysis.field import StrainField, ZoiGrid
 from live.pipeline.measurement import Measurement
 from live.pipeline.snapshot import AXIAL, FORCE, STRESS, Snapshot

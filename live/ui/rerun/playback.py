@@ -19,9 +19,7 @@ from numpy.typing import NDArray
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Level
 from acquire.frame import Frame, frozen
-from acquire.text import Message
-from acquire.text.message import about, word
-from acquire.text.quantity import Amount, counts
+from acquire.text import Amount, Message, about, counts, word
 from analysis.evaluate import evaluate_test
 from live.config.gauges import gauge_colours, outlines
 from live.config.loading import from_dict

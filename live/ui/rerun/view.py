@@ -26,8 +26,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from acquire.text import Message
-from acquire.text.message import joined
+from acquire.text import Message, joined
 from live.ui.rerun.messages import ViewSetup, ViewTarget, row_of
 from live.ui.rerun.outbox import MessageSource, Outbox, Pending
 from live.ui.rerun.supervisor import Notify, Supervisor

@@ -15,10 +15,9 @@ import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, TextIO
 
-from acquire.text import Message
-from acquire.text.message import about, joined
+from acquire.text import Amount, Message, about, counts, joined
 from acquire.text.printable import duration, printable, share_text
-from acquire.text.quantity import IN_ASCII, Amount, counts
+from acquire.text.quantity import IN_ASCII
 from live.pipeline.consumer import Screen
 from live.ui.terminal.status_line import GAP, cameras_line, force_text, gauge_texts, status_line
 from live.words.language import told

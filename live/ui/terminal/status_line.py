@@ -7,10 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from acquire.text import Message
-from acquire.text.message import joined, word
+from acquire.text import Amount, Message, counts, joined, word
 from acquire.text.printable import duration, share_text
-from acquire.text.quantity import UNKNOWN, Amount, counts
+from acquire.text.quantity import UNKNOWN
 from live.pipeline.snapshot import AXIAL, BURST, FORCE, STRESS
 from live.pipeline.timed.figure import BEYOND, LACKING, FigureState
 from live.words.language import told

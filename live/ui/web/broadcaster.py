@@ -7,8 +7,7 @@ import math
 import threading
 from typing import Any
 
-from acquire.text import Message
-from acquire.text.quantity import Amount
+from acquire.text import Amount, Message
 
 MAX_PAGES = 8
 """Pages that may be open at one time."""

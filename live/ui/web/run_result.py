@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from acquire.text import Message
-from acquire.text.message import about, joined, word
+from acquire.text import Message, about, joined, word
 from analysis.evaluate import TensileFigures
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import sentence

@@ -26,11 +26,10 @@ from analysis.evaluate import GaugeValue
 from analysis.field import PAIR_INDEX
 from live.pipeline.measurement import Measurement
 from live.results import Results, ResultsInfo, Strain
-from live.results.layout import MAPS, PLAIN_MAPS
+from live.results.layout import COLUMNS, MAPS, PLAIN_MAPS
 from live.results.row import StrainRow, maps_of
 from live.results.stored_fields import read_field
 from live.results.strain_h5 import FLUSH_S, StrainWriter, rounded
-from live.results.writer import COLUMNS
 from tests.acquire.session.fixtures import writer
 from tests.clock import Clock
 from tests.live.made_up import CAMERA, START, make_grid, make_measurement
