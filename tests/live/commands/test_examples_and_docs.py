@@ -37,7 +37,7 @@ def test_the_examples_come_with_pictures_and_a_notebook(copied: Path) -> None:
 
 def test_nothing_is_overwritten(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert phasedic(["examples", str(copied)]) == 2
-    assert "nothing is overwritten" in capsys.readouterr().err
+    assert "is not overwritten" in capsys.readouterr().err
 
 
 def test_the_pictures_of_the_tensile_test_give_what_the_readme_says(

@@ -15,7 +15,7 @@ import pytest
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag, LoadSample
 from analysis.evaluate import TwoSides
-from live.commands import devices, identify
+from live.commands import devices, identify, scale
 from live.commands.init import _stable
 from live.commands.load_calibrate import _raw, _unfit
 from live.commands.map import _warn_of_motion
@@ -93,12 +93,16 @@ def scale_arguments(**given: Any) -> argparse.Namespace:
 
 def test_a_scale_is_taken_one_way_and_in_mm_above_zero() -> None:
     check_scale(scale_arguments(width=5.0, sigma=0.0, stand_off=1.0))
-    for given in (
-        {}, {"points": "1,2,3,4", "width": 5.0}, {"width": 5.0, "sigma": -0.1}, {"width": 5.0, "length": 0.0},
-        {"width": 5.0, "square": math.inf}, {"width": 5.0, "stand_off": -1.0}, {"width": 5.0, "marker": 0.0},
-    ):  # fmt: skip
+    for given in ({}, {"points": "1,2,3,4", "width": 5.0}):
         with pytest.raises(ConfigError):
             check_scale(scale_arguments(**given))
+    parser = argparse.ArgumentParser()
+    scale.add_arguments(parser)
+    for words in (
+        "--sigma -0.1", "--length 0", "--square inf", "--stand-off -1", "--marker 0", "--width 0", "--width nan"
+    ):  # fmt: skip
+        with pytest.raises(SystemExit):
+            parser.parse_args(words.split())
     screen = RecordingScreen()
     _print_false_strain(None, screen)
     _print_false_strain(500.0, screen)

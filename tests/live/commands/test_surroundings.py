@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 import io
-import math
 import threading
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -13,7 +13,6 @@ import pytest
 from acquire.errors import ConfigError
 from live.cli import main
 from live.commands import environment, recover
-from live.commands.batch import _chunk_s
 from live.commands.environment import NonBlockingStream
 from live.commands.options import add_options
 from live.config.loading import load_config
@@ -140,22 +139,18 @@ def test_the_short_help_has_all_options_but_those_for_experts(capsys: pytest.Cap
 
 
 @pytest.mark.parametrize(
-    ("chunk", "as_measured", "words"),
+    ("words", "said"),
     [
-        (None, False, ""),
-        (None, True, ""),
-        (0.5, False, ""),
-        (0.5, True, "--as-measured is bit-identical"),
-        (0.0, False, "seconds above 0"),
-        (-1.0, False, "seconds above 0"),
-        (math.inf, False, "seconds above 0"),
-        (math.nan, False, "seconds above 0"),
+        *((["--chunk", chunk], "above 0") for chunk in ("0", "-1", "inf", "nan", "some")),
+        (["--chunk", "0.5", "--as-measured"], "--as-measured is bit-identical"),
+        (["--workers", "0"], "from 1"),
     ],
 )
-def test_chunks_of_a_batch(chunk: float | None, as_measured: bool, words: str) -> None:
-    arguments = argparse.Namespace(chunk_s=chunk, as_measured=as_measured)
-    if words:
-        with pytest.raises(ConfigError, match=words):
-            _chunk_s(arguments)
-    else:
-        assert _chunk_s(arguments) == chunk
+def test_chunks_and_workers_of_a_batch(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    try:
+        code = main(["batch", "x", "--out", str(tmp_path / "out"), *words])
+    except SystemExit as ended:
+        code = int(ended.code or 0)
+    assert code == 2 and said in capsys.readouterr().err

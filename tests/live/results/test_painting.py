@@ -283,7 +283,7 @@ def test_a_map_is_saved_as_a_new_file(tmp_path: Path) -> None:
     save(image, tmp_path / "a.jpg")
     assert (tmp_path / "a.jpg").read_bytes().startswith(b"\xff\xd8")
     with pytest.raises(DataError, match="cannot be written"):
-        save(image, tmp_path / "no" / "a.png")
+        save(image, tmp_path / "a.jpg" / "a.png")
 
 
 # -- ranges ---------------------------------------------------------------------------------------

@@ -83,7 +83,7 @@ def test_the_checks_that_were_made_stand_in_one_line() -> None:
     turned = checks_line(findings(made(-STRAINS, force=stress_of(STRAINS) * 20e-6)))
     assert "; sign of the force" in turned and "in doubt" in turned
     without = checks_line(findings(finished(run_of(PULLED, loads=False))))
-    assert without.endswith("; 7 that need a force not possible")
+    assert without.endswith("; 8 that need a force not possible")
 
 
 def test_a_bad_test_has_its_answers_in_twelve_lines_in_the_order_in_which_they_are_asked(

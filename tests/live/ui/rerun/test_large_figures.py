@@ -45,7 +45,7 @@ def test_figures_come_back_from_a_message() -> None:
 def test_what_counts_stands_below() -> None:
     now = replace(NOW, valid=1007, area_share=0.5, frames={"without_force": 1234})
     assert LargeFigures.of(now).line == (
-        "1007 of 1008 ZOIs, 1 LOST; strain of 50 % of the area   without a force 1\u202f234"
+        "1\u202f007 of 1\u202f008 ZOIs, 1 LOST; strain of 50 % of the area   without a force 1\u202f234"
     )
     assert LargeFigures.of(replace(NOW, zois=0)).line == "nothing measured yet"
     assert LargeFigures.of(replace(NOW, paused=True)).cells[0] == ("STATE", "PAUSED", "PAUSED")
