@@ -1,4 +1,8 @@
-"""How a tensile test is evaluated, and its figures."""
+"""How a tensile test is evaluated, what standards demand of it, and its figures.
+
+Of the standards facts only, from ISO 6892-1:2019 (metals), ISO 527-1:2019 (plastics) and ASTM D3039/D3039M-17
+(composites); read the standard itself before reporting by it.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +16,6 @@ from analysis.evaluate.figure import Figure
 from analysis.evaluate.programme import KINDS, Kind
 
 PER_MINUTE = 1 / 60
-
-
 ZeroBy = Literal["raw", "toe", "preload"]
 
 

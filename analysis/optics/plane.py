@@ -8,6 +8,9 @@ With places (X, Y) about a centre, over a length L, a plane that was square to t
 to the first order: shift (q0, q1), scale q2, turn q3, keystone (q4, q5) of a tilt, stretch and shear (q6, q7), which
 a rigid plane shows only where the camera is not square to it. Applied exactly: R. Hartley, A. Zisserman, Multiple View
 Geometry in Computer Vision, 2nd ed. (2004), section 2.4.
+
+In a field without load motion along the axis shows exx = eyy. A tilt shows a scale that rises evenly over the picture:
+along x u = k x^2 and v = k x y, so that both displacements give the same k; in-plane bending gives them opposite signs.
 """
 
 from __future__ import annotations

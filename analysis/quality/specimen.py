@@ -4,7 +4,8 @@ The figure is the smaller eigenvalue of the structure tensor, the noise taken ou
 gradient in the worst direction, from which the uncertainty of a displacement follows. An edge, a brushed
 grip, a blurred background have none of it. Single strong edges (letters, screws) are capped at the strength
 of the speckle, so that they count for no more than one. The rest is a matter of size: what no ZOI fits
-into is left out, and of several speckled places the largest is the specimen.
+into is left out, and of several speckled places the largest is the specimen. Rectangles of its speckle beside it, along
+its length, look like plates.
 """
 
 from __future__ import annotations

@@ -32,10 +32,8 @@ MIN_CYCLES = 4
 # Standard deviations of the noise, and share of the whole range: what a cycle exceeds
 _SURE, _LEAST = 12.0, 0.1
 _SHARE, _FACTOR = 0.8, 1.2  # of the cycles that must be like the one before, and how like
-_FIGURES, _CERTAIN = (
-    1.3,
-    5,
-)  # or of their durations and ranges, that many a cycle and as many beyond: of blocks
+# Of blocks: so many of both durations and ranges a cycle are alike, and so many more
+_FIGURES, _CERTAIN = 1.3, 5
 _PAUSE = 1.5  # of the distance to the next cycle
 _KEPT = 16_384  # readings, of a cycle that goes on
 _BLOCK = 32_768  # readings and bursts that are taken at once, of a test that is over

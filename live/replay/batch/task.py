@@ -1,4 +1,8 @@
-"""One test of a campaign: replayed into a staging folder, which is renamed when it is complete."""
+"""One test of a campaign: replayed into a staging folder, which is renamed when it is complete.
+
+The staging folder is ``.NAME.HOST.PID.part``. One of a process that has ended is stale. Processes of other machines
+cannot be checked; their folders are removed when the task is complete.
+"""
 
 from __future__ import annotations
 

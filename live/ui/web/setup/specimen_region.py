@@ -1,4 +1,8 @@
-"""The region of the specimen and its gauges during set-up: drawn by strokes, found or placed, undone, and saved."""
+"""The region of the specimen and its gauges during set-up: drawn by strokes, found or placed, undone, and saved.
+
+Strokes are in px of the picture. The centre of the pixel in column i and row j is at (i, j); a pixel belongs to a shape
+where its centre lies in it.
+"""
 
 from __future__ import annotations
 
