@@ -373,4 +373,6 @@ def _moves(force: Track, strain: Track, new: NDArray[np.intp]) -> bool:
     changed = np.searchsorted(force.t[new - 1], t[1:]) > np.searchsorted(force.t[new], t[:-1])
     if changed.all():  # fewer pictures than values: a force seldom goes by so many steps so fast
         return bool((last - first) / len(new) < _FAST_S and len(np.unique(force.values)) > len(new) / 2)
+    if not changed.any():
+        return False
     return bool(np.mean((way * moved)[~changed]) > _MOVES * np.mean((way * moved)[changed]))

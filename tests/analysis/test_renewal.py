@@ -64,3 +64,9 @@ def test_few_readings_tell_nothing(n: int) -> None:
     assert (
         renewal_s(Track(np.arange(n) * 1.0, np.arange(n) * 1.0), Track(np.arange(3.0), np.zeros(3)))[0] == 0
     )
+
+
+def test_two_pictures_between_two_values_show_nothing() -> None:
+    t = np.arange(0, 12, 1 / 80)
+    force = Track(t, 100.0 * np.floor(t / 0.4 + 1e-9) + np.floor(t / 0.4 + 1e-9) % 3 * 0.01)
+    assert renewal_s(force, Track(np.array([4.1, 4.2]), np.array([1e-4, 2e-4]))) == (0.0, 0.0)
