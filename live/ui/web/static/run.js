@@ -188,10 +188,11 @@ function showRecording(recording, isEnded) {
   put($("rec"), t(isOn ? RECORDING.on : RECORDING.off));
   $("rec").parentElement.className = isOn ? "rec on" : "rec off";
   const [begin, end] = ["start", "stop"].map((line) => document.querySelector(`[data-part="run"] [data-line=${line}]`));
+  begin.disabled = recording !== false || isEnded;
+  end.disabled = !isOn;
+  if (isEnded) return; // the buttons stay where they are while the files are closed
   begin.hidden = recording !== false;
   end.hidden = recording === false;
-  begin.disabled = recording !== false;
-  end.disabled = !isOn;
 }
 
 // Red and the cause: alarms, errors that are not over, figures that are old or unknown, until that is over. Amber near
