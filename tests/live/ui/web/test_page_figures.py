@@ -474,6 +474,21 @@ INSIDE = """() => { const bar = document.getElementById("strip").getBoundingClie
         .map(one => one.top >= bar.top - 1 && one.bottom <= bar.bottom + 1 && one.right <= bar.right + 1); }"""
 
 
+def test_the_buttons_of_a_run_stay_while_its_files_are_closed(browser: Any) -> None:
+    """A test that was recorded and one that was not: neither can be recorded then, and nothing moves."""
+    places = """() => [...document.querySelectorAll("[data-part=run] .toolbar button")].map(one => {
+        const { x, y, width } = one.getBoundingClientRect(); return [x, y, width]; })"""
+    with opened(browser) as page:
+        for recording, line in ((True, "stop"), (False, "start")):
+            show_run(page, recording=recording)
+            button = page.page.locator(f"[data-part=run] [data-line={line}]")
+            before = page.page.evaluate(places)
+            assert button.is_enabled()
+            show(page, "run", "showRun", run_state(state="ended", recording=False))
+            assert page.page.evaluate(places) == before
+            assert button.is_visible() and button.is_disabled()
+
+
 @pytest.mark.parametrize("locale", LOCALES)
 def test_a_fault_can_be_read_at_every_size(browser: Any, locale: str) -> None:
     names = ("extension", "width", "area")
