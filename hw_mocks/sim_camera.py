@@ -21,16 +21,22 @@ from typing import Any, Self
 import numpy as np
 
 from acquire.addresses import Address, Options
-from acquire.closing import Closing
 from acquire.errors import DeviceError
 from acquire.events import EventSink, device_event
 from acquire.frame import CameraInfo, CameraSetting, Clock, Frame
+from acquire.opening import Closing
 from acquire.settings import number, take_settings
 from acquire.text import Message
-from hw_mocks.faults import CAMERA_FAULTS, FaultPlan, Planned, parse_faults, plan_frames
 from hw_mocks.optics import Optics, take_optics
 from hw_mocks.scene import Exposer, Scene, Sensor, rendered_fps, take_sensor, upper_half
-from hw_mocks.sim_settings import PictureSettings
+from hw_mocks.sim_settings import (
+    CAMERA_FAULTS,
+    FaultPlan,
+    PictureSettings,
+    Planned,
+    parse_faults,
+    plan_frames,
+)
 from hw_mocks.specimen import VirtualSpecimen, take_specimen
 
 log = logging.getLogger(__name__)

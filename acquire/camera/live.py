@@ -22,7 +22,7 @@ from acquire.camera.timing import FrameCounter, StallWatch, StampOf, longest_pau
 from acquire.errors import DeviceError, PhasedicError, Spoken
 from acquire.events import EventSink, Level, RateLimiter, device_event
 from acquire.frame import CameraInfo, Clock, Frame
-from acquire.opening_thread import Reopening, close_within
+from acquire.opening import Reopening, close_within
 from acquire.text import Message
 
 log = logging.getLogger(__name__)

@@ -22,8 +22,8 @@ from acquire.camera.live import DeviceFault, LiveCamera, Picture
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import EventSink
+from acquire.files.picture import GRAYS, WEBCAM_WARNING, to_gray
 from acquire.frame import CameraInfo, Clock, frozen
-from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
 from acquire.settings import choice, number, read_settings, setting
 from acquire.text import Message
 

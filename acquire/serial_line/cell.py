@@ -15,13 +15,12 @@ from typing import Any, Self
 
 from acquire.addresses import Address
 from acquire.clock import ClockUnit, DeviceClock
-from acquire.closing import Closing
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
+from acquire.opening import Closing
 from acquire.protocols.base import Reading
-from acquire.serial_line.clock import ArrivalRate, ArrivalTimes, in_milliseconds
-from acquire.serial_line.echo import Echo
+from acquire.serial_line.arrivals import ArrivalRate, ArrivalTimes, Echo, in_milliseconds
 from acquire.serial_line.link import FloodWatch, Link, LinkContext, LoadWatch, Opener
 from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling

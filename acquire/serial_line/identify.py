@@ -23,8 +23,7 @@ from itertools import pairwise
 from acquire.addresses import Options, parse_address
 from acquire.errors import ConfigError, DeviceError, PhasedicError
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Parser, Protocol, Reading, find_protocol
-from acquire.protocols.units import is_mass, is_unit
+from acquire.protocols.base import Parser, Protocol, Reading, find_protocol, is_mass, is_unit
 from acquire.serial_line.byte_ports import Port
 from acquire.serial_line.ports import PORT_ERRORS, LineSettings, open_port
 from acquire.text.message import Message, joined

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 from acquire.errors import ConfigError, DeviceError
 from acquire.load_sample import LoadFlag, LoadSample
-from acquire.opening_thread import RETRY_S, Opening, Reopening, close_within
+from acquire.opening import RETRY_S, Opening, Reopening, close_within
+from acquire.serial_line.arrivals import Echo
 from acquire.serial_line.byte_ports import Port
-from acquire.serial_line.echo import Echo
 from acquire.serial_line.ports import PORT_ERRORS, LineSettings, find_again, identity_of
 from acquire.text import Message
 

@@ -20,7 +20,6 @@ import h5py
 import numpy as np
 
 from acquire.clock import ClockPair
-from acquire.closing import Closing
 from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Burst, Frame
@@ -38,6 +37,7 @@ from acquire.hdf5 import (
     to_json,
 )
 from acquire.load_sample import LoadSample
+from acquire.opening import Closing
 from acquire.session import layout
 from acquire.session.layout import SessionInfo
 from acquire.session.rows import BurstTable

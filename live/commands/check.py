@@ -23,7 +23,7 @@ from acquire.files.picture import write_picture
 from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
 from acquire.text import Message, about, word
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from live.commands.options import (
     MEASURE,
     PICTURES,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from acquire.opencv.images import read_image
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from live.results import Strain
 from live.results.maps.map import MapRequest, draw, save
 from live.results.run_folder import open_run

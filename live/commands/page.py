@@ -10,7 +10,7 @@ from typing import Any
 
 from acquire.errors import EXIT_INTERRUPTED, DeviceError, PhasedicError
 from acquire.text import Message
-from acquire.text.printable import brief
+from acquire.text.message import brief
 from live.commands.attended import page_opened
 from live.commands.init import find_devices
 from live.commands.options import OUTPUT, add_measure, add_options, overrides

@@ -26,7 +26,7 @@ from acquire.hdf5 import FolderWatch
 from acquire.load_sample import LoadSample
 from acquire.opencv.images import picture_times
 from acquire.text import Amount, Message, about, counts, joined
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
 from live.pipeline.consumer import Compose, RunInfo, Screen

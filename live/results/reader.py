@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError
 from acquire.hdf5 import (
     DAMAGE,
@@ -36,6 +35,7 @@ from acquire.hdf5 import (
     read_superblock,
     stored_rows,
 )
+from acquire.opening import Closing
 from acquire.text.message import Message, about, word
 from analysis.field import ZoiGrid
 from live.results import layout

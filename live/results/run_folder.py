@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.camera import with_scheme
-from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
+from acquire.opening import Closing
 from acquire.record_mode import Crop
 from acquire.session import Session
 from acquire.text import Message

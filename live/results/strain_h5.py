@@ -32,7 +32,7 @@ from acquire.hdf5 import (
     storable,
 )
 from acquire.text import Message
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from analysis.evaluate import load_axis
 from live.results import layout
 from live.results.response.stored import CORRELATION, CURRENT, GROUP, add_group

@@ -10,7 +10,7 @@ import numpy as np
 
 from acquire.load_cell import LoadLog
 from acquire.text import Amount, Message, counts, joined
-from acquire.text.printable import brief, share_text
+from acquire.text.message import brief, share_text
 from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History

@@ -12,8 +12,8 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from acquire.closing import Closing
 from acquire.errors import DataError
+from acquire.opening import Closing
 from live.config.loading import Config
 from live.pipeline.consumer import Consumer, Policy, RunInfo
 from live.pipeline.history import AxisFinder

@@ -30,7 +30,7 @@ from acquire.events import Event, EventKind, Level
 from acquire.load_cell import LoadCell
 from acquire.load_sample import LoadSample
 from acquire.text import Message
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from live.config.listen_address import SOCKET, ListenAddress, private_socket, read_token
 from live.pipeline.consumer import Screen
 from live.run.tcp_lines import LineServer

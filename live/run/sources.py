@@ -23,7 +23,7 @@ from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadCell
 from acquire.system import lower_priority
 from acquire.text import Message
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from live.config.loading import Config
 from live.pipeline.latency import LOAD
 from live.pipeline.reference import ReferenceTaker

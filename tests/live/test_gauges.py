@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from acquire.errors import ConfigError
-from acquire.text.printable import share_text
+from acquire.text.message import share_text
 from analysis import Status, StrainField
 from analysis.evaluate import AreaGauge, Gauge, GaugeSet, GaugeValue
 from analysis.field import ZoiGrid

@@ -14,9 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from acquire.addresses import parse_address
-from acquire.camera.contract import Camera
+from acquire.camera.contract import Camera, list_cameras, open_camera
 from acquire.camera.live import LiveCamera
-from acquire.camera.opening import list_cameras, open_camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import Event
 from acquire.frame import Frame

@@ -18,7 +18,7 @@ from typing import Any
 
 from acquire.errors import EXIT_INTERRUPTED, LOSS, ConfigError, DataError, PhasedicError
 from acquire.text import Message
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from live.config.loading import load_config
 from live.config.new_files import made_folder, replaced_file
 from live.pipeline.consumer import Screen

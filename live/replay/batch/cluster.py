@@ -18,7 +18,7 @@ from typing import Any
 
 from acquire.errors import ConfigError, DataError
 from acquire.text import Message
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from live.pipeline.consumer import Screen
 from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow, failed

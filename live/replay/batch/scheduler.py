@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import DEFECT, PhasedicError
 from acquire.text import Amount, Message, about, counts, joined
-from acquire.text.printable import duration
+from acquire.text.message import duration
 from live.pipeline.consumer import Screen
 from live.replay.batch.cluster import Cluster
 from live.replay.batch.keys import is_session, key_of_chunk

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from acquire.errors import DataError, PhasedicError
 from acquire.system import is_running
 from acquire.text import Message
-from acquire.text.printable import changed, printable
+from acquire.text.message import changed, printable
 from live.pipeline.consumer import Screen
 from live.replay.batch.row import BatchRow, failed, row_of, row_of_chunk
 from live.replay.parts import measure_part

@@ -19,7 +19,7 @@ from acquire.addresses import expanded, parse_address
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
 from acquire.text import Message
-from acquire.text.printable import printable
+from acquire.text.message import printable
 
 LISTS = (".toml", ".csv")
 _PICTURES = (".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm")

@@ -25,7 +25,7 @@ from acquire.hdf5 import (
     read_attributes,
     reason,
 )
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from live.pipeline.timed.response import leaves_name, slope_name
 from live.results.quantities import quantity_of
 

@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, TextIO
 
 from acquire.text import Amount, Message, about, counts, joined
-from acquire.text.printable import duration, printable, share_text
+from acquire.text.message import duration, printable, share_text
 from acquire.text.quantity import IN_ASCII
 from live.pipeline.consumer import Screen
 from live.ui.terminal.status_line import GAP, cameras_line, force_text, gauge_texts, status_line

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from acquire.text import Amount, Message, counts, joined, word
-from acquire.text.printable import duration, share_text
+from acquire.text.message import duration, share_text
 from acquire.text.quantity import UNKNOWN
 from live.pipeline.snapshot import AXIAL, BURST, FORCE, STRESS
 from live.pipeline.timed.figure import BEYOND, LACKING, FigureState

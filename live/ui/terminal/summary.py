@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from acquire.text import Amount, Message, counts
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from live.pipeline.consumer import ConsumerReport, Screen
 from live.pipeline.event_log import sentence
 from live.pipeline.history import History

@@ -17,7 +17,7 @@ from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.text import Message
-from acquire.text.printable import printable, share_text
+from acquire.text.message import printable, share_text
 from analysis.evaluate import ExtensionGauge, LineGauge
 from live.config.gauges import complete_gauges, gauge_colours
 from live.config.loading import Config

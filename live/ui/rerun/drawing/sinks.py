@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from acquire.text import Message
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from live.results.maps.colours import MICROSTRAIN
 from live.ui.rerun.drawing.layout import blueprint
 from live.ui.rerun.drawing.proxy import ViewerProxy, hidden_address, wait_for

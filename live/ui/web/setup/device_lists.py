@@ -15,7 +15,7 @@ from acquire.serial_line.identify import Finding
 from acquire.serial_line.ports import LineSettings, PortInfo, list_serial_ports
 from acquire.settings import settings_of
 from acquire.text import Message
-from acquire.text.printable import brief, printable
+from acquire.text.message import brief, printable
 from live.setup.devices import camera_settings, load_settings
 from live.ui.web.setup.config_draft import ConfigDraft
 

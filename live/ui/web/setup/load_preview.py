@@ -18,7 +18,7 @@ from acquire.load_cell.check import ListenResult, LoadReport, report, stillness
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.system import lower_priority
 from acquire.text import Message
-from acquire.text.printable import brief, printable
+from acquire.text.message import brief, printable
 from live.pipeline.latency import OUTPUT
 from live.pipeline.timed.figure import OLD_S
 from live.setup.check.lines import CheckLine

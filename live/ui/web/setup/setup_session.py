@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from acquire.frame import CameraInfo, Frame
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from live.config.cameras import BACK
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST

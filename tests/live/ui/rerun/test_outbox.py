@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from acquire.events import Event, EventKind
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from acquire.text.quantity import Amount
 from live.pipeline.snapshot import Snapshot
 from live.results.finished.readings import Readings
