@@ -34,7 +34,6 @@ FRINGE = 8.0  # px of pattern beyond what the test can move into view
 RENDER_SHARE = 0.4
 """Of one core that rendering may take where the rate follows the machine."""
 
-
 STILL_S, STILL_FRAMES = 1.0, 40
 """Without motion at the start, at least, for the reference."""
 SPOT_PX = 6

@@ -44,7 +44,6 @@ SERIAL_FAULTS: Mapping[str, float] = {
     "rate": 0.5,  # from here on this part of the promised rate
 }
 
-
 BITS = (8, 10, 12, 16)
 
 

@@ -113,7 +113,7 @@ CAMERAS: Registry[Camera] = Registry(
     {
         "": "acquire.v4l2.camera:open_v4l2" if HAS_V4L2 else "acquire.camera.contract:without_v4l2",
         "genicam": "acquire.genicam.camera:open_genicam",
-        "pylon": "acquire.pylon.camera:open_pylon",
+        "pylon": "acquire.pylon:open_pylon",
         "opencv": "acquire.opencv.webcam:open_opencv",
         "video": "acquire.opencv.video:open_video",
         "files": "acquire.opencv.images:open_files",
@@ -122,12 +122,12 @@ CAMERAS: Registry[Camera] = Registry(
     lists_group="phasedic.camera_lists",
     elsewhere=["sim"],
     lists=({"": "acquire.v4l2.listing:list_cameras"} if HAS_V4L2 else {})
-    | {"genicam": "acquire.genicam.camera:list_cameras", "pylon": "acquire.pylon.camera:list_cameras"},
+    | {"genicam": "acquire.genicam.camera:list_cameras", "pylon": "acquire.pylon:list_cameras"},
     settings_group="phasedic.camera_settings",
     settings={
         "": "acquire.v4l2.controls:V4L2Settings",
         "genicam": "acquire.genicam.settings:GenicamSettings",
-        "pylon": "acquire.pylon.camera:PylonSettings",
+        "pylon": "acquire.pylon:PylonSettings",
         "opencv": "acquire.opencv.webcam:OpenCVSettings",
         "video": "acquire.opencv.video:VideoSettings",
         "files": "acquire.opencv.images:FileSettings",

@@ -38,7 +38,6 @@ _KINDS = {
     stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
 }  # fmt: skip
 
-
 GRAYS = ("luma", "r", "g", "b")
 _PLANE = {"b": 0, "g": 1, "r": 2}  # OpenCV's order
 

@@ -44,7 +44,6 @@ MASSES = {  # kg
 UNITS = (*FORCES, *MASSES)
 DOUBTFUL = ("mn", "mg")  # with a capital M: milli- or mega-
 
-
 Mode = Literal["listen", "stream", "poll"]
 Parity = Literal["N", "E", "O"]
 

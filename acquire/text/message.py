@@ -24,7 +24,6 @@ MOST = 20_000
 SAY, WITH = "say", "with"  # keys of a message as JSON
 QUANTITY = Amount("strain", 0.0).to_json().keys()
 
-
 # Control characters of both kinds (but for line feed and tab), halves of surrogate pairs, marks that turn the
 # direction of writing or are not seen, and separators that some terminals take for an end of line.
 _HARMFUL = re.compile(

@@ -36,7 +36,7 @@ from live.commands.options import (
     overrides,
     require_new,
 )
-from live.commands.signals import interrupts
+from live.commands.process import interrupts
 from live.config.cameras import camera_configs
 from live.config.loading import Config
 from live.config.sections import DEFAULT_REFERENCE_BURST

@@ -33,7 +33,6 @@ SHIFT_PX, NEARER, FILM_FRAMES = (3.4, -2.7), 1.0008, 40
 BACKGROUND, RULER_PX, NOISE_GL = 0.2, 50, 1.5
 """Grey level beside the strip, part of full scale; px of 5 mm on the ruler; noise of all pictures."""
 
-
 FOLDER = "phasedic-examples"
 CELL = "# %%"
 

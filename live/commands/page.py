@@ -14,9 +14,9 @@ from acquire.text.message import brief
 from live.commands.attended import page_opened
 from live.commands.init import find_devices
 from live.commands.options import OUTPUT, add_measure, add_options, overrides
+from live.commands.process import signals
 from live.commands.report import write_report
 from live.commands.run import OTHER_PROGRAMS, RECORDING, run_with_page
-from live.commands.signals import signals
 from live.config.cameras import camera_configs
 from live.config.loading import load_config
 from live.pipeline.consumer import Screen

@@ -33,12 +33,12 @@ from live.config.loading import from_dict
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import curve_of
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
-from live.results.finished.readings import Readings
+from live.results.layout import gauge_columns
 from live.results.reader import Strain
-from live.results.row import gauge_columns
 from live.results.stored_fields import (
     Image,
     Pictures,
+    Readings,
     StoredPattern,
     length_between,
     of_images,

@@ -35,12 +35,12 @@ from acquire.text import Message
 from acquire.text.message import counted
 from analysis.evaluate import load_axis
 from live.results import layout
+from live.results.layout import STRAINS, StrainRow, gauge_columns
 from live.results.response.stored import CORRELATION, CURRENT, GROUP, add_group
-from live.results.row import STRAINS, StrainRow, gauge_columns
 
 if TYPE_CHECKING:
     from analysis.field import Sums, ZoiGrid
-    from live.results.row import ResultsInfo
+    from live.results.layout import ResultsInfo
 
 VALUE_BITS, SIGMA_BITS = 9, 9
 """Binary digits kept: of a value below its standard uncertainty; of an uncertainty."""

@@ -26,7 +26,7 @@ from live.results.figures import (
     sharpness_line,
     tare_line,
 )
-from live.results.finished.answers import checks_line
+from live.results.finished.figures_file import checks_line
 from live.results.finished.findings import DataCheck, doubts, findings
 from live.results.finished.finished_test import FinishedTest
 from live.words.language import told

@@ -20,8 +20,7 @@ from live.pipeline.history import AxisFinder
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.results.folder import versions
-from live.results.layout import COLUMNS
-from live.results.row import ResultsInfo, StrainRow, gauge_columns
+from live.results.layout import COLUMNS, ResultsInfo, StrainRow, gauge_columns
 from live.results.strain_h5 import FLUSH_S, StrainWriter
 
 if TYPE_CHECKING:

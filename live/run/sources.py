@@ -32,7 +32,6 @@ from live.stream.stream import CameraEnded, LoadEnded, Record, ReferenceWanted, 
 
 log = logging.getLogger(__name__)
 
-
 HELD_BYTES, HELD_S, A_MEGAPIXEL_S, LATE_S = 512_000_000, 1.0, 0.25, 0.25
 """Limits of the bursts that wait: bytes; s while the first is prepared, longer for a large reference; s later."""
 _AT_WORK, _MEASURED, _OF_REFERENCE = 2, 3, 3

@@ -69,7 +69,7 @@ LAYERS = {
         for i, layer in enumerate(LIVE)
     },
     "live.cli": "acquire.errors acquire.text acquire.text.message live.commands.arguments"
-    " live.commands.environment live.commands.signals live.words.language",
+    " live.commands.process live.words.language",
 }
 # One module opens the simulated devices. The demo compares with their truth; the examples have simulated pictures.
 EXCEPTIONS = {

@@ -19,7 +19,7 @@ from acquire.camera.live import LiveCamera
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import Event
 from acquire.frame import Frame
-from acquire.pylon.camera import PylonDriver, open_pylon
+from acquire.pylon import PylonDriver, open_pylon
 from acquire.session.reader import Session
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle

@@ -24,9 +24,9 @@ from acquire.text import Amount, Message, about, counts, joined
 from acquire.text.message import duration
 from live.pipeline.consumer import Screen
 from live.replay.batch.cluster import Cluster
-from live.replay.batch.keys import is_session, key_of_chunk
 from live.replay.batch.row import RENEWED, BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress, remove, staging_dirs
+from live.replay.batch.test_list import is_session, key_of_chunk
 from live.replay.batch.worker import Pool
 from live.replay.opening import open_source
 

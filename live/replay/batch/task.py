@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
 _SUFFIX = ".part"
 
-
 log = logging.getLogger(__name__)
 ROW_FILE, LOG_FILE, FIELDS_FILE = "batch.json", "replay.txt", "fields"
 _PROGRESS_EVERY_S = 0.25
@@ -138,7 +137,7 @@ class Task:
     of : str
         The test that this task is a chunk of.
     key : str
-        Hash of all that the results depend on (``keys``).
+        Hash of all that the results depend on (``test_list``).
     """
 
     name: str

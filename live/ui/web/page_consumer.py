@@ -31,10 +31,8 @@ from live.pipeline.timed.response import shown_names
 from live.results.reader import whole_maps
 from live.results.run_folder import STRAIN
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.cameras_panel import CamerasPanel
-from live.ui.web.curve_history import CurveHistory
-from live.ui.web.limits import FigureLimits
 from live.ui.web.map_view import MapView, as_jpeg, gauge_shapes, plate_shapes, shrunk
+from live.ui.web.run_panels import CamerasPanel, CurveHistory, FigureLimits
 
 if TYPE_CHECKING:
     from live.run.camera_run import CameraRun

@@ -16,7 +16,7 @@ from acquire.genicam.device import GenicamDevice
 from acquire.genicam.formats import FORMATS, decode
 from acquire.genicam.library import CALLS, load_aravis
 from acquire.genicam.settings import GenicamSettings
-from acquire.pylon.camera import list_cameras as list_basler_cameras
+from acquire.pylon import list_cameras as list_basler_cameras
 from acquire.settings import read_settings
 
 

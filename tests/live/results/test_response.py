@@ -16,6 +16,7 @@ from acquire.errors import ConfigError, DataError
 from analysis.field import Status, StrainField
 from analysis.field.grid import ZoiGrid
 from live.cli import main
+from live.commands.show import playback_messages, view_setup
 from live.config.loading import Config, from_dict
 from live.pipeline.measurement import Measurement
 from live.pipeline.timed.response import ResponseWatch, leaves_name, slope_name
@@ -26,7 +27,6 @@ from live.results.report.report import ReportRequest, make_report
 from live.results.response.evaluate import check_channel, respond, response_lines, response_of, response_title
 from live.results.response.stored import FATE, map_names
 from live.results.run_folder import open_run
-from live.ui.rerun.playback import playback_messages, view_setup
 from live.ui.rerun.wire import Kind
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.made_run import CONFIG, UTC_START

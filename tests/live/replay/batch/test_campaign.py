@@ -25,11 +25,10 @@ from live.replay.batch.campaign import (
     run_campaign,
     write_summary,
 )
-from live.replay.batch.keys import _pictures, _source, key_of
 from live.replay.batch.row import COLUMNS, BatchRow
 from live.replay.batch.scheduler import ChunkPlan, perform_all
 from live.replay.batch.task import ROW_FILE, Task
-from live.replay.batch.test_list import BatchJob, find_tests
+from live.replay.batch.test_list import BatchJob, _pictures, _source, find_tests, key_of
 from live.replay.batch.worker import Pool
 from tests.live.screens import RecordingScreen
 

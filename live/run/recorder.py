@@ -33,8 +33,8 @@ from live.pipeline.timed.figure import TimedFigure
 from live.pipeline.timed.health import DISK_EVERY_S, Health
 from live.results.folder import versions
 from live.run.outcome import StopSignal
+from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
 from live.run.prepared_run import PreparedRun
-from live.run.recording.pre_trigger import PreTrigger, PreTriggerBuffer
 
 log = logging.getLogger(__name__)
 _SMALL = 512  # bytes counted for a sample or an event
