@@ -11,6 +11,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Generic, Self, TypeVar
 
+from acquire.clock import Clock
+
 Opened = TypeVar("Opened")
 RETRY_S, LOOK_S = 0.5, 0.1
 
@@ -110,7 +112,7 @@ class Reopening(Generic[Opened]):
         failed: Callable[[Exception], object] = lambda error: None,
         *,
         after_s: float = 0.0,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Clock = time.monotonic,
     ) -> None:
         self._attempt, self._close, self._errors = attempt, close, errors
         self._sleep, self._failed, self._clock = sleep, failed, clock

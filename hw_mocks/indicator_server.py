@@ -15,11 +15,12 @@ import struct
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal
 
+from acquire.clock import Clock
 from acquire.opening import Closing
 from acquire.system import open_pty
 from hw_mocks.indicator import Indicator, IndicatorOutput, IndicatorReading, Sensing
@@ -312,7 +313,7 @@ class IndicatorServer(Closing):
         *,
         seed: int = 0,
         faults: FaultPlan | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Clock = time.monotonic,
     ) -> None:
         self._clock, self._boot = clock, clock()
         self._output = IndicatorOutput(indicator, sensing, self._boot, seed, faults)

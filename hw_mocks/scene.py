@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from statistics import NormalDist
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from acquire.addresses import Address, Options
 from acquire.bounds import one_of
 from acquire.camera import CameraBase
+from acquire.clock import Clock
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.settings import number, read_settings, setting, take_settings, whole
 from hw_mocks.deformation import Affine
@@ -277,9 +278,7 @@ class MemoryCamera(CameraBase):
         Frames lost so far because the ring was full.
     """
 
-    def __init__(
-        self, settings: MemorySettings, address: str, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, settings: MemorySettings, address: str, clock: Clock = time.monotonic) -> None:
         super().__init__()
         self._settings, self._clock = settings, clock
         self._pictures = render(settings)

@@ -21,9 +21,10 @@ from typing import Any, Self
 import numpy as np
 
 from acquire.addresses import Address, Options
+from acquire.clock import Clock
 from acquire.errors import DeviceError
 from acquire.events import EventSink, device_event
-from acquire.frame import CameraInfo, CameraSetting, Clock, Frame
+from acquire.frame import CameraInfo, CameraSetting, ClockKind, Frame
 from acquire.opening import Closing
 from acquire.settings import number, take_settings
 from acquire.text import Message
@@ -148,7 +149,7 @@ class SimCamera(Closing):
         address: str,
         on_event: EventSink,
         *,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Clock = time.monotonic,
         sleep: Callable[[float], object] | None = None,
     ) -> None:
         self.specimen, self._settings, self._on_event = specimen, settings, on_event
@@ -170,7 +171,7 @@ class SimCamera(Closing):
 
     def _describe(self, address: str) -> CameraInfo:
         settings, sensor, specimen = self._settings, self._settings.sensor, self.specimen
-        clock: Clock = "nominal" if specimen.nominal else "device"
+        clock: ClockKind = "nominal" if specimen.nominal else "device"
         controls: dict[str, Any] = {
             "bits": sensor.bits,
             "full_well_e": sensor.full_well_e if np.isfinite(sensor.full_well_e) else None,

@@ -25,7 +25,7 @@ from acquire.camera.timing import longest_pause_s
 from acquire.clock import DeviceClock
 from acquire.errors import ConfigError, DataError, DeviceError
 from acquire.events import EventSink
-from acquire.frame import CameraInfo, Clock
+from acquire.frame import CameraInfo, ClockKind
 from acquire.genicam.device import CameraIdentity, GenicamDevice, Received
 from acquire.genicam.formats import decode, preferred, readable
 from acquire.genicam.library import Aravis, GenicamError, has_aravis, load_aravis
@@ -264,7 +264,7 @@ class GenicamDriver:
         clock, t, remark = self._stamp(received, arrived)
         return Picture(received.taken, t, received.number, "", clock, self._settings.stamp, arrived, remark)
 
-    def _stamp(self, received: Received, arrived: float) -> tuple[Clock, float, str]:
+    def _stamp(self, received: Received, arrived: float) -> tuple[ClockKind, float, str]:
         """The camera's stamp on our clock, of a camera that has none the arrival; and what is to be said of it."""
         if received.stamp_ns == 0:
             remark = Message("the camera does not stamp its frames: times are those of their arrival")

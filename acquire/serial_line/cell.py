@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Self
 
 from acquire.addresses import Address
-from acquire.clock import ClockUnit, DeviceClock
+from acquire.clock import Clock, ClockUnit, DeviceClock
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
@@ -37,8 +37,6 @@ REFILL_S, FULL_BYTES = 0.002, 2048  # a USB adapter whose buffer was full sends 
 ANSWER_S = 1.0  # that an answer may take from its first byte to its last
 TARE_S = 0.3  # that a device may take to tare
 FORCED, UNDO = "force", "undo"
-
-Clock = Callable[[], float]
 
 
 class SerialCell(Closing):

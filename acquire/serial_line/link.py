@@ -14,6 +14,7 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from acquire.clock import Clock
 from acquire.errors import ConfigError, DeviceError
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.opening import RETRY_S, Opening, Reopening, close_within
@@ -61,7 +62,7 @@ class LinkContext:
     """
 
     opener: Opener
-    clock: Callable[[], float]
+    clock: Clock
     stopped: threading.Event
     sleep: Callable[[float], object]
 

@@ -30,7 +30,8 @@ from analysis.evaluate.gauges.extensometers import (
     RegionStrips,
     TransverseGauge,
 )
-from analysis.evaluate.gauges.gauge import Gauge, Parameter, inside_polygon
+from analysis.evaluate.gauges.gauge import Gauge, Parameter
+from analysis.evaluate.gauges.geometry import inside_polygon
 from analysis.evaluate.gauges.kinds import GAUGE_KINDS, AreaGauge, CircleGauge, StripGauge, ZoiGauge
 from analysis.evaluate.gauges.readings import GaugeSet, GaugeValue, distance, facing
 from analysis.evaluate.gauges.taken import COME_APART

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TextIO
 
+from acquire.clock import Clock
 from acquire.text import Message
 from live.commands.process import signals
 from live.config.loading import Config
@@ -160,9 +161,7 @@ class Keys:
     clock : callable giving seconds
     """
 
-    def __init__(
-        self, controls: Controls, screen: Screen, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, controls: Controls, screen: Screen, clock: Clock = time.monotonic) -> None:
         self._controls, self._screen, self._clock = controls, screen, clock
         self._line: str | None = None
         self._quit_t = -math.inf

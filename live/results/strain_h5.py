@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.clock import Clock
 from acquire.errors import DataError
 from acquire.hdf5 import (
     FlushTimer,
@@ -73,7 +74,7 @@ class StrainWriter:
         grid: ZoiGrid,
         info: ResultsInfo,
         flush_s: float = FLUSH_S,
-        now: Callable[[], float] = time.monotonic,
+        now: Clock = time.monotonic,
     ) -> None:
         self._path, self.failed, self._axis = path, False, info.axis
         self._flushed = 0  # rows

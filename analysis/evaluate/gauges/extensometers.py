@@ -8,12 +8,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from analysis.evaluate.gauges.gauge import (
+from analysis.evaluate.gauges.gauge import Gauge, Parameter
+from analysis.evaluate.gauges.geometry import (
     Box,
-    Gauge,
     Line,
     Mask,
-    Parameter,
     Point,
     box_between,
     circle,

@@ -19,12 +19,11 @@ from analysis.evaluate.gauges.extensometers import (
     LineGauge,
     TransverseGauge,
 )
-from analysis.evaluate.gauges.gauge import (
+from analysis.evaluate.gauges.gauge import Gauge, Parameter
+from analysis.evaluate.gauges.geometry import (
     Box,
-    Gauge,
     Line,
     Mask,
-    Parameter,
     Point,
     box_between,
     circle,

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from acquire.text import Message, joined
 from analysis.evaluate.area.affine import Places
 from analysis.evaluate.area.strain import GRADIENTS
-from analysis.evaluate.gauges.gauge import Mask
+from analysis.evaluate.gauges.geometry import Mask
 from analysis.evaluate.gauges.taken import (
     NOTHING,
     AffineTaken,

@@ -11,7 +11,7 @@ import dataclasses
 import itertools
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.clock import Clock
 from acquire.errors import DEFECT, PhasedicError
 from acquire.text import Amount, Message, about, counts, joined
 from acquire.text.message import duration
@@ -110,7 +111,7 @@ class BatchProgress:
     now : callable giving s
     """
 
-    def __init__(self, tests: int, now: Callable[[], float]) -> None:
+    def __init__(self, tests: int, now: Clock) -> None:
         self._tests, self._now, self._began = tests, now, now()
         self._ended = 0
         self._shares: dict[str, float] = {}

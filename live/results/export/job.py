@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.clock import Clock
 from acquire.errors import ConfigError, DataError
 from acquire.text import Message
 from analysis.field import Status
@@ -97,7 +98,7 @@ class ExportJob:
         gauge = self.run.gauges.get(name.removeprefix("gauge_"))
         return gauge is not None and gauge.described.get("value") in ("exy", "gamma_xy")
 
-    def steps(self, now: Callable[[], float] = time.monotonic) -> Iterator[tuple[int, int]]:
+    def steps(self, now: Clock = time.monotonic) -> Iterator[tuple[int, int]]:
         """(k, row) for each instant; shows the progress after two seconds."""
         began = now()
         for k, row in enumerate(self.rows):

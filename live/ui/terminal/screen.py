@@ -11,10 +11,11 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, TextIO
 
+from acquire.clock import Clock
 from acquire.text import Amount, Message, about, counts, joined, word
 from acquire.text.message import duration, printable, share_text
 from acquire.text.quantity import IN_ASCII, UNKNOWN
@@ -209,7 +210,7 @@ class TerminalScreen(Screen):
     """Prints to ``stream``; the status line at most four times a second (a log: every 5 s)."""
 
     def __init__(
-        self, stream: TextIO | None = None, now: Callable[[], float] = time.monotonic, quiet: bool = False
+        self, stream: TextIO | None = None, now: Clock = time.monotonic, quiet: bool = False
     ) -> None:
         self._stream = stream or sys.stdout
         self._now, self._quiet = now, quiet

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from acquire.clock import Clock
 from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
@@ -76,7 +77,7 @@ class PageConsumer(Consumer):
         self,
         broadcaster: Broadcaster,
         config: Config,
-        now: Callable[[], float] = time.monotonic,
+        now: Clock = time.monotonic,
         picture: bytes = b"",
         side: str = "",
         cameras: int = 1,

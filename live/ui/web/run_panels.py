@@ -8,9 +8,10 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from acquire.clock import Clock
 from analysis.evaluate import TensileFigures
 from live.config.cameras import BACK, FRONT
 from live.config.figures import figure_of
@@ -169,9 +170,7 @@ class CamerasPanel:
     now : callable giving monotonic seconds
     """
 
-    def __init__(
-        self, states: Mapping[str, RunState], specimen: SpecimenConfig, now: Callable[[], float]
-    ) -> None:
+    def __init__(self, states: Mapping[str, RunState], specimen: SpecimenConfig, now: Clock) -> None:
         self._states, self._specimen, self._now = states, specimen, now
         self._due, self._figures = 0.0, list[dict[str, str]]()
 
