@@ -8,7 +8,7 @@ floor in it too. ``deconvolution`` removes the blur of the ZOI from a map. ``res
 all instants.
 """
 
-from analysis.evaluate.area.strain import AreaStrain, Unevenness
+from analysis.evaluate.area_strain import AreaStrain, Unevenness
 from analysis.evaluate.curve import Course, Curve, TwoSides, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import ErrorLimits, LoadAxis, load_axis, principal_direction

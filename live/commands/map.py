@@ -26,8 +26,8 @@ from analysis.field import ZoiGrid
 from live.config.new_files import new_file
 from live.results.maps.painting import Image, Painter
 from live.results.maps.scale import AutoRange, ColourScale, range_kind
+from live.results.place_response import response_title
 from live.results.reader import Strain
-from live.results.response.evaluate import response_title
 from live.results.run_folder import open_run
 from live.ui.terminal.screen import print_line
 

@@ -29,9 +29,9 @@ from live.config.loading import from_dict
 from live.config.new_files import check_free
 from live.pipeline.consumer import Screen
 from live.results.figures import figure_lines, tensile_options
-from live.results.response.evaluate import response_lines
-from live.results.response.stored import FATE
+from live.results.place_response import response_lines
 from live.results.run_folder import RunFolder, open_run
+from live.results.stored_response import FATE
 from live.ui.rerun.messages import (
     STRAINS,
     ViewSetup,

@@ -43,7 +43,7 @@ from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Work, 
 from live.results.finished.figures_file import finished
 from live.results.finished.finished_test import FinishedTest
 from live.results.folder import LOG, BurstFailures, check_folder, make_folder
-from live.results.response.evaluate import check_channel
+from live.results.place_response import check_channel
 from live.results.writer import write_results
 from live.setup.pictures import camera_of, with_film, with_mask
 from live.setup.region import is_auto_region

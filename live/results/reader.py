@@ -40,7 +40,7 @@ from acquire.text.message import Message, about, word
 from analysis.field import ZoiGrid
 from live.results import layout
 from live.results.quantities import Display, mean_name, quantity_of
-from live.results.response.stored import StoredResponse, read_response
+from live.results.stored_response import StoredResponse, read_response
 
 _log = logging.getLogger(__name__)
 _LENGTH, _POSITION = JsonField(int, 1, layout.MAX_SIDE_PX), JsonField(int, 0, layout.MAX_SIDE_PX)

@@ -24,7 +24,7 @@ from acquire.load_cell import LoadLog
 from acquire.record_mode import Crop
 from acquire.session import Session
 from analysis.evaluate import ExtensionGauge, Figure, RegionStrips, Track, distance, facing, find_lag
-from analysis.evaluate.area.affine import Places, noise_of_windows
+from analysis.evaluate.affine import Places, noise_of_windows
 from analysis.field import PAIR_INDEX, WINDOWS, Measure, StrainField, Window
 from live.config.gauges import gauges_for
 from live.config.loading import from_dict

@@ -37,7 +37,7 @@ from acquire.text.message import counted
 from analysis.evaluate import load_axis
 from live.results import layout
 from live.results.layout import STRAINS, StrainRow, gauge_columns
-from live.results.response.stored import CORRELATION, CURRENT, GROUP, add_group
+from live.results.stored_response import CORRELATION, CURRENT, GROUP, add_group
 
 if TYPE_CHECKING:
     from analysis.field import Sums, ZoiGrid

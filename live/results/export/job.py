@@ -15,11 +15,11 @@ from acquire.errors import ConfigError, DataError
 from acquire.text import Message
 from analysis.field import Status
 from live.pipeline.consumer import Screen
+from live.results.place_response import response_lines
 from live.results.quantities import Display
 from live.results.reader import Strain
-from live.results.response.evaluate import response_lines
-from live.results.response.stored import GROUP
 from live.results.run_folder import RunFolder
+from live.results.stored_response import GROUP
 
 USUAL = ("u", "v", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy", "status")
 _ROUNDING_S = 1e-6  # of times that were typed

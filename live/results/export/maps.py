@@ -32,7 +32,7 @@ from live.config.new_files import new_file, new_folder
 from live.results.export.job import ExportJob
 from live.results.maps.painting import Levels, Painter, caption
 from live.results.maps.scale import ColourScale
-from live.results.response.evaluate import response_title
+from live.results.place_response import response_title
 from live.results.stored_fields import Pictures
 
 # Codec of the encoders in OpenCV's wheel, and the programs that do not play it.

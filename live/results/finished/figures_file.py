@@ -29,7 +29,7 @@ from live.results.figures import TensileRow, tensile_table
 from live.results.finished.cycles import creep_figures
 from live.results.finished.findings import NO_FORCE, DataCheck, changes, findings
 from live.results.finished.finished_test import FinishedTest
-from live.results.response.evaluate import response_of
+from live.results.place_response import response_of
 from live.results.run_folder import SESSION, RunFolder
 
 FILE, FORMAT, VERSION = "figures.json", "phasedic-figures", 1

@@ -27,8 +27,8 @@ from live.pipeline.event_log import Repeats, counted_text, sentence
 from live.pipeline.measurement import AXIAL, Measurement, TimeStep
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import BURST, FORCE, STRESS, ChannelValues, ShownFigure, Snapshot, peak_force
+from live.pipeline.timed.course import shown_names
 from live.pipeline.timed.figure import TimedFigure
-from live.pipeline.timed.response import shown_names
 from live.results.reader import whole_maps
 from live.results.run_folder import STRAIN
 from live.ui.web.broadcaster import Broadcaster

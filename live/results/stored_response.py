@@ -26,7 +26,7 @@ from acquire.hdf5 import (
     reason,
 )
 from acquire.text.message import printable
-from live.pipeline.timed.response import leaves_name, slope_name
+from live.pipeline.timed.course import leaves_name, slope_name
 from live.results.quantities import quantity_of
 
 GROUP, CURRENT, CORRELATION, FATE = "response", "current", "correlation", "fate"
