@@ -86,7 +86,7 @@ class PhaseKernel:
         clipped: NDArray[np.bool_] | None = None,
         least_noise: float = 0.0,
     ) -> None:
-        from analysis.picture.splines import room_for
+        from analysis.picture.prefilter import room_for
 
         FORK_CHECK.check()
         image = as_image(reference, "the reference")
@@ -209,7 +209,7 @@ class PhaseKernel:
     @contextmanager
     def _room(self) -> Iterator[NDArray[np.float32]]:
         """Memory for the coefficients of one picture; another thread that measures meanwhile takes its own."""
-        from analysis.picture.splines import room_for
+        from analysis.picture.prefilter import room_for
 
         try:
             room = self._rooms.pop()

@@ -101,7 +101,7 @@ class Solution:
         guess: Floats,
         room: NDArray[np.float32] | None = None,
     ) -> None:
-        from analysis.picture.splines import room_for
+        from analysis.picture.prefilter import room_for
 
         prepared = reference.prepared
         self.reference = reference
@@ -168,7 +168,7 @@ class Solution:
         self.retried = False
 
     def _picture(self, box: Box) -> PictureArgs:
-        from analysis.picture.splines import coefficients
+        from analysis.picture.prefilter import coefficients
 
         self._box, prepared = box, self.reference.prepared
         poles = prefilter_poles(self.reference.settings.interpolant)

@@ -38,20 +38,20 @@ PICTURE_KINDS = ("uint8", "uint16", "float32")
 def not_compiled(kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) -> bool:
     """Whether numba's cache lacks a loop that pictures of these kinds (and the estimator by phases) need."""
     from analysis.compiled.loops import is_cached
-    from analysis.picture.splines import coefficients
+    from analysis.picture import prefilter
 
     loops = _loops(phase)
-    return not (all(map(is_cached, loops)) and all(is_cached(coefficients, kind) for kind in kinds))
+    return not (all(map(is_cached, loops)) and all(is_cached(prefilter.coefficients, kind) for kind in kinds))
 
 
 def _loops(phase: bool) -> list[Any]:
     from analysis.compiled import sparse_sums
     from analysis.fit import assembly, iteration, pooling, sensitivity, shared, sums, verdict
-    from analysis.follow import hill_climb, parts, prediction, search
+    from analysis.follow import coherence, hill_climb, prediction, search
 
     loops = [
         sensitivity.prepare, iteration.track, shared.share_warps, search.match, hill_climb.climb,
-        prediction.advance, verdict.judge, parts.stand_out, parts.label,
+        prediction.advance, verdict.judge, coherence.stand_out, coherence.label,
         assembly.expect, assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.row_medians,
         pooling.interpolate, assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
         sparse_sums.row_sums, sparse_sums.overlapping,
@@ -62,10 +62,10 @@ def _loops(phase: bool) -> list[Any]:
 def share_compiled(kinds: Sequence[str], since: float, *, phase: bool) -> float:
     """About how much of a compilation from nothing is done, 0 to 1, that began at ``since``, s since the epoch."""
     from analysis.compiled.loops import compiled_since
-    from analysis.picture.splines import coefficients
+    from analysis.picture import prefilter
 
     functions = FUNCTIONS + FUNCTIONS_OF_KIND * len(kinds) + FUNCTIONS_OF_PHASE * phase
-    return min(compiled_since([*_loops(phase), coefficients], since) / functions, 1.0)
+    return min(compiled_since([*_loops(phase), prefilter.coefficients], since) / functions, 1.0)
 
 
 def numerics() -> dict[str, str]:
@@ -190,7 +190,8 @@ def _phase() -> None:
 
 def _prefilter(kinds: Sequence[str]) -> None:
     """What every deformed image goes through first, for each kind of picture."""
-    from analysis.picture.splines import coefficients, prefilter_poles, room_for
+    from analysis.picture.prefilter import coefficients, room_for
+    from analysis.picture.splines import prefilter_poles
 
     for kind in kinds:
         picture = _small()[0].astype(kind)

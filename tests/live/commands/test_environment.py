@@ -97,7 +97,7 @@ def test_numba_itself_reads_what_is_kept(tmp_path: Path) -> None:
 def test_all_compiled_loops_are_checked() -> None:
     from acquire.burst.accumulate_loops import tile_sums
     from acquire.hdf5.checksum_loops import fletcher32
-    from analysis.picture.splines import coefficients
+    from analysis.picture.prefilter import coefficients
     from hw_mocks.speckle_loops import splat
 
     for loop in (tile_sums, fletcher32, splat, getattr(coefficients, "dispatcher", coefficients)):
