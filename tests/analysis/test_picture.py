@@ -24,8 +24,8 @@ from analysis.picture.pattern import (
     predicted_sigma,
     resolution_length,
 )
-from analysis.picture.prefilter import coefficients, room_for
-from analysis.picture.splines import PAD, PART, Box, basis, prefilter_poles, tap_table
+from analysis.picture.prefilter import PART, coefficients, room_for
+from analysis.picture.splines import PAD, Box, basis, prefilter_poles, tap_table
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 
