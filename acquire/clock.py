@@ -10,13 +10,16 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
+
+Clock = Callable[[], float]
+"""Says the time, s: ``time.monotonic``, or in a test a clock that is moved by hand."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Clock = Literal["device", "host", "nominal"]
+ClockKind = Literal["device", "host", "nominal"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +47,7 @@ class Frame:
     image: NDArray[Any]
     index: int
     t: float
-    clock: Clock
+    clock: ClockKind
     lost_before: int
     bits: int
     raw_t: float
@@ -106,7 +106,7 @@ class Burst:
     first_index: int
     last_index: int
     lost: int
-    clock: Clock
+    clock: ClockKind
     motion_px: float = math.nan
     blank: int = 0
 
@@ -183,7 +183,7 @@ class CameraInfo:
     height: int
     bits: int
     live: bool
-    clock: Clock
+    clock: ClockKind
     fps: float | None = None
     exposure_s: float | None = None
     pixel_format: str = ""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import Flag, auto
 from typing import Any
 
-from acquire.frame import Clock
+from acquire.frame import ClockKind
 
 
 class LoadFlag(Flag):
@@ -73,7 +73,7 @@ class LoadCellInfo:
     address: str
     name: str
     protocol: str
-    clock: Clock = "host"
+    clock: ClockKind = "host"
     sign: int = 1
     capacity_N: float | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)

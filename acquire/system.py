@@ -1,6 +1,6 @@
 """What differs between operating systems: signals, processes, priorities, processor and memory use, disk and ports.
 
-No other module asks which system this is, but for the terminal (``live.run.keyboard``) and V4L2, which is Linux.
+No other module asks which system this is, but for the terminal (``live.commands.attended``) and V4L2, which is Linux.
 Where there is no /proc, processor and memory use are read by psutil; without it they are not known.
 """
 

@@ -22,10 +22,10 @@ from acquire.session import layout
 from acquire.settings import settings_of
 from analysis.field import Status
 from live.config.figures import FIGURES, columns
+from live.results import stored_response
 from live.results.finished.cycles import COLUMNS as CYCLES
 from live.results.layout import COLUMNS
 from live.results.quantities import quantity_of
-from live.results.response import stored
 from live.setup.devices import camera_settings, load_settings
 
 DOCS = Path(__file__).parent
@@ -56,7 +56,7 @@ def session_layout() -> str:
 
 def response() -> str:
     """The datasets of the group response."""
-    return listed("response/", stored.items("stress", ZOIS))
+    return listed("response/", stored_response.items("stress", ZOIS))
 
 
 def means() -> str:

@@ -19,7 +19,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from hw_mocks.faults import Fault, FaultPlan
+from hw_mocks.sim_settings import Fault, FaultPlan
 
 Status = Literal["ok", "overload", "underload", "error"]
 NEWTONS = {"N": 1.0, "kN": 1e3, "lbF": 4.4482216153, "kgF": 9.80665, "kg": 9.80665, "g": 9.80665e-3}

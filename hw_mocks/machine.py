@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from acquire.clock import Clock
 from acquire.errors import ConfigError
 
 Array = NDArray[np.float64]
@@ -53,7 +54,7 @@ class Machine:
         port: int,
         yield_strain: float,
         elapsed: Callable[[float], float],
-        clock: Callable[[], float] = time.monotonic,
+        clock: Clock = time.monotonic,
     ) -> None:
         self.port = port
         self._yield_strain, self._elapsed, self._clock = yield_strain, elapsed, clock

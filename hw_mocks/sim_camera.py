@@ -21,16 +21,23 @@ from typing import Any, Self
 import numpy as np
 
 from acquire.addresses import Address, Options
-from acquire.closing import Closing
+from acquire.clock import Clock
 from acquire.errors import DeviceError
 from acquire.events import EventSink, device_event
-from acquire.frame import CameraInfo, CameraSetting, Clock, Frame
+from acquire.frame import CameraInfo, CameraSetting, ClockKind, Frame
+from acquire.opening import Closing
 from acquire.settings import number, take_settings
 from acquire.text import Message
-from hw_mocks.faults import CAMERA_FAULTS, FaultPlan, Planned, parse_faults, plan_frames
 from hw_mocks.optics import Optics, take_optics
 from hw_mocks.scene import Exposer, Scene, Sensor, rendered_fps, take_sensor, upper_half
-from hw_mocks.sim_settings import PictureSettings
+from hw_mocks.sim_settings import (
+    CAMERA_FAULTS,
+    FaultPlan,
+    PictureSettings,
+    Planned,
+    parse_faults,
+    plan_frames,
+)
 from hw_mocks.specimen import VirtualSpecimen, take_specimen
 
 log = logging.getLogger(__name__)
@@ -142,7 +149,7 @@ class SimCamera(Closing):
         address: str,
         on_event: EventSink,
         *,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Clock = time.monotonic,
         sleep: Callable[[float], object] | None = None,
     ) -> None:
         self.specimen, self._settings, self._on_event = specimen, settings, on_event
@@ -164,7 +171,7 @@ class SimCamera(Closing):
 
     def _describe(self, address: str) -> CameraInfo:
         settings, sensor, specimen = self._settings, self._settings.sensor, self.specimen
-        clock: Clock = "nominal" if specimen.nominal else "device"
+        clock: ClockKind = "nominal" if specimen.nominal else "device"
         controls: dict[str, Any] = {
             "bits": sensor.bits,
             "full_well_e": sensor.full_well_e if np.isfinite(sensor.full_well_e) else None,

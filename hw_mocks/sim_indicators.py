@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from hw_mocks.indicator import NEWTONS, AsciiIndicator, Indicator, IndicatorReading, decimals
-from hw_mocks.modbus_indicator import ModbusIndicator
+from hw_mocks.indicator_server import ModbusIndicator
 
 CRLF = b"\r\n"
 

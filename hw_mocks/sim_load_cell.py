@@ -17,18 +17,17 @@ from typing import Self
 import numpy as np
 
 from acquire.addresses import Address, Options
-from acquire.closing import Closing
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink, device_event
 from acquire.load_cell import LoadCell, open_load_cell
 from acquire.load_sample import LoadCellInfo, LoadSample
+from acquire.opening import Closing
 from acquire.settings import TEXT, choice, number, setting, take_settings, whole
 from acquire.text import Message
-from hw_mocks.faults import SERIAL_FAULTS, parse_faults
 from hw_mocks.indicator import AsciiIndicator, Indicator, Sensing, Style
 from hw_mocks.indicator_server import IndicatorServer
 from hw_mocks.sim_indicators import INDICATORS, HbmAedIndicator
-from hw_mocks.sim_settings import SPECIMEN_KEYS
+from hw_mocks.sim_settings import SERIAL_FAULTS, SPECIMEN_KEYS, parse_faults
 from hw_mocks.specimen import VirtualSpecimen, take_specimen
 
 log = logging.getLogger(__name__)

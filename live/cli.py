@@ -13,11 +13,9 @@ from collections.abc import Sequence
 from typing import TextIO
 
 from acquire.errors import DEFECT, EXIT_INTERRUPTED, ConfigError, DataError, PhasedicError
-from acquire.text.message import Message, about, word
-from acquire.text.printable import brief, printable
+from acquire.text.message import Message, about, brief, printable, word
 from live.commands.arguments import Command, parse
-from live.commands.environment import check_environment, limit_resources, nonblocking_streams
-from live.commands.signals import ended_by_sigterm
+from live.commands.process import check_environment, ended_by_sigterm, limit_resources, nonblocking_streams
 from live.words.language import said_here, told
 
 _WRONG_PATH = {errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}

@@ -13,7 +13,7 @@ from typing import Any
 _MODULES = {
     "acquire.addresses": "Address Options",
     "acquire.camera": "CameraListing open_camera",
-    "acquire.closing": "Closing",
+    "acquire.opening": "Closing",
     "acquire.errors": "ConfigError DataError DeviceError PhasedicError",
     "acquire.events": "Event EventKind EventSink device_event",
     "acquire.frame": "CameraInfo CameraSetting Frame frozen",

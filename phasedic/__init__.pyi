@@ -2,7 +2,7 @@
 
 from acquire.addresses import Address as Address, Options as Options
 from acquire.camera import CameraListing as CameraListing, open_camera as open_camera
-from acquire.closing import Closing as Closing
+from acquire.opening import Closing as Closing
 from acquire.errors import (
     ConfigError as ConfigError,
     DataError as DataError,

@@ -92,7 +92,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
 def no_cameras_of_the_network(monkeypatch: pytest.MonkeyPatch) -> None:
     """Tests ask no network for cameras, but for their own (``make genicam-test``)."""
     if not os.environ.get("PHASEDIC_IN_NAMESPACE"):
-        monkeypatch.setattr("acquire.genicam.finding.list_cameras", list)
+        monkeypatch.setattr("acquire.genicam.camera.list_cameras", list)
 
 
 @pytest.fixture(autouse=True)

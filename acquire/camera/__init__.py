@@ -1,15 +1,16 @@
-"""What a camera is (``contract``), what opens any of them (``opening``), and the loop over live devices (``live``)."""
+"""What a camera is and what opens any of them (``contract``), and the loop over live devices (``live``)."""
 
-from acquire.camera.contract import Camera, CameraBase
-from acquire.camera.live import DeviceFault, Driver, LiveCamera, Picture
-from acquire.camera.opening import (
+from acquire.camera.contract import (
     CAMERAS,
+    Camera,
+    CameraBase,
     CameraListing,
     CroppedCamera,
     list_cameras,
     open_camera,
     with_scheme,
 )
+from acquire.camera.live import DeviceFault, Driver, LiveCamera, Picture
 from acquire.camera.timing import (
     FrameCounter,
     StallWatch,

@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from acquire.camera.contract import CameraBase
 from acquire.camera.timing import FrameCounter, StallWatch, StampOf, longest_pause_s, mid_exposure
+from acquire.clock import Clock
 from acquire.errors import DeviceError, PhasedicError, Spoken
 from acquire.events import EventSink, Level, RateLimiter, device_event
-from acquire.frame import CameraInfo, Clock, Frame
-from acquire.opening_thread import Reopening, close_within
+from acquire.frame import CameraInfo, ClockKind, Frame
+from acquire.opening import Reopening, close_within
 from acquire.text import Message
 
 log = logging.getLogger(__name__)
@@ -50,7 +51,7 @@ class Picture:
         The device's number of the frame; None: it counts none.
     trouble : str
         Why there is no picture, or why this one is damaged: recorded, not measured. "" where all is well.
-    clock : Clock
+    clock : ClockKind
         Whose stamp it is.
     stamp : "start" | "end" | ""
         What of the exposure ``t`` marks; "": not known.
@@ -64,7 +65,7 @@ class Picture:
     t: float
     number: int | None = None
     trouble: str = ""
-    clock: Clock = "device"
+    clock: ClockKind = "device"
     stamp: StampOf = ""
     arrived: float | None = None
     remark: str = ""
@@ -127,7 +128,7 @@ class LiveCamera(CameraBase):
     """
 
     def __init__(
-        self, address: str, opener: Opener, on_event: EventSink, now: Callable[[], float] = time.monotonic
+        self, address: str, opener: Opener, on_event: EventSink, now: Clock = time.monotonic
     ) -> None:
         super().__init__()
         self._address, self._opener, self._on_event, self._now = address, opener, on_event, now

@@ -1,9 +1,10 @@
-"""Picture files as arrays and back; only regular files, decoded from memory.
+"""Picture files as grey arrays and back; only regular files, decoded from memory.
 
 A pipe, device or socket would wait or run for ever and is refused unopened. OpenCV crashes on a name that is not
 UTF-8, so it gets bytes and no names. It fills what it cannot decode of an 8-bit TIFF or a JPEG with black or grey,
 reports that on standard error and returns the picture. This report is caught: while a picture is decoded,
-standard error leads into a file, and what others wrote meanwhile is passed on.
+standard error leads into a file, and what others wrote meanwhile is passed on. Colour pictures of equal channels are
+grey already; of others the grey has to be chosen.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.cv2_loader import LOG_WARNING, load_cv2, log_settings
-from acquire.errors import DataError
+from acquire.errors import ConfigError, DataError
 from acquire.files.headers import UNREADABLE, tiff_pages
 from acquire.text import Message
 
@@ -36,6 +37,14 @@ _KINDS = {
     stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFDIR: "a folder",
     stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
 }  # fmt: skip
+
+GRAYS = ("luma", "r", "g", "b")
+_PLANE = {"b": 0, "g": 1, "r": 2}  # OpenCV's order
+
+WEBCAM_WARNING = Message(
+    "grey is the luma of a compressed colour stream: clipped, with noise that averaging does not "
+    "remove; a raw grey format measures better"
+)
 
 
 def check_regular(path: Path) -> int:
@@ -306,3 +315,54 @@ def write_picture(path: Path, picture: NDArray[Any]) -> None:
         raise DataError(
             "{path}: cannot be written: {strerror}; look at the folder and the disk", path, error
         ) from error
+
+
+def to_gray(picture: NDArray[Any], gray: str | None, source: str) -> NDArray[Any]:
+    """The picture as one plane.
+
+    Parameters
+    ----------
+    picture : (H, W) or (H, W, 1 | 3 | 4) uint8 | uint16
+        Blue, green, red (and alpha, ignored), as OpenCV has them.
+    gray : "luma" | "r" | "g" | "b" | None
+        None: only a picture whose channels are equal is taken.
+    source : str
+        For messages.
+
+    Raises
+    ------
+    ConfigError
+        The channels differ and ``gray`` is not given.
+    DataError
+        Neither 8- nor 16-bit, or an unknown number of channels.
+    """
+    if picture.dtype not in (np.uint8, np.uint16):
+        raise DataError(
+            "{source}: samples are {dtype}; save it with 8 or 16 bits a sample", source, picture.dtype
+        )
+    if picture.ndim == 2:
+        return picture
+    if picture.ndim != 3 or picture.shape[2] not in (1, 3, 4):
+        raise DataError(
+            "{source}: a picture of shape {shape} is neither grey nor colour", source, picture.shape
+        )
+    if picture.shape[2] == 1:
+        return picture[:, :, 0].copy()
+    return _one_plane(picture, gray, source)
+
+
+def _one_plane(picture: NDArray[Any], gray: str | None, source: str) -> NDArray[Any]:
+    first = picture[:, :, 0]
+    if all(np.array_equal(first, picture[:, :, k]) for k in (1, 2)):
+        return first.copy()
+    if gray is None:
+        raise ConfigError(
+            "{source}: a colour picture; add ?gray=luma (or r, g, b) to the address, as in 'shots?gray=luma'",
+            source,
+        )
+    if gray in _PLANE:
+        return picture[:, :, _PLANE[gray]].copy()
+    cv2 = load_cv2()
+
+    luma: NDArray[Any] = cv2.cvtColor(np.ascontiguousarray(picture[:, :, :3]), cv2.COLOR_BGR2GRAY)
+    return luma

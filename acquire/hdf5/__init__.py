@@ -1,7 +1,7 @@
 """HDF5 that survives a kill, a full disk and bad bytes.
 
 ``damage`` reads a file's state before the library does, ``tables`` and ``pictures`` append, ``disk`` flushes
-and forecasts the free space, ``declared`` and ``json_fields`` say what a file holds: it is made of that, and checked.
+and forecasts the free space, ``declared`` says what a file holds: it is made of that, and checked.
 """
 
 from acquire.hdf5.damage import (
@@ -39,14 +39,16 @@ from acquire.hdf5.disk import (
     free_bytes,
     network_share,
 )
-from acquire.hdf5.json_fields import JsonField, check_object, read_object
 from acquire.hdf5.pictures import COMPRESSED, PictureReader, PictureStack, compile_loops
 from acquire.hdf5.tables import (
     NO_UNIT,
     GrowingDataset,
+    JsonField,
     RowTable,
     as_text,
+    check_object,
     new_group,
+    read_object,
     set_attributes,
     storable,
     to_json,

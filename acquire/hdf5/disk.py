@@ -13,9 +13,9 @@ import os
 import shutil
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 
+from acquire.clock import Clock
 from acquire.system import forget_pages, to_disk
 from acquire.text import Message
 
@@ -157,7 +157,7 @@ class FlushTimer:
         Gives seconds.
     """
 
-    def __init__(self, every_s: float, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, every_s: float, now: Clock = time.monotonic) -> None:
         self._every_s, self._now = every_s, now
         self._last = -math.inf
         self._waits = False

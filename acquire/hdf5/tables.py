@@ -1,8 +1,8 @@
-"""Growing HDF5 datasets row by row, and the texts of NeXus in HDF5.
+"""Growing HDF5 datasets row by row, and the texts of NeXus and of JSON in HDF5.
 
-A session has some twenty columns; the low-level calls take a tenth of the time of ``dataset.resize``
-and ``dataset[n] = ...``, and rows that are written together share that. Groups carry their NeXus class; attributes
-and JSON are texts of fixed length.
+A session has some twenty columns; the low-level calls take a tenth of the time of ``dataset.resize`` and
+``dataset[n] = ...``, and rows that are written together share that. Groups carry their NeXus class; attributes and
+JSON are texts of fixed length. What a JSON object must hold is declared as data.
 """
 
 from __future__ import annotations
@@ -10,11 +10,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
+
+from acquire.errors import DataError
 
 
 class GrowingDataset:
@@ -144,3 +147,78 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return value if value is None or isinstance(value, str | int | bool) else str(value)
+
+
+@dataclass(frozen=True, slots=True)
+class JsonField:
+    """What a value must be.
+
+    Attributes
+    ----------
+    kind : type
+        str, bool, int, float (which whole numbers are too), dict or list.
+    low, high : float
+        Range of a number, ends included; not a number is outside.
+    missing : bool
+        Whether it may be left out or null.
+    words : tuple of str
+        The texts that are allowed; empty: any.
+    """
+
+    kind: type
+    low: float = -math.inf
+    high: float = math.inf
+    missing: bool = False
+    words: tuple[str, ...] = ()
+
+    def takes(self, value: Any) -> bool:
+        """Whether ``value`` is so."""
+        if value is None:
+            return self.missing
+        if self.kind in (int, float):
+            number = isinstance(value, int) if self.kind is int else isinstance(value, int | float)
+            return (
+                number and not isinstance(value, bool) and self.low <= value <= self.high and _finite(value)
+            )
+        return isinstance(value, self.kind) and (not self.words or value in self.words)
+
+
+def _finite(value: float) -> bool:
+    return isinstance(value, int) or math.isfinite(value)
+
+
+def read_object(text: Any, where: str) -> dict[str, Any]:
+    """The JSON object that stands in ``text``.
+
+    Raises
+    ------
+    DataError
+        It is none.
+    """
+    try:
+        value = json.loads(as_text(text))
+    except (ValueError, RecursionError) as error:
+        raise DataError(
+            "{where} is not JSON ({error}); the file is damaged, or not of phasedic", where, error
+        ) from error
+    if not isinstance(value, dict):
+        raise DataError("{where} is not a JSON object; this is not a file as phasedic writes it", where)
+    return value
+
+
+def check_object(value: Mapping[str, Any], form: Mapping[str, JsonField], where: str) -> None:
+    """Refuse an object whose values are not of ``form``; others than those are let be.
+
+    Raises
+    ------
+    DataError
+    """
+    for name, declared in form.items():
+        if not declared.takes(value.get(name)):
+            shown = repr(value.get(name))[:60]
+            raise DataError(
+                "{where}: {name} is {shown}; this is not a file as phasedic writes it",
+                where,
+                repr(name),
+                shown,
+            )

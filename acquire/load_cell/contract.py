@@ -11,10 +11,10 @@ from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
 from acquire.addresses import Address, Options, Registry
-from acquire.closing import Closing
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink, ignore_event
 from acquire.load_sample import LoadCellInfo, LoadSample
+from acquire.opening import Closing
 from acquire.text import Message, word
 
 

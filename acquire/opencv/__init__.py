@@ -1,1 +1,1 @@
-"""What is read through OpenCV: ``webcam``, ``video`` files and ``images`` as cameras; ``gray`` converts colours."""
+"""What is read through OpenCV: ``webcam``, ``video`` files and ``images`` as cameras."""

@@ -27,13 +27,21 @@ from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import EventSink, device_event, ignore_event
 from acquire.files.headers import full_pages, quantisation, tiff_pages
 from acquire.files.order import AUTO, BY, in_order, listed, masks
-from acquire.files.picture import LOSSY, Source, check_regular, picture_source, read_bytes, read_picture_page
+from acquire.files.picture import (
+    GRAYS,
+    LOSSY,
+    Source,
+    check_regular,
+    picture_source,
+    read_bytes,
+    read_picture_page,
+    to_gray,
+)
 from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
-from acquire.opencv.gray import GRAYS, to_gray
 from acquire.opencv.image_metadata import read_stamps, taken_times
 from acquire.settings import choice, number, read_settings, setting, whole
 from acquire.text import Message
-from acquire.text.printable import counted
+from acquire.text.message import counted
 
 MAX_REPORTED = 20  # pictures that are left out, one by one
 _SAMPLE = 3  # pictures whose format is compared

@@ -20,9 +20,8 @@ from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
 from acquire.events import EventSink, device_event
 from acquire.files.headers import quantisation
-from acquire.files.picture import check_regular, is_utf8
+from acquire.files.picture import GRAYS, WEBCAM_WARNING, check_regular, is_utf8, to_gray
 from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
-from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
 from acquire.settings import choice, number, read_settings, setting, whole
 from acquire.text import Message
 

@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from acquire.addresses import Address
 from acquire.camera.live import DeviceFault, LiveCamera, Picture
+from acquire.clock import Clock
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import EventSink
-from acquire.frame import CameraInfo, Clock, frozen
-from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
+from acquire.files.picture import GRAYS, WEBCAM_WARNING, to_gray
+from acquire.frame import CameraInfo, ClockKind, frozen
 from acquire.settings import choice, number, read_settings, setting
 from acquire.text import Message
 
@@ -98,7 +99,7 @@ class _Shot:
 class _Drain(threading.Thread):
     """Reads one capture and nothing else, until it fails or is stopped."""
 
-    def __init__(self, capture: Capture, now: Callable[[], float]) -> None:
+    def __init__(self, capture: Capture, now: Clock) -> None:
         super().__init__(name="opencv-drain", daemon=True)
         self._capture, self._now = capture, now
         self.shots: queue.Queue[_Shot] = queue.Queue(maxsize=4)
@@ -149,9 +150,7 @@ class OpenCVDriver:
 
     cycle = 1
 
-    def __init__(
-        self, address: str, capture: Capture, settings: OpenCVSettings, now: Callable[[], float]
-    ) -> None:
+    def __init__(self, address: str, capture: Capture, settings: OpenCVSettings, now: Clock) -> None:
         self.name, self._capture, self._settings, self._now = address, capture, settings, now
         self._drain: _Drain | None = None
         try:
@@ -204,7 +203,7 @@ class OpenCVDriver:
                 "{name}: opens but gives no picture: {verdict}", self.name, _verdict(self._now() - began)
             )
         stamp = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000
-        self._clock: Clock = "device" if abs(self._now() - stamp) < 1 else "host"
+        self._clock: ClockKind = "device" if abs(self._now() - stamp) < 1 else "host"
         height, width = self._gray(picture).shape
         controls = {name: capture.get(prop) for name, prop in _properties().items()}
         fps = controls["fps"]
@@ -301,7 +300,7 @@ def live_camera(
     opened: Callable[[], Capture],
     settings: OpenCVSettings,
     on_event: EventSink,
-    now: Callable[[], float] = time.monotonic,
+    now: Clock = time.monotonic,
 ) -> LiveCamera:
     """The camera of the captures that ``opened`` gives, at once and after every fault."""
     return LiveCamera(address, lambda before: OpenCVDriver(address, opened(), settings, now), on_event, now)

@@ -21,9 +21,8 @@ from dataclasses import dataclass
 
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Parser, ParserSettings, Protocol, Reading
+from acquire.protocols.base import Parser, ParserSettings, Protocol, Reading, is_unit
 from acquire.protocols.buffers import Line, LineParser, bad, number
-from acquire.protocols.units import is_unit
 from acquire.settings import choice, setting, whole
 from acquire.text import Message
 

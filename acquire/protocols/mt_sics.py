@@ -12,9 +12,8 @@ from __future__ import annotations
 import re
 
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Parser, ParserSettings, Protocol, Reading
+from acquire.protocols.base import Parser, ParserSettings, Protocol, Reading, is_unit
 from acquire.protocols.buffers import Line, LineParser, bad, number
-from acquire.protocols.units import is_unit
 from acquire.text import Message
 
 _VALUE = re.compile(rb"S ([SD]) +([-+]? *[0-9]+(?:\.[0-9]*)?) ([A-Za-z]{1,4}) *")

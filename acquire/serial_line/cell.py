@@ -14,14 +14,13 @@ from collections.abc import Callable, Iterator
 from typing import Any, Self
 
 from acquire.addresses import Address
-from acquire.clock import ClockUnit, DeviceClock
-from acquire.closing import Closing
+from acquire.clock import Clock, ClockUnit, DeviceClock
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
+from acquire.opening import Closing
 from acquire.protocols.base import Reading
-from acquire.serial_line.clock import ArrivalRate, ArrivalTimes, in_milliseconds
-from acquire.serial_line.echo import Echo
+from acquire.serial_line.arrivals import ArrivalRate, ArrivalTimes, Echo, in_milliseconds
 from acquire.serial_line.link import FloodWatch, Link, LinkContext, LoadWatch, Opener
 from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling
@@ -38,8 +37,6 @@ REFILL_S, FULL_BYTES = 0.002, 2048  # a USB adapter whose buffer was full sends 
 ANSWER_S = 1.0  # that an answer may take from its first byte to its last
 TARE_S = 0.3  # that a device may take to tare
 FORCED, UNDO = "force", "undo"
-
-Clock = Callable[[], float]
 
 
 class SerialCell(Closing):

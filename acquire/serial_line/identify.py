@@ -21,10 +21,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from acquire.addresses import Options, parse_address
+from acquire.clock import Clock
 from acquire.errors import ConfigError, DeviceError, PhasedicError
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Parser, Protocol, Reading, find_protocol
-from acquire.protocols.units import is_mass, is_unit
+from acquire.protocols.base import Parser, Protocol, Reading, find_protocol, is_mass, is_unit
 from acquire.serial_line.byte_ports import Port
 from acquire.serial_line.ports import PORT_ERRORS, LineSettings, open_port
 from acquire.text.message import Message, joined
@@ -127,7 +127,6 @@ SURE = 0.8  # part of the lines that must be readings
 COUNTS = 1000  # whole numbers from here on may be counts of a converter
 
 Opener = Callable[[LineSettings], Port]
-Clock = Callable[[], float]
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,11 +14,12 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from acquire.clock import Clock
 from acquire.errors import ConfigError, DeviceError
 from acquire.load_sample import LoadFlag, LoadSample
-from acquire.opening_thread import RETRY_S, Opening, Reopening, close_within
+from acquire.opening import RETRY_S, Opening, Reopening, close_within
+from acquire.serial_line.arrivals import Echo
 from acquire.serial_line.byte_ports import Port
-from acquire.serial_line.echo import Echo
 from acquire.serial_line.ports import PORT_ERRORS, LineSettings, find_again, identity_of
 from acquire.text import Message
 
@@ -61,7 +62,7 @@ class LinkContext:
     """
 
     opener: Opener
-    clock: Callable[[], float]
+    clock: Clock
     stopped: threading.Event
     sleep: Callable[[float], object]
 

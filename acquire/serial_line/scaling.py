@@ -11,8 +11,7 @@ from collections.abc import Callable
 from acquire.errors import ConfigError
 from acquire.load_cell import LoadStillness, stillness
 from acquire.load_sample import LoadFlag, LoadSample
-from acquire.protocols.base import Reading
-from acquire.protocols.units import newtons_per
+from acquire.protocols.base import Reading, newtons_per
 from acquire.serial_line.settings import SerialSettings
 from acquire.text import Message
 

@@ -11,8 +11,7 @@ from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError
 from acquire.load_cell import Calibration, load_calibration
 from acquire.load_sample import LoadCellInfo
-from acquire.protocols.base import PROTOCOLS, Mode, Parser, Protocol, find_protocol
-from acquire.protocols.units import newtons_per
+from acquire.protocols.base import PROTOCOLS, Mode, Parser, Protocol, find_protocol, newtons_per
 from acquire.serial_line.ports import LineSettings
 from acquire.settings import FLAG, TEXT, choice, number, setting, take_settings, whole
 from acquire.text import Message

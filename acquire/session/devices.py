@@ -9,11 +9,11 @@ import dataclasses
 from collections.abc import Iterator
 
 from acquire.addresses import Address
-from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError
 from acquire.events import EventSink, device_event
 from acquire.frame import CameraInfo, Frame
 from acquire.load_sample import LoadCellInfo, LoadSample
+from acquire.opening import Closing
 from acquire.session.reader import Session
 from acquire.settings import read_settings
 from acquire.text import Message

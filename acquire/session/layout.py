@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from acquire.clock import ClockPair
 from acquire.events import Event, Level
-from acquire.frame import CameraInfo, Clock
+from acquire.frame import CameraInfo, ClockKind
 from acquire.hdf5 import NO_UNIT, Declared, Group, JsonField, new_datasets, new_group, set_attributes, to_json
 from acquire.load_sample import LoadCellInfo, LoadFlag
 from acquire.record_mode import RecordMode
@@ -82,7 +82,7 @@ NO_CROP = (0, 0, 0, 0)
 EVENT_BYTES = 512  # of one row; longer events go on in rows that begin with CONTINUED
 CONTINUED = b"+"
 LEDGER_BYTES = 8192
-CLOCKS: tuple[Clock, ...] = ("device", "host", "nominal")
+CLOCKS: tuple[ClockKind, ...] = ("device", "host", "nominal")
 STABLE = {None: -1, False: 0, True: 1}
 FLAGS = {flag.name: flag.value for flag in LoadFlag}
 

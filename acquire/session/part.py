@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.clock import ClockPair
-from acquire.closing import Closing
 from acquire.errors import DataError, PhasedicError
 from acquire.events import Event
 from acquire.frame import Burst, CameraInfo, Frame, frozen
@@ -42,6 +41,7 @@ from acquire.hdf5 import (
     still_reading,
 )
 from acquire.load_sample import LoadCellInfo, LoadSample
+from acquire.opening import Closing
 from acquire.record_mode import RecordMode
 from acquire.session import layout, stored
 from acquire.session.rows import LoadPiece, LoadTable, burst_from

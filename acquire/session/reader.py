@@ -25,11 +25,11 @@ from numpy.typing import NDArray
 
 from acquire.addresses import session_file
 from acquire.clock import ClockPair
-from acquire.closing import Closing
 from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Burst, CameraInfo, Frame
 from acquire.load_sample import LoadCellInfo, LoadSample
+from acquire.opening import Closing
 from acquire.record_mode import RecordMode
 from acquire.session.layout import SessionInfo
 from acquire.session.part import SessionPart

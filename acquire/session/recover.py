@@ -18,7 +18,7 @@ from acquire.session.layout import SessionInfo
 from acquire.session.part import SessionPart
 from acquire.session.writer import SessionWriter
 from acquire.text import Message, counts
-from acquire.text.printable import counted
+from acquire.text.message import counted
 
 Item = TypeVar("Item")
 

@@ -20,8 +20,7 @@ from acquire.hdf5 import GrowingDataset, PictureStack, RowTable, open_datasets, 
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import layout
-from acquire.session.oddities import Oddities
-from acquire.session.stored import Rows, read_column, same_length, usable
+from acquire.session.stored import Oddities, Rows, read_column, same_length, usable
 
 PIECE = 1 << 16
 """Samples that are read at once."""

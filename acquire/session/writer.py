@@ -19,8 +19,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from acquire.clock import ClockPair
-from acquire.closing import Closing
+from acquire.clock import Clock, ClockPair
 from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Burst, Frame
@@ -38,6 +37,7 @@ from acquire.hdf5 import (
     to_json,
 )
 from acquire.load_sample import LoadSample
+from acquire.opening import Closing
 from acquire.session import layout
 from acquire.session.layout import SessionInfo
 from acquire.session.rows import BurstTable
@@ -86,7 +86,7 @@ class SessionWriter(Closing):
         *,
         checksum: bool = True,
         cut_already: bool = False,
-        now: Callable[[], float] = time.monotonic,
+        now: Clock = time.monotonic,
     ) -> None:
         recorded = info if cut_already else info.cropped()
         self.path = Path(path)

@@ -1,7 +1,4 @@
-"""Texts for people: ``message`` keeps what is said apart from what is filled in, ``quantity`` prints numbers with unit.
-
-``printable`` cleans a text of others.
-"""
+"""Texts for people: ``message`` keeps what is said apart from what is filled in, ``quantity`` prints numbers."""
 
 from acquire.text.message import Message, about, joined, word
 from acquire.text.quantity import Amount, counts

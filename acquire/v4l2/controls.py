@@ -1,7 +1,7 @@
-"""The controls of a V4L2 camera: listed, put on manual, set, and read back.
+"""What an address asks of a V4L2 camera, and its controls: listed, put on manual, set, and read back.
 
-A control that an automatic one holds (flag inactive) accepts writes and ignores them, so the
-automatic ones go first; and since drivers clamp in silence, every value is read back.
+A control that an automatic one holds (flag inactive) accepts writes and ignores them, so the automatic ones go first;
+and since drivers clamp in silence, every value is read back.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError
 from acquire.frame import CameraSetting
-from acquire.settings import keys_of
+from acquire.settings import FLAG, choice, keys_of, number, others, setting, whole
 from acquire.text import Message
 from acquire.v4l2 import api
 from acquire.v4l2.device import V4L2Device
-from acquire.v4l2.settings import V4L2Settings
+from acquire.v4l2.formats import PLANES, Plane
 
 INTEGER, BOOLEAN, MENU, BUTTON, INTEGER64, CLASS, STRING, BITMASK, INTEGER_MENU = range(1, 10)
 _VALUED = (INTEGER, BOOLEAN, MENU, BITMASK, INTEGER_MENU)
@@ -43,6 +44,44 @@ MANUAL: dict[int, int] = {
     0x9A0918: 0,  # sensitivity, automatic
 }
 _POWER_LINE_AUTO, _POWER_LINE_OFF = 3, 0
+
+
+def _fourcc(word: str) -> str | None:
+    return word.strip().upper() or None
+
+
+def _number_of_control(word: str) -> int:
+    try:
+        return int(word, 0)
+    except ValueError:
+        raise NotAllowed("a whole number") from None
+
+
+# fmt: off
+@dataclass(frozen=True, slots=True)
+class V4L2Settings:
+    """Settings of ``/dev/video0?...``."""
+
+    format: str | None = setting(_fourcc, None,
+        "four-character code; default the best raw grey format (Y12, Y14, Y10, Y16, GREY), then YUYV, UYVY, then a"
+        " Bayer mosaic; never MJPG")
+    width: int | None = setting(whole(1, 65536), None, "default the size that is set", "px")
+    height: int | None = setting(whole(1, 65536), None, "default the size that is set", "px")
+    fps: float | None = setting(number(1e-3, 1e5), None, "frames a second", "1/s")
+    input: int | None = setting(whole(0), None, "number of the input")
+    plane: Plane = setting(choice(*PLANES), "raw",
+        "of a Bayer mosaic: all pixels, or those of one colour at half the width and height")
+    white: int | None = setting(whole(1, 65535), None, "grey level of saturation, where it is not the highest", "GL")
+    buffers: int = setting(whole(2, 32), 8, "pictures that the driver holds")
+    stall_s: float | None = setting(number(0.1), None,
+        "time without a picture that counts as a stall (default five frame periods and the exposure, at least 0.5);"
+        " more than the longest pause of a trigger", "s")
+    manual: bool = setting(FLAG, True, "no: leave automatic controls on (not for measuring)")
+    exposure_us: float | None = setting(number(1), None, "exposure (cameras count in steps of 100)", "us")
+    gain: int | None = setting(whole(), None, "in the camera's own steps")
+    controls: Mapping[str, int] = others(_number_of_control,
+        "any control by its name, `brightness=10`, as `phasedic devices` lists them")
+# fmt: on
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,16 +214,16 @@ def apply_controls(device: V4L2Device, wishes: V4L2Settings, where: str) -> dict
     if wishes.manual:
         _put_on_manual(device)
     controls = list_controls(device)
-    for number, value, unit in _asked(controls, wishes, where):
-        _set(device, controls[number], value, unit, where)
+    for which, value, unit in _asked(controls, wishes, where):
+        _set(device, controls[which], value, unit, where)
     return list_controls(device)
 
 
 def _put_on_manual(device: V4L2Device) -> None:
     controls = list_controls(device)
-    for number, value in MANUAL.items():
-        if number in controls and controls[number].value != value and controls[number].writable:
-            write_control(device, number, value)
+    for which, value in MANUAL.items():
+        if which in controls and controls[which].value != value and controls[which].writable:
+            write_control(device, which, value)
     line = controls.get(POWER_LINE)
     if line is not None and line.value == _POWER_LINE_AUTO:
         write_control(device, POWER_LINE, _POWER_LINE_OFF)

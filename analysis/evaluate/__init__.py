@@ -3,17 +3,25 @@
 ``gauges`` are virtual gauges and extensometers on a field, by the extension of two ends. ``tensile`` evaluates a
 test: a ``curve`` by one of the standards (``tensile_figures``), its ``elastic`` line, its ``strengths``, its plastic
 ``flow``, each a ``figure`` with an interval; ``programme`` finds what kind of test it is, ``seen`` what of the force
-was seen. ``lag`` is the delay of the load beside the frames. ``floor`` has the still phase of a test and the noise
-floor in it. ``deconvolution`` removes the blur of the ZOI from a map. ``response`` has what each place does over all
-instants.
+was seen. ``lag`` is the delay of the load beside the frames. ``figure`` has the still phase of a test and the noise
+floor in it too. ``deconvolution`` removes the blur of the ZOI from a map. ``response`` has what each place does over
+all instants.
 """
 
-from analysis.evaluate.area.strain import AreaStrain, Unevenness
+from analysis.evaluate.area_strain import AreaStrain, Unevenness
 from analysis.evaluate.curve import Course, Curve, TwoSides, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import ErrorLimits, LoadAxis, load_axis, principal_direction
-from analysis.evaluate.figure import AT_LEAST, CONFIDENCE, Figure
-from analysis.evaluate.floor import MIN_STILL_INSTANTS, NoiseFloor, evenly, noise_floor, still_phase
+from analysis.evaluate.figure import (
+    AT_LEAST,
+    CONFIDENCE,
+    MIN_STILL_INSTANTS,
+    Figure,
+    NoiseFloor,
+    evenly,
+    noise_floor,
+    still_phase,
+)
 from analysis.evaluate.flow import Neck, neck, true_at_top
 from analysis.evaluate.gauges.extensometers import (
     REGION,

@@ -1,7 +1,7 @@
 """The apparent motion of the camera, measured on plates that move with the specimen and are not loaded.
 
 Reference-sample compensation: B. Pan, L. Yu, D. Wu, Experimental Mechanics 53 (2013) 1751-1761. The fit is the
-generalised least squares of ``analysis.evaluate.area.affine``, with the shapes of ``plane``.
+generalised least squares of ``analysis.evaluate.affine``, with the shapes of ``plane``.
 
 The grid that has the ZOIs of the specimen and of the plates beside it.
 """
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from acquire.text import Message
 from analysis.evaluate import AreaStrain
-from analysis.evaluate.area.affine import Places, covariance_of
+from analysis.evaluate.affine import Places, covariance_of
 from analysis.field import Block, CommonError, Roi, StrainField, ZoiGrid, fixed_sums, part_of
 from analysis.optics.plane import KEYSTONE, MODELS, STRETCH, ApparentMotion, Model, affine_values, shapes
 

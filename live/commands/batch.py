@@ -27,7 +27,7 @@ from live.commands.options import (
     overrides,
     whole,
 )
-from live.commands.signals import signals
+from live.commands.process import signals
 from live.ui.terminal.screen import TerminalScreen
 
 OUTPUT = ("axis", "standard", "test", "zero", "lag")

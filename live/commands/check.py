@@ -23,7 +23,7 @@ from acquire.files.picture import write_picture
 from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
 from acquire.text import Message, about, word
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from live.commands.options import (
     MEASURE,
     PICTURES,
@@ -36,7 +36,7 @@ from live.commands.options import (
     overrides,
     require_new,
 )
-from live.commands.signals import interrupts
+from live.commands.process import interrupts
 from live.config.cameras import camera_configs
 from live.config.loading import Config
 from live.config.sections import DEFAULT_REFERENCE_BURST

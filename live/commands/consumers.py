@@ -17,7 +17,7 @@ from live.config.loading import Config
 from live.pipeline.consumer import Compose, Consumer, RunInfo, Screen
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import ChannelValues
-from live.pipeline.timed.response import shown_names
+from live.pipeline.timed.course import shown_names
 from live.results.sides import JointChannels
 from live.results.summary import StatusCard
 from live.results.writer import write_results

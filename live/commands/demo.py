@@ -11,7 +11,6 @@ import argparse
 import math
 import time
 from collections import deque
-from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.addresses import parse_address, with_setting
+from acquire.clock import Clock
 from acquire.errors import LOSS
 from acquire.frame import Frame
 from acquire.text import Amount, Message, word
@@ -158,7 +158,7 @@ class Operator(Consumer):
     name = "operator of the rig"
     blocks = False
 
-    def __init__(self, seconds: float | None, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, seconds: float | None, clock: Clock = time.monotonic) -> None:
         self._seconds, self._clock = seconds, clock
         self._measured: deque[tuple[float, float]] = deque(maxlen=RATE_BURSTS)
         self._specimen: VirtualSpecimen | None = None

@@ -30,8 +30,7 @@ from acquire.frame import CameraInfo, Frame
 from acquire.load_cell import check
 from acquire.serial_line import identify
 from acquire.serial_line.ports import list_serial_ports
-from acquire.text.message import Message, word
-from acquire.text.printable import brief, printable
+from acquire.text.message import Message, brief, printable, word
 from live import VERSION
 from live.setup.devices import open_load
 from live.setup.pictures import camera_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -15,7 +15,7 @@ from live.commands.consumers import standard_consumers
 from live.config.loading import Config, load_config
 from live.pipeline.consumer import Consumer, Policy, Screen
 from live.pipeline.measurement import Measurement
-from live.run.live_run import LiveRun, run_live
+from live.run.live_run import OnStart, run_live
 from live.run.outcome import Outcome, StopSignal
 from live.setup.region import located
 from live.ui.terminal.screen import TerminalScreen
@@ -33,7 +33,7 @@ def run(
     *,
     screen: Screen | None = None,
     stop: StopSignal | None = None,
-    on_start: Callable[[LiveRun], object] = lambda live: None,
+    on_start: OnStart = lambda live: None,
 ) -> Outcome:
     """Run a live test with one camera: results, recording and view as by ``phasedic run``, and ``consumers``.
 

@@ -8,8 +8,7 @@ from collections.abc import Callable
 from acquire.errors import NOT_READY, PhasedicError
 from acquire.serial_line import identify
 from acquire.serial_line.ports import LineSettings
-from acquire.text.message import Message, about, word
-from acquire.text.printable import brief
+from acquire.text.message import Message, about, brief, word
 from live.ui.terminal.screen import print_line
 
 PrintLine = Callable[[str], None]

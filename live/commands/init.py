@@ -12,7 +12,7 @@ from acquire.addresses import parse_address
 from acquire.errors import LOSS, DeviceError
 from acquire.files.picture import write_picture
 from acquire.text import Amount, Message, about, joined, word
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from live.commands.options import (
     PICTURES,
     add_help_all,

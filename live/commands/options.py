@@ -26,7 +26,7 @@ from live.commands.arguments import HELP_ALL, bad_value, not_empty
 from live.config.gauges import gauges_for
 from live.config.loading import Config, lens_in, load_config, options
 from live.config.values import numbers_of
-from live.results.row import gauge_columns
+from live.results.layout import gauge_columns
 from live.results.run_folder import RunFolder
 
 MEASURE = (

@@ -10,13 +10,13 @@ from typing import Any
 
 from acquire.errors import EXIT_INTERRUPTED, DeviceError, PhasedicError
 from acquire.text import Message
-from acquire.text.printable import brief
+from acquire.text.message import brief
 from live.commands.attended import page_opened
 from live.commands.init import find_devices
 from live.commands.options import OUTPUT, add_measure, add_options, overrides
+from live.commands.process import signals
 from live.commands.report import write_report
 from live.commands.run import OTHER_PROGRAMS, RECORDING, run_with_page
-from live.commands.signals import signals
 from live.config.cameras import camera_configs
 from live.config.loading import load_config
 from live.pipeline.consumer import Screen

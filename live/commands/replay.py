@@ -22,7 +22,7 @@ from live.commands.options import (
     in_picture_order,
     overrides,
 )
-from live.commands.signals import signals
+from live.commands.process import signals
 from live.results.folder import check_folder, make_folder
 from live.ui.terminal.screen import CamerasScreen, TerminalScreen
 

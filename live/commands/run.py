@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import queue
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import MappingProxyType
@@ -24,7 +24,7 @@ from live.results.folder import check_folder
 from live.results.sides import JointChannels
 from live.run.alarms import check_alarms
 from live.run.control import Answer, refusal
-from live.run.live_run import CameraOfTest, LiveRun, run_cameras
+from live.run.live_run import CameraOfTest, LiveRun, OnStart, run_cameras
 from live.run.outcome import Outcome, OutcomeOfTest, StopSignal
 from live.setup.devices import check_load_port
 from live.setup.region import located
@@ -107,7 +107,7 @@ def run_attended(
     configs: Mapping[str, Config],
     screen: Screen,
     consumers: Mapping[str, Sequence[Consumer]] = MappingProxyType({}),
-    attend: Callable[[LiveRun], None] = lambda live: None,
+    attend: OnStart = lambda live: None,
 ) -> OutcomeOfTest:
     """Run with signals, keyboard and remote commands.
 

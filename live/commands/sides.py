@@ -63,7 +63,7 @@ def put_together(front: Path, back: Path, out: Path, screen: Screen) -> None:
 def _strains(sides: SidesOfTest) -> Iterator[str]:
     """The last instant that both sides have."""
     from live.results.sides import at_end
-    from live.ui.terminal.status_line import strain_text
+    from live.ui.terminal.screen import strain_text
 
     yield Message("at the end:            mean of both        front minus mean")
     for name, one in at_end(sides.courses).items():

@@ -29,7 +29,7 @@ class LiveFigure:
         Its definition; of a column, empty where that of a map or of its value says it.
     column : str
         Attribute that a column of the results is: ``step.NAME`` (of ``TimeStep``), ``burst.NAME``, or "row", made by
-        ``live.results.row``; empty: no column.
+        ``live.results.layout``; empty: no column.
     sigma : bool
         The column has its standard uncertainty behind it, ``sigma_NAME``.
     only : str

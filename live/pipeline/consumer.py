@@ -20,7 +20,7 @@ from acquire.events import Event
 from acquire.frame import CameraInfo, Frame
 from acquire.load_sample import LoadSample
 from acquire.text import Message, about, joined
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from live.config.loading import Config
 from live.pipeline.measurement import Measurement, TimeStep
 from live.pipeline.run_state import RunState

@@ -19,8 +19,7 @@ from typing import Any
 
 from acquire.events import Event, EventKind, EventSink, Level, RateLimiter, named
 from acquire.text import Amount, Message, about
-from acquire.text.message import without_name
-from acquire.text.printable import brief
+from acquire.text.message import brief, without_name
 
 AS_THEY_COME = 3
 """So many events alike are kept one by one; of those that follow the newest alone, with their number."""

@@ -13,10 +13,9 @@ from live.pipeline.event_log import EventLog, sentence
 from live.pipeline.history import History
 from live.pipeline.measurement import TimeStep, strains_along
 from live.pipeline.snapshot import FORCE, STRESS, Snapshot
-from live.pipeline.timed.cycles import CycleWatch
+from live.pipeline.timed.course import CycleWatch, ResponseWatch
 from live.pipeline.timed.figure import FigureState, TimedFigure
 from live.pipeline.timed.health import Health, force_at, strains_at
-from live.pipeline.timed.response import ResponseWatch
 
 
 @dataclass(slots=True)

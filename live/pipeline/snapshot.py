@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from acquire.clock import Clock
 from acquire.text import Amount, Message, word
 from live.config.figures import CYCLE_CHANNELS, FIGURES, LIVE, OF_SNAPSHOT, LiveFigure, attributes, figure_of
 from live.pipeline.measurement import Measurement, TimeStep
@@ -65,7 +66,7 @@ class ChannelValues:
         start: float,
         state: StateOfTest,
         joint: FurtherChannels | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Clock = time.monotonic,
     ) -> None:
         self.start, self._state, self._joint, self._clock = start, state, joint, clock
         self._recent: deque[tuple[float, float]] = deque()

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from acquire.errors import DataError
 from acquire.session.layout import MAX_FORCE_N
 from acquire.text import Message
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from acquire.text.quantity import number as grouped
 from live.config.sections import LoadConfig
 from live.replay.export_table import Table, blocks, cell_of, find_table, is_heading, is_remark

@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 from acquire.errors import DataError
 from acquire.text import Message, joined
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from live.config.sections import LoadConfig
 from live.replay.export_text import (
     EMPTY,

@@ -25,7 +25,7 @@ from typing import BinaryIO
 import numpy as np
 
 from acquire.errors import ConfigError, DataError
-from acquire.protocols.units import is_mass, newtons_per
+from acquire.protocols.base import is_mass, newtons_per
 from acquire.text import Amount, Message
 
 HEAD = 1 << 18

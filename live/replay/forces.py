@@ -22,7 +22,7 @@ from acquire.files.picture import MAX_BYTES, check_regular
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from acquire.text import Amount, Message, about, counts
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from live.config.sections import LoadConfig
 from live.replay.export_file import Export, read_export
 

@@ -21,7 +21,7 @@ from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
 from acquire.opencv.images import picture_names
 from acquire.text import Message
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from live.config.loading import Config
 from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Window
 

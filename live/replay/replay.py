@@ -26,7 +26,7 @@ from acquire.hdf5 import FolderWatch
 from acquire.load_sample import LoadSample
 from acquire.opencv.images import picture_times
 from acquire.text import Amount, Message, about, counts, joined
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
 from live.pipeline.consumer import Compose, RunInfo, Screen
@@ -43,7 +43,7 @@ from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Work, 
 from live.results.finished.figures_file import finished
 from live.results.finished.finished_test import FinishedTest
 from live.results.folder import LOG, BurstFailures, check_folder, make_folder
-from live.results.response.evaluate import check_channel
+from live.results.place_response import check_channel
 from live.results.writer import write_results
 from live.setup.pictures import camera_of, with_film, with_mask
 from live.setup.region import is_auto_region

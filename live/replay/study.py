@@ -24,7 +24,7 @@ from analysis.picture.pattern import gauge_length, l10_strain
 from live.config.loading import Config
 from live.pipeline.reference import averaged
 from live.replay.source import ReplaySource
-from live.results.finished.readings import Readings
+from live.results.stored_fields import Readings
 from live.setup.pictures import read_mask
 from live.setup.prepared import MeasurePlan
 

@@ -32,7 +32,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
 from live.pipeline.measurement import AXIAL
 from live.results.budget import BudgetRow, CameraView, budget_rows
-from live.results.finished.readings import Readings
+from live.results.stored_fields import Readings
 
 HEADLINE = ("E", "nu", "Rp02", "Rm")
 """The figures that are shown first, and compared between tests."""

@@ -16,7 +16,7 @@ from acquire.errors import ConfigError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst
 from acquire.text import Message
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from live import VERSION
 from live.config.new_files import free_name, made_folder
 from live.pipeline.measure import NewReference

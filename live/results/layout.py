@@ -1,19 +1,39 @@
-"""The layout of ``strain.h5``, as data: the writer makes it, the reader refuses any other, the documents list it."""
+"""A row of the results (maps and means of one measurement), what the files hold besides, the layout of ``strain.h5``.
+
+The layout is data: the writer makes the file of it, the reader refuses any other, the documents list it.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquire.hdf5 import COMPRESSED, Declared
-from analysis.field import Status
-from live.config.figures import FIGURES, columns
+from analysis.evaluate import AreaStrain
+from analysis.field import PAIR_INDEX, Status, Sums, blur_maps
+from live.config.figures import FIGURES, attributes, columns
+from live.pipeline.measurement import AXIAL, extension_along, strains_along
 from live.results.quantities import quantity_of
-from live.results.row import BLUR, GRADIENTS, STRAINS, gauge_columns
+
+if TYPE_CHECKING:
+    from acquire.frame import CameraInfo
+    from analysis.field import StrainField
+    from live.pipeline.measurement import Measurement
+
+StrainMeasure = Literal["small", "engineering", "green", "hencky"]
+STRAINS = ("exx", "eyy", "exy")
+BLUR = ("blur", "sigma_blur")
+LENS = columns(["lens"])
+"""Columns of a test whose lens is corrected: the strain that was removed, and its standard uncertainty."""
+_OF_STEP, _OF_BURST = attributes("step"), attributes("burst")
+GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
 
 FORMAT, FORMAT_VERSION = "phasedic-strain", 1
 PLAIN_MAPS = ("u", "v", *GRADIENTS, *STRAINS)
@@ -47,6 +67,172 @@ GRID = {
     "size": Declared("int", unit="px"),
     "step": Declared("int", unit="px"),
 }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResultsInfo:
+    """What the files of a test hold besides the rows.
+
+    Attributes
+    ----------
+    start_monotonic : float, s
+        Zero of ``time_s``.
+    start_utc : str
+        The same instant, ISO 8601.
+    config, metadata, versions : mapping to JSON values
+        The configuration in force, free text of the user, versions of the programs.
+    camera : CameraInfo or None
+    strain_measure : "small" | "engineering" | "green" | "hencky"
+    area_m2 : float or None, m^2
+        Cross-section of the specimen; with it the rows have a stress.
+    gauges : mapping of name to JSON values
+        The virtual gauges, each as it was described.
+    axis : "x", "y" or "auto"
+        Of the load; auto: found from the means, y until then.
+    plates : bool
+        Plates correct the strains; rows have the strains as measured and the motion of the plates too.
+    lens : bool
+        A lens is corrected; rows have the strain that it made too.
+    lagged : bool
+        The force is corrected for a lag of the load; rows have the force as stamped too.
+    response : str
+        What the response of each place will be over; empty: none.
+    """
+
+    start_monotonic: float
+    start_utc: str
+    config: Mapping[str, Any]
+    metadata: Mapping[str, Any]
+    versions: Mapping[str, Any]
+    camera: CameraInfo | None
+    strain_measure: StrainMeasure = "small"
+    area_m2: float | None = None
+    gauges: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    axis: str = "y"
+    lagged: bool = False
+    plates: bool = False
+    lens: bool = False
+    response: str = ""
+
+    @property
+    def extras(self) -> tuple[str, ...]:
+        """The columns that only some tests have, without those of gauges."""
+        has = {
+            "section": self.area_m2 is not None,
+            "lag": self.lagged,
+            "lens": self.lens,
+            "plates": self.plates,
+        }
+        return columns(name for name, there in has.items() if there)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StrainRow:
+    """What is written of one measurement.
+
+    Attributes
+    ----------
+    maps : mapping of name to (R, C) array
+        u, v (px), gradients and strains (dimensionless), sigma_* of each, residual, status,
+        iterations; blur and its sigma (px).
+    values : mapping of name to number
+        One a row, in the order of the columns of ``strain.csv``.
+    pattern : Sums or None
+        Of the reference, by which areas weigh their ZOIs.
+    noise : (float, (R, C) array) or None
+        Share of the variance of strains that is not of the reference, and correlation of the noises of exx and eyy;
+        where a response is wanted.
+    """
+
+    maps: dict[str, NDArray[Any]]
+    values: dict[str, float | int]
+    pattern: Sums | None = None
+    noise: tuple[float, NDArray[np.float64]] | None = None
+
+    @classmethod
+    def of(cls, measurement: Measurement, info: ResultsInfo, axis: str = "y") -> StrainRow:
+        """The row of ``measurement``, strains in the measure of ``info``; ``axis`` is that of the load."""
+        maps = maps_of(measurement.field, info.strain_measure)
+        noise = _noise(measurement.field) if info.response else None
+        return cls(maps, _values(measurement, maps, info, axis), measurement.field.sums, noise)
+
+
+def gauge_columns(name: str) -> tuple[str, str, str]:
+    """The names that value, standard uncertainty and share of the area of a virtual gauge have in files."""
+    return f"gauge_{name}", f"sigma_gauge_{name}", f"share_gauge_{name}"
+
+
+def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any]]:
+    """The (R, C) arrays of a field by the names they have in files; strains in ``measure``."""
+    plain, strain = ("u", "v", *GRADIENTS), field.strain(measure)
+    maps = {name: getattr(field, name) for name in plain}
+    maps |= {name: getattr(strain, name) for name in STRAINS}
+    maps |= {f"sigma_{name}": getattr(field, f"sigma_{name}") for name in (*plain, *STRAINS)}
+    maps |= {name: getattr(field, name) for name in ("residual", "status", "iterations")}
+    maps |= dict(zip(BLUR, blur_maps(field), strict=True))
+    return maps
+
+
+def _noise(field: StrainField) -> tuple[float, NDArray[np.float64]]:
+    """As ``StrainRow.noise``, the share of a typical ZOI; the correlation is 0 where it is not known."""
+    x, y = field.sigma("exx"), field.sigma("eyy")
+    known = field.ok & (x > 0) & (y > 0)
+    both = np.zeros(known.shape)
+    np.divide(field.covariance[PAIR_INDEX[1, 5]], x * y, out=both, where=known)  # of du_dx and dv_dy
+    return field.own_share("eyy"), both
+
+
+def _values(
+    measurement: Measurement, maps: dict[str, NDArray[Any]], info: ResultsInfo, axis: str
+) -> dict[str, float | int]:
+    burst, time_step = measurement.burst, measurement.time_step
+    values: dict[str, float | int] = {name: getattr(time_step, of) for name, of in _OF_STEP.items()}
+    values |= {name: getattr(burst, of) for name, of in _OF_BURST.items()}
+    values |= {"time_s": burst.t - info.start_monotonic, "kernel_s": time_step.measure_s or math.nan}
+    values |= _strains(measurement, info.strain_measure)
+    for name, gauge in time_step.gauges.items():
+        values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma, gauge.share), strict=True))
+    if info.area_m2 is not None:
+        values["stress_Pa"] = stress = time_step.force / info.area_m2
+        stretch = _stretch(measurement, info.strain_measure, axis)
+        values |= {"true_strain": math.log(stretch), "true_stress_Pa": stress * stretch}
+    if info.lens:
+        values |= dict(zip(LENS, measurement.lens or [math.nan] * len(LENS), strict=True))
+    if info.plates:
+        values |= _plates(measurement)
+    return values
+
+
+def _plates(measurement: Measurement) -> dict[str, float]:
+    read, names = measurement.plates, columns(["plates"])
+    if read is None:
+        return dict.fromkeys(names, math.nan)
+    values = [*(read.raw_strain(name) for name in STRAINS), float(read.corrected)]
+    values += [*read.motion.parameters.tolist(), read.sigma_scale]
+    return dict(zip(names, values, strict=True))
+
+
+def _strains(measurement: Measurement, measure: StrainMeasure) -> dict[str, float]:
+    """Strains of the region, in ``measure``: those of the time step, where its field has that measure."""
+    if measurement.field.measure == measure:
+        return {name: getattr(measurement.time_step, name) for name in STRAINS}
+    area = AreaStrain.of(replace(measurement.field, measure=measure))
+    return {name: math.nan if area is None else area.value(name) for name in STRAINS}
+
+
+def _stretch(measurement: Measurement, measure: StrainMeasure, axis: str) -> float:
+    """Length over first length along the load: of the gauge ``axial``, between strips, or of the region."""
+    time_step = measurement.time_step
+    name, extension = strains_along(time_step.gauges, axis)[0], extension_along(time_step.gauges, axis)
+    strain = time_step.gauges[AXIAL].value if name == AXIAL else getattr(time_step, extension)
+    stretch = 1 + strain if math.isfinite(strain) else _stretched(getattr(time_step, name), measure)
+    return stretch if stretch > 0 else math.nan
+
+
+def _stretched(strain: float, measure: StrainMeasure) -> float:
+    if measure == "hencky":
+        return math.exp(strain)
+    return math.sqrt(max(1 + 2 * strain, 0.0)) if measure == "green" else 1 + strain
 
 
 def maps(shape: tuple[int, int]) -> dict[str, Declared]:

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError
 from acquire.hdf5 import (
     DAMAGE,
@@ -36,11 +35,12 @@ from acquire.hdf5 import (
     read_superblock,
     stored_rows,
 )
+from acquire.opening import Closing
 from acquire.text.message import Message, about, word
 from analysis.field import ZoiGrid
 from live.results import layout
 from live.results.quantities import Display, mean_name, quantity_of
-from live.results.response.stored import StoredResponse, read_response
+from live.results.stored_response import StoredResponse, read_response
 
 _log = logging.getLogger(__name__)
 _LENGTH, _POSITION = JsonField(int, 1, layout.MAX_SIDE_PX), JsonField(int, 0, layout.MAX_SIDE_PX)

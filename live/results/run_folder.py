@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.camera import with_scheme
-from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
+from acquire.opening import Closing
 from acquire.record_mode import Crop
 from acquire.session import Session
 from acquire.text import Message
@@ -33,12 +33,12 @@ from live.config.loading import from_dict
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import curve_of
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
-from live.results.finished.readings import Readings
+from live.results.layout import gauge_columns
 from live.results.reader import Strain
-from live.results.row import gauge_columns
 from live.results.stored_fields import (
     Image,
     Pictures,
+    Readings,
     StoredPattern,
     length_between,
     of_images,

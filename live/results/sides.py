@@ -14,7 +14,7 @@ import itertools
 import math
 import time
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -23,6 +23,7 @@ from typing import Any, NamedTuple, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.clock import Clock
 from acquire.errors import DataError
 from acquire.text import Message, joined, word
 from analysis.evaluate import (
@@ -50,7 +51,7 @@ LATE_S = 1.0
 class JointChannels:
     """The channels of front and back together (``live.config.figures.JOINT_CHANNELS``); for any thread."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, clock: Clock = time.monotonic) -> None:
         self._clock = clock
         self._states: Mapping[str, RunState] = {}
         self._live = False

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.clock import Clock
 from acquire.errors import DataError
 from acquire.hdf5 import (
     FlushTimer,
@@ -32,15 +33,15 @@ from acquire.hdf5 import (
     storable,
 )
 from acquire.text import Message
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from analysis.evaluate import load_axis
 from live.results import layout
-from live.results.response.stored import CORRELATION, CURRENT, GROUP, add_group
-from live.results.row import STRAINS, StrainRow, gauge_columns
+from live.results.layout import STRAINS, StrainRow, gauge_columns
+from live.results.stored_response import CORRELATION, CURRENT, GROUP, add_group
 
 if TYPE_CHECKING:
     from analysis.field import Sums, ZoiGrid
-    from live.results.row import ResultsInfo
+    from live.results.layout import ResultsInfo
 
 VALUE_BITS, SIGMA_BITS = 9, 9
 """Binary digits kept: of a value below its standard uncertainty; of an uncertainty."""
@@ -73,7 +74,7 @@ class StrainWriter:
         grid: ZoiGrid,
         info: ResultsInfo,
         flush_s: float = FLUSH_S,
-        now: Callable[[], float] = time.monotonic,
+        now: Clock = time.monotonic,
     ) -> None:
         self._path, self.failed, self._axis = path, False, info.axis
         self._flushed = 0  # rows

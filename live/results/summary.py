@@ -10,7 +10,7 @@ import numpy as np
 
 from acquire.load_cell import LoadLog
 from acquire.text import Amount, Message, counts, joined
-from acquire.text.printable import brief, share_text
+from acquire.text.message import brief, share_text
 from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
@@ -26,7 +26,7 @@ from live.results.figures import (
     sharpness_line,
     tare_line,
 )
-from live.results.finished.answers import checks_line
+from live.results.finished.figures_file import checks_line
 from live.results.finished.findings import DataCheck, doubts, findings
 from live.results.finished.finished_test import FinishedTest
 from live.words.language import told

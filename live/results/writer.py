@@ -12,16 +12,15 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from acquire.closing import Closing
 from acquire.errors import DataError
+from acquire.opening import Closing
 from live.config.loading import Config
 from live.pipeline.consumer import Consumer, Policy, RunInfo
 from live.pipeline.history import AxisFinder
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.results.folder import versions
-from live.results.layout import COLUMNS
-from live.results.row import ResultsInfo, StrainRow, gauge_columns
+from live.results.layout import COLUMNS, ResultsInfo, StrainRow, gauge_columns
 from live.results.strain_h5 import FLUSH_S, StrainWriter
 
 if TYPE_CHECKING:

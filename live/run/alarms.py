@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from acquire.clock import Clock
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind
 from acquire.text import Amount, Message, word
@@ -257,7 +258,7 @@ class AlarmWatch(Consumer):
         alarms: Sequence[Alarm],
         values: ChannelValues,
         run_state: RunState,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Clock = time.monotonic,
         joint: FurtherChannels | None = None,
     ) -> None:
         self._alarms, self._values, self._clock, self._joint = alarms, values, clock, joint

@@ -23,10 +23,9 @@ from live.run.control import ControlRefused
 from live.run.incoming_bursts import TAKING, IncomingBursts
 from live.run.measurer import Measurer
 from live.run.outcome import INTERRUPTED, TIME_IS_OVER, Outcome, StopSignal
+from live.run.pre_trigger import CyclePictures, PreTriggerBuffer
 from live.run.prepared_run import PreparedRun
-from live.run.recording.cycle_pictures import CyclePictures
-from live.run.recording.pre_trigger import PreTriggerBuffer
-from live.run.recording.recorder import open_recording
+from live.run.recorder import open_recording
 from live.run.sources import CameraSource, GrabPlan
 from live.setup.devices import Rig
 from live.stream.adapted import Outputs

@@ -20,17 +20,17 @@ from __future__ import annotations
 import math
 import queue
 import socket
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from acquire.clock import Clock
 from acquire.errors import Spoken
 from acquire.events import Event, EventKind, Level
 from acquire.load_cell import LoadCell
 from acquire.load_sample import LoadSample
 from acquire.text import Message
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from live.config.listen_address import SOCKET, ListenAddress, private_socket, read_token
 from live.pipeline.consumer import Screen
 from live.run.tcp_lines import LineServer
@@ -138,7 +138,7 @@ class TareControl:
         self,
         cell: LoadCell,
         test: TareableTest,
-        clock: Callable[[], float],
+        clock: Clock,
         wait_s: float = TARED_S,
     ) -> None:
         self._cell, self._test, self._clock, self._wait_s = cell, test, clock, wait_s

@@ -174,6 +174,10 @@ class LiveRun:
         self._load.close()
 
 
+OnStart = Callable[[LiveRun], object]
+"""Called once when the test has begun, to attach keyboard and other controls."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraOfTest:
     """One camera of a test to come.
@@ -197,7 +201,7 @@ def run_live(
     *,
     stop: StopSignal | None = None,
     consumers: Compose = write_results,
-    on_start: Callable[[LiveRun], object] = lambda live: None,
+    on_start: OnStart = lambda live: None,
 ) -> Outcome:
     """Run a test with one camera from opening the devices to closing the files.
 
@@ -225,7 +229,7 @@ def run_cameras(
     cameras: Mapping[str, CameraOfTest],
     *,
     stop: StopSignal | None = None,
-    on_start: Callable[[LiveRun], object] = lambda live: None,
+    on_start: OnStart = lambda live: None,
 ) -> OutcomeOfTest:
     """Run a test with any number of cameras, the leading one first; parameters and errors as of ``run_live``.
 
@@ -285,7 +289,7 @@ def _run(
     states: Mapping[str, RunState],
     folder: Path,
     stop: StopSignal,
-    on_start: Callable[[LiveRun], object],
+    on_start: OnStart,
 ) -> dict[str, CameraRun]:
     """The test itself; outputs and recordings are closed in any case, the recordings last, with all events."""
     stream = Stream()

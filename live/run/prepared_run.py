@@ -21,7 +21,7 @@ from live.pipeline.consumer import Screen
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import RunState
 from live.results.folder import make_folder
-from live.results.response.evaluate import check_channel
+from live.results.place_response import check_channel
 from live.run.alarms import check_alarms
 from live.run.outcome import StopSignal
 from live.setup.devices import Rig

@@ -23,7 +23,7 @@ from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadCell
 from acquire.system import lower_priority
 from acquire.text import Message
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from live.config.loading import Config
 from live.pipeline.latency import LOAD
 from live.pipeline.reference import ReferenceTaker
@@ -31,7 +31,6 @@ from live.pipeline.run_state import RunState
 from live.stream.stream import CameraEnded, LoadEnded, Record, ReferenceWanted, Role, Stream, Subscriber
 
 log = logging.getLogger(__name__)
-
 
 HELD_BYTES, HELD_S, A_MEGAPIXEL_S, LATE_S = 512_000_000, 1.0, 0.25, 0.25
 """Limits of the bursts that wait: bytes; s while the first is prepared, longer for a large reference; s later."""

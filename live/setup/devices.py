@@ -139,7 +139,7 @@ def check_load_sign(load: LoadConfig) -> None:
 
 def camera_settings() -> dict[str, type]:
     """The class of the settings of every kind of camera, by scheme."""
-    from hw_mocks.memory_camera import MemorySettings
+    from hw_mocks.scene import MemorySettings
     from hw_mocks.sim_settings import SimSettings
 
     return {"sim": SimSettings, "bench": MemorySettings, **dict(CAMERAS.settings())}
@@ -189,7 +189,7 @@ def _open_cropped(
 
 def _open_camera(address: str, on_event: EventSink, specimen: VirtualSpecimen | None) -> Camera:
     if parse_address(address).scheme == "bench":
-        from hw_mocks.memory_camera import open_memory_camera
+        from hw_mocks.scene import open_memory_camera
 
         return open_memory_camera(parse_address(address))
     if not _simulated(address):

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from acquire.errors import ConfigError
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from analysis.quality.pattern import zoi_pattern
 from analysis.quality.specimen import FoundPlates, find_plates, find_specimen
 from live.config.gauges import GaugeTable

@@ -15,11 +15,12 @@ import math
 import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from acquire.burst import SummedBurst
+from acquire.clock import Clock
 from acquire.errors import exit_code_of
 from acquire.events import Event, EventKind
 from acquire.frame import Burst, Frame
@@ -168,7 +169,7 @@ class StateKeeper(Subscriber):
 
     takes: Sequence[type] = (Frame, LoadSample, Measurement, Event, LoadEnded)
 
-    def __init__(self, run_state: RunState, load: str, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, run_state: RunState, load: str, clock: Clock = time.monotonic) -> None:
         self._run_state, self._load, self._clock = run_state, load, clock
         self._last_frame_t = math.nan
         self._samples, self._first_t, self._last_t = 0, math.nan, math.nan

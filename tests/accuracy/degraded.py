@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.burst import BurstAccumulator
-from acquire.camera.opening import open_camera
+from acquire.camera.contract import open_camera
 from acquire.frame import Burst
 from analysis import PhaseKernel, Roi, StrainField, ZoiGrid
 from live.pipeline.measure import Tracker

@@ -19,7 +19,7 @@ from analysis.evaluate.response import Departures, ResponseLines, ResponseSums
 from hw_mocks.scene import Exposer, Scene, Sensor
 from hw_mocks.specimen import VirtualSpecimen, specimen_from
 from live.commands.demo import ZoiTruth
-from live.results.response.evaluate import UP_TO
+from live.results.place_response import UP_TO
 from tests.accuracy.coverage import Coverage
 
 Array = NDArray[np.float64]

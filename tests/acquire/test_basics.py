@@ -15,8 +15,8 @@ import pytest
 
 from acquire.addresses import Options, parse_address
 from acquire.clock import ClockPair
-from acquire.closing import Closing
 from acquire.errors import ConfigError
+from acquire.opening import Closing
 
 
 def test_the_text_comes_back() -> None:

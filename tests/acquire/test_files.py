@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from acquire.camera.opening import with_scheme
+from acquire.camera.contract import with_scheme
 from acquire.errors import DataError
 from acquire.files.picture import (
     check_regular,
@@ -23,7 +23,7 @@ from acquire.files.picture import (
     read_picture,
     write_picture,
 )
-from acquire.text.printable import printable
+from acquire.text.message import printable
 
 
 def smooth(dtype: type = np.uint8) -> np.ndarray:

@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from acquire.addresses import parse_address
-from acquire.camera.opening import open_camera
+from acquire.camera.contract import open_camera
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Event
 from acquire.files.headers import full_pages
+from acquire.files.picture import to_gray
 from acquire.opencv import images
-from acquire.opencv.gray import to_gray
 from acquire.opencv.image_metadata import read_stamps
 from acquire.opencv.images import MAX_REPORTED, picture_names, picture_times, read_image
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from acquire import opening_thread
-from acquire.opening_thread import LOOK_S, Reopening, close_within
+from acquire import opening
+from acquire.opening import LOOK_S, Reopening, close_within
 
 
 def opened_again(again: Reopening[str], looks: int = 600) -> str | None:
@@ -22,7 +22,7 @@ def tried(attempt: Callable[[], str], **more: Any) -> Reopening[str]:
 
 @pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(opening_thread, "RETRY_S", 0.0)
+    monkeypatch.setattr(opening, "RETRY_S", 0.0)
 
 
 def test_it_is_tried_until_it_works(at_once: None) -> None:

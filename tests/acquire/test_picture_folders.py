@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquire.addresses import parse_address
-from acquire.camera.opening import open_camera
+from acquire.camera.contract import open_camera
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event
 from acquire.files.headers import full_pages, quantisation

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from acquire.camera.contract import open_camera
 from acquire.camera.live import LiveCamera
-from acquire.camera.opening import open_camera
 from acquire.errors import ConfigError, DataError, DeviceError
 from acquire.events import Event, ignore_event
 from acquire.opencv import webcam

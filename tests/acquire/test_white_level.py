@@ -13,7 +13,7 @@ import pytest
 
 from acquire.addresses import parse_address
 from acquire.burst.accumulate import burst_of
-from acquire.camera.opening import CroppedCamera, open_camera
+from acquire.camera.contract import CroppedCamera, open_camera
 from acquire.events import ignore_event
 from acquire.frame import Frame, frozen, saturation
 from acquire.session import Session

@@ -12,7 +12,7 @@ from acquire.clock import ClockPair
 from acquire.errors import ConfigError, DataError, DeviceError, Interrupted, MachineUnfit, PhasedicError
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.record_mode import RecordMode
-from acquire.text.printable import brief, counted, duration, printable, share_text
+from acquire.text.message import brief, counted, duration, printable, share_text
 
 
 @pytest.mark.parametrize(

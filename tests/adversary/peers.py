@@ -17,7 +17,7 @@ from typing import Any
 import serial
 from serial.rfc2217 import PortManager
 
-from acquire.closing import Closing
+from acquire.opening import Closing
 
 LINE = b"12.5 N\r\n"
 Write = Callable[[bytes], None]

@@ -15,7 +15,7 @@ import pytest
 
 from acquire.session import Session
 from live.cli import main
-from live.commands.environment import NonBlockingStream
+from live.commands.process import NonBlockingStream
 from live.ui.terminal.screen import TerminalScreen
 
 SIM = "sim:uniform?lockstep=yes&seconds=1&fps=15&width=160&height=128&bits=12"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from analysis import Status, StrainField
 from analysis.evaluate import AreaStrain, Gauge, facing
-from analysis.evaluate.area.strain import GRADIENTS
+from analysis.evaluate.area_strain import GRADIENTS
 from analysis.field import PAIR_INDEX, variance_of_sum
 from analysis.field.part import BLOCK_SHARE, MIN_BLOCK, in_blocks
 

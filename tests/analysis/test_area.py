@@ -9,7 +9,7 @@ import pytest
 
 from analysis import PhaseKernel
 from analysis.evaluate import REGION, AreaGauge, AreaStrain, ExtensionGauge, GaugeSet, load_axis
-from analysis.evaluate.area.affine import Places, covariance_of
+from analysis.evaluate.affine import Places, covariance_of
 from analysis.field import CommonError, Roi, StrainField, ZoiGrid, profile
 from tests.accuracy.truth import Speckle
 from tests.accuracy.truth import pixels as pixel_grid

@@ -10,9 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from analysis.evaluate import Curve
-from analysis.evaluate.creep import Creep
-from analysis.evaluate.figure import quantile
-from analysis.evaluate.floor import MIN_STILL_INSTANTS, evenly, noise_floor, still_phase
+from analysis.evaluate.figure import MIN_STILL_INSTANTS, evenly, noise_floor, quantile, still_phase
+from analysis.evaluate.programme import Creep
 
 UNKNOWN = np.full(6, np.nan)
 MOVES = {"eyy": (np.array([0.0, 4e-6, -4e-6, 2e-4, 0.0, 0.0]), np.full(6, 1e-6))}

@@ -68,8 +68,8 @@ LAYERS = {
         )
         for i, layer in enumerate(LIVE)
     },
-    "live.cli": "acquire.errors acquire.text acquire.text.message acquire.text.printable live.commands.arguments"
-    " live.commands.environment live.commands.signals live.words.language",
+    "live.cli": "acquire.errors acquire.text acquire.text.message live.commands.arguments"
+    " live.commands.process live.words.language",
 }
 # One module opens the simulated devices. The demo compares with their truth; the examples have simulated pictures.
 EXCEPTIONS = {

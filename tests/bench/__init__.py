@@ -1,6 +1,6 @@
 """The benchmark, ``make bench``; it stops with advice where OpenCV does not work."""
 
-from live.commands.environment import limit_resources
+from live.commands.process import limit_resources
 
 limit_resources()  # as the program does, before numpy is loaded
 try:

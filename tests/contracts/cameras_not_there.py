@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from acquire import pylon as pylon_module
 from acquire.addresses import parse_address
 from acquire.camera import live
 from acquire.camera.live import DeviceFault, Driver, LiveCamera, Picture
@@ -28,7 +29,6 @@ from acquire.genicam import camera as genicam_camera
 from acquire.genicam.device import CameraIdentity, Received
 from acquire.genicam.library import GenicamError
 from acquire.opencv.webcam import OpenCVSettings, live_camera
-from acquire.pylon import camera as pylon_camera
 from acquire.v4l2 import api
 from acquire.v4l2.camera import open_v4l2
 from tests.acquire.genicam.test_setup import MadeUpCamera
@@ -297,9 +297,9 @@ def pylon(world: World, patch: pytest.MonkeyPatch) -> LiveCamera:
     nodes = SimpleNamespace(
         GenericException=GoneError, IsAvailable=lambda node: True, IsWritable=lambda node: True
     )
-    patch.setattr(pylon_camera, "_pylon", lambda: (library, nodes))
-    on_the_clock_of(world, pylon_camera, patch)
-    return pylon_camera.open_pylon(parse_address("pylon:1"), world.events.append)
+    patch.setattr(pylon_module, "_pylon", lambda: (library, nodes))
+    on_the_clock_of(world, pylon_module, patch)
+    return pylon_module.open_pylon(parse_address("pylon:1"), world.events.append)
 
 
 # -- OpenCV -----------------------------------------------------------------------------------------

@@ -16,8 +16,7 @@ import pytest
 
 from acquire.addresses import parse_address, with_setting
 from acquire.camera import CameraListing, list_cameras
-from acquire.camera.contract import Camera
-from acquire.camera.opening import open_camera
+from acquire.camera.contract import Camera, open_camera
 from acquire.errors import ConfigError, DataError, DeviceError, PhasedicError
 from acquire.events import ignore_event
 from acquire.frame import Frame

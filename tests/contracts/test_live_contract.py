@@ -9,7 +9,7 @@ from itertools import islice, pairwise
 
 import pytest
 
-from acquire import opening_thread
+from acquire import opening
 from acquire.camera import CAMERAS
 from acquire.camera.live import LiveCamera
 from acquire.frame import Frame
@@ -33,7 +33,7 @@ Open = Callable[[World], LiveCamera]
 
 @pytest.fixture(params=KINDS, ids=lambda scheme: scheme or "v4l2")
 def opened(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Open:
-    monkeypatch.setattr(opening_thread, "RETRY_S", 0.001)
+    monkeypatch.setattr(opening, "RETRY_S", 0.001)
     return lambda world: KINDS[request.param](world, monkeypatch)
 
 

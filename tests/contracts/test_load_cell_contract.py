@@ -16,11 +16,11 @@ from acquire.addresses import parse_address
 from acquire.errors import ConfigError, DataError, DeviceError, PhasedicError
 from acquire.events import Event, EventKind
 from acquire.load_cell.contract import LoadCell, open_load_cell
-from hw_mocks.faults import FaultPlan
 from hw_mocks.indicator import Sensing
 from hw_mocks.indicator_server import IndicatorServer
 from hw_mocks.sim_indicators import INDICATORS
 from hw_mocks.sim_load_cell import open_sim_load
+from hw_mocks.sim_settings import FaultPlan
 from hw_mocks.specimen import specimen_from
 from tests.acquire.session import fixtures as session_fixtures
 from tests.contracts.entry_points import install_example

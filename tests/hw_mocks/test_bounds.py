@@ -10,14 +10,12 @@ from acquire.addresses import Options, parse_address
 from acquire.errors import ConfigError
 from acquire.events import ignore_event
 from acquire.settings import settings_of
-from hw_mocks.faults import CAMERA_FAULTS, SERIAL_FAULTS
 from hw_mocks.machine import FlowCurve, PowerLaw
-from hw_mocks.memory_camera import MemorySettings, open_memory_camera
 from hw_mocks.optics import Optics, take_optics
-from hw_mocks.scene import Sensor, take_sensor
+from hw_mocks.scene import MemorySettings, Sensor, open_memory_camera, take_sensor
 from hw_mocks.sim_camera import SimCameraSettings, open_sim_camera
 from hw_mocks.sim_load_cell import SimLoadSettings, open_sim_load
-from hw_mocks.sim_settings import SPECIMEN_KEYS, SimSettings
+from hw_mocks.sim_settings import CAMERA_FAULTS, SERIAL_FAULTS, SPECIMEN_KEYS, SimSettings
 from hw_mocks.specimen import VirtualSpecimen, specimen_from, take_specimen
 
 SPECIMEN = {

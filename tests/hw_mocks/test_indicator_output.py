@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from acquire.errors import ConfigError
-from hw_mocks.faults import CAMERA_FAULTS, SERIAL_FAULTS, Fault, FaultPlan, parse_faults, plan_frames
 from hw_mocks.indicator import AsciiIndicator, IndicatorOutput, IndicatorReading, Sensing
 from hw_mocks.sim_indicators import MtSicsIndicator
+from hw_mocks.sim_settings import CAMERA_FAULTS, SERIAL_FAULTS, Fault, FaultPlan, parse_faults, plan_frames
 
 RATE = 10.0
 

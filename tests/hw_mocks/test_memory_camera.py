@@ -9,7 +9,7 @@ import pytest
 
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError
-from hw_mocks.memory_camera import MemoryCamera, MemorySettings, glare, open_memory_camera, render
+from hw_mocks.scene import MemoryCamera, MemorySettings, glare, open_memory_camera, render
 
 SMALL = MemorySettings(64, 64, 8, 1000.0, seconds=0.1, pictures=4, buffers=8, saturated=0.05)
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hw_mocks.indicator import NEWTONS, Indicator, IndicatorReading, decimals
-from hw_mocks.modbus_indicator import DAT400, PT113, ModbusIndicator, RegisterMap, crc
+from hw_mocks.indicator_server import DAT400, PT113, ModbusIndicator, RegisterMap, crc
 from hw_mocks.sim_indicators import (
     INDICATORS,
     AedStandardIndicator,

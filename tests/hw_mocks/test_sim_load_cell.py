@@ -15,12 +15,11 @@ from acquire.errors import ConfigError
 from acquire.events import Event, ignore_event
 from acquire.load_cell.contract import LoadCell
 from acquire.load_sample import LoadSample
-from hw_mocks.faults import SERIAL_FAULTS
 from hw_mocks.indicator import AsciiIndicator, Sensing
 from hw_mocks.indicator_server import IndicatorServer, PtyPort
 from hw_mocks.sim_indicators import INDICATORS
 from hw_mocks.sim_load_cell import NominalLoadCell, SimLoadCell, open_sim_load
-from hw_mocks.sim_settings import SPECIMEN_KEYS
+from hw_mocks.sim_settings import SERIAL_FAULTS, SPECIMEN_KEYS
 from hw_mocks.specimen import VirtualSpecimen, specimen_from, take_specimen
 
 

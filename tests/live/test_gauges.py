@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from acquire.errors import ConfigError
-from acquire.text.printable import share_text
+from acquire.text.message import share_text
 from analysis import Status, StrainField
 from analysis.evaluate import AreaGauge, Gauge, GaugeSet, GaugeValue
 from analysis.field import ZoiGrid
@@ -33,7 +33,7 @@ from live.results.summary import StatusCard, summary_lines
 from live.run.outcome import Outcome
 from live.ui.rerun.drawing.layout import paint
 from live.ui.rerun.messages import LargeFigures
-from live.ui.terminal.status_line import gauge_texts, status_line
+from live.ui.terminal.screen import gauge_texts, status_line
 from tests.live.made_run import finished
 from tests.live.made_up import START, make_grid, make_measurement
 from tests.live.test_end_to_end import live_run

@@ -15,8 +15,8 @@ from acquire.session import Session
 from hw_mocks.specimen import specimen_from
 from live.cli import main
 from live.commands.demo import ZoiTruth
-from live.results.response.stored import StoredResponse
 from live.results.run_folder import RunFolder, open_run
+from live.results.stored_response import StoredResponse
 from tests.live.ended import code_of
 
 KINDS = ("uniform", "woven", "hole", "halves")

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquire.errors import ConfigError, DataError
-from live.results.maps.map import for_display
+from live.commands.map import for_display
 from live.setup.pattern.imposed import ExpectedErrors, Imposed, robust_std
 from live.setup.pattern.outcome import (
     ExperimentContext,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from analysis.field import Roi, StrainField, ZoiGrid
 from hw_mocks.deformation import SpecimenDeformation, StrainModes
-from live.results.maps.map import PAPER_LOW_PASS, for_display
+from live.commands.map import PAPER_LOW_PASS, for_display
 from live.setup.pattern.outcome import (
     ExperimentContext,
     ExperimentOutcome,

@@ -14,13 +14,12 @@ import pytest
 from numpy.typing import NDArray
 
 from acquire.addresses import parse_address
-from acquire.camera.contract import Camera
+from acquire.camera.contract import Camera, list_cameras, open_camera
 from acquire.camera.live import LiveCamera
-from acquire.camera.opening import list_cameras, open_camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import Event
 from acquire.frame import Frame
-from acquire.pylon.camera import PylonDriver, open_pylon
+from acquire.pylon import PylonDriver, open_pylon
 from acquire.session.reader import Session
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle

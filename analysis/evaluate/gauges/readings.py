@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.text import Message, joined
-from analysis.evaluate.area.affine import Places
-from analysis.evaluate.area.strain import GRADIENTS
+from analysis.evaluate.affine import Places
+from analysis.evaluate.area_strain import GRADIENTS
 from analysis.evaluate.gauges.geometry import Mask
 from analysis.evaluate.gauges.taken import (
     NOTHING,

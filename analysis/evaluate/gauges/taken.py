@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.text import Message
-from analysis.evaluate.area.affine import AffineFit, Places, affine_fit
-from analysis.evaluate.area.strain import GRADIENT, STRAINS, affine_values, strain_of
+from analysis.evaluate.affine import AffineFit, Places, affine_fit
+from analysis.evaluate.area_strain import GRADIENT, STRAINS, affine_values, strain_of
 from analysis.evaluate.gauges.geometry import Floats, Mask, Point
 from analysis.field import PAIR_INDEX, StrainField, combination, overlap, products
 

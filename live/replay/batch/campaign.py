@@ -18,16 +18,15 @@ from typing import Any
 
 from acquire.errors import EXIT_INTERRUPTED, LOSS, ConfigError, DataError, PhasedicError
 from acquire.text import Message
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from live.config.loading import load_config
 from live.config.new_files import made_folder, replaced_file
 from live.pipeline.consumer import Screen
 from live.replay.batch.cluster import Cluster, check_scheduler
-from live.replay.batch.keys import key_of, longest_first
 from live.replay.batch.row import COLUMNS, BatchRow, Value, failed
 from live.replay.batch.scheduler import BatchProgress, ChunkPlan, Scheduler, cut, perform_all, sweep_chunks
 from live.replay.batch.task import Task, row_done, sweep, sweep_done
-from live.replay.batch.test_list import BatchJob
+from live.replay.batch.test_list import BatchJob, key_of, longest_first
 from live.replay.batch.worker import Pool, WorkerProcesses
 from live.replay.pictures import reference_file
 from live.setup.compiling import compile_ahead

@@ -18,11 +18,11 @@ from typing import Any
 
 from acquire.errors import ConfigError, DataError
 from acquire.text import Message
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from live.pipeline.consumer import Screen
-from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress, row_done
+from live.replay.batch.test_list import deciding_versions
 from live.replay.batch.worker import OnProgress, compile_on_worker, describe_worker, perform_on_worker
 
 log = logging.getLogger(__name__)

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from acquire.text import Message
-from acquire.text.message import from_json
-from acquire.text.printable import printable
+from acquire.text.message import from_json, printable
 from analysis.evaluate import TensileFigures
 from live.config.loading import Config
 from live.pipeline.history import History

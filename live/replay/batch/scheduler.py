@@ -11,7 +11,7 @@ import dataclasses
 import itertools
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,14 +19,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.clock import Clock
 from acquire.errors import DEFECT, PhasedicError
 from acquire.text import Amount, Message, about, counts, joined
-from acquire.text.printable import duration
+from acquire.text.message import duration
 from live.pipeline.consumer import Screen
 from live.replay.batch.cluster import Cluster
-from live.replay.batch.keys import is_session, key_of_chunk
 from live.replay.batch.row import RENEWED, BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress, remove, staging_dirs
+from live.replay.batch.test_list import is_session, key_of_chunk
 from live.replay.batch.worker import Pool
 from live.replay.opening import open_source
 
@@ -110,7 +111,7 @@ class BatchProgress:
     now : callable giving s
     """
 
-    def __init__(self, tests: int, now: Callable[[], float]) -> None:
+    def __init__(self, tests: int, now: Clock) -> None:
         self._tests, self._now, self._began = tests, now, now()
         self._ended = 0
         self._shares: dict[str, float] = {}

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from acquire.errors import DataError, PhasedicError
 from acquire.system import is_running
 from acquire.text import Message
-from acquire.text.printable import changed, printable
+from acquire.text.message import changed, printable
 from live.pipeline.consumer import Screen
 from live.replay.batch.row import BatchRow, failed, row_of, row_of_chunk
 from live.replay.parts import measure_part
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from live.pipeline.measurement import TimeStep
 
 _SUFFIX = ".part"
-
 
 log = logging.getLogger(__name__)
 ROW_FILE, LOG_FILE, FIELDS_FILE = "batch.json", "replay.txt", "fields"
@@ -138,7 +137,7 @@ class Task:
     of : str
         The test that this task is a chunk of.
     key : str
-        Hash of all that the results depend on (``keys``).
+        Hash of all that the results depend on (``test_list``).
     """
 
     name: str

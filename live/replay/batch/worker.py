@@ -29,9 +29,9 @@ from typing import Any, TextIO
 from acquire.system import blocked_signals, python_command, python_environment, unblock_signals
 from acquire.text import Message
 from analysis import PICTURE_KINDS, not_compiled
-from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress, perform
+from live.replay.batch.test_list import deciding_versions
 
 ONE_THREAD = (
     "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM",

@@ -1,5 +1,5 @@
 """A run in the formats of other programs.
 
-``formats`` lists them and runs a ``job``. Text and arrays: ``tables``; ParaView: ``vtk``; ImageJ: ``tiff``;
-pictures: ``films``; metadata of the experiment: ``r3xa``.
+``formats`` lists them and runs a ``job``. Text, arrays and the metadata of the experiment: ``tables``; pictures,
+ImageJ and ParaView: ``maps``.
 """

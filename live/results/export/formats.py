@@ -8,11 +8,9 @@ from pathlib import Path
 
 from acquire.errors import ConfigError
 from live.pipeline.consumer import Screen
-from live.results.export.films import write_gif, write_mp4, write_png
-from live.results.export.grids import write_tiff, write_vtk
 from live.results.export.job import USUAL, ExportJob, ExportOptions, chosen_fields, chosen_rows
-from live.results.export.r3xa import write_r3xa
-from live.results.export.tables import write_csv, write_mat, write_npz
+from live.results.export.maps import write_gif, write_mp4, write_png, write_tiff, write_vtk
+from live.results.export.tables import write_csv, write_mat, write_npz, write_r3xa
 from live.results.quantities import Display
 from live.results.run_folder import RunFolder
 

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.clock import Clock
 from acquire.errors import ConfigError, DataError
 from acquire.text import Message
 from analysis.field import Status
 from live.pipeline.consumer import Screen
+from live.results.place_response import response_lines
 from live.results.quantities import Display
 from live.results.reader import Strain
-from live.results.response.evaluate import response_lines
-from live.results.response.stored import GROUP
 from live.results.run_folder import RunFolder
+from live.results.stored_response import GROUP
 
 USUAL = ("u", "v", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy", "status")
 _ROUNDING_S = 1e-6  # of times that were typed
@@ -97,7 +98,7 @@ class ExportJob:
         gauge = self.run.gauges.get(name.removeprefix("gauge_"))
         return gauge is not None and gauge.described.get("value") in ("exy", "gamma_xy")
 
-    def steps(self, now: Callable[[], float] = time.monotonic) -> Iterator[tuple[int, int]]:
+    def steps(self, now: Clock = time.monotonic) -> Iterator[tuple[int, int]]:
         """(k, row) for each instant; shows the progress after two seconds."""
         began = now()
         for k, row in enumerate(self.rows):

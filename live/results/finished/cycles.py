@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 from acquire.text import Amount, Message, joined
 from analysis.evaluate import Curve, Figure, Track
-from analysis.evaluate.creep import Creep
 from analysis.evaluate.curve import broken_at
 from analysis.evaluate.cyclic.cycles import CycleTable
 from analysis.evaluate.cyclic.loop import BurstStrains
 from analysis.evaluate.figure import quantile
+from analysis.evaluate.programme import Creep
 from live.config.new_files import new_file
 from live.results.figures import figure_text
-from live.results.finished.readings import Readings
+from live.results.stored_fields import Readings
 
 Floats = NDArray[np.float64]
 FILE = "cycles.csv"

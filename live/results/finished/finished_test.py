@@ -21,14 +21,14 @@ from analysis.evaluate import (
     Track,
     evaluate_test,
 )
-from analysis.evaluate.creep import Creep
+from analysis.evaluate.programme import Creep
 from live.config.sections import SpecimenConfig
 from live.pipeline.measurement import AXIAL, TimeStep, mean_width
 from live.pipeline.run_state import RunState
 from live.results.figures import lag_of, tensile_options
 from live.results.finished.cycles import Cycles, creep_lines
-from live.results.finished.readings import Readings
 from live.results.run_folder import RunFolder
+from live.results.stored_fields import Readings
 
 NO_VALUE = Message("no ZOI has a value in the last burst")
 _NO_READINGS = Message("no readings of a load cell are there")

@@ -1,3 +1,1 @@
-"""Strain maps as pictures: ``colours``, ``scale`` (range and unit), ``painting``; ``field_maps`` during a test,
-``map`` as a file.
-"""
+"""Strain maps as pictures: ``colours``, ``scale`` (range and unit), ``painting`` of files and during a test."""

@@ -12,7 +12,7 @@ import numpy as np
 from acquire.text import Amount, Message, joined
 from acquire.text.quantity import unit_of
 from analysis.evaluate import true_curve
-from analysis.evaluate.creep import Creep
+from analysis.evaluate.programme import Creep
 from live.config.figures import FIGURES
 from live.config.gauges import gauge_colours
 from live.results.finished.cycles import FILE, Cycles

@@ -17,11 +17,11 @@ from acquire.text.message import joined as texts
 from live.results.maps.colours import ticks
 from live.results.maps.painting import Levels, Painter, caption
 from live.results.maps.scale import ColourScale, status_legend
+from live.results.place_response import response_lines, response_title
 from live.results.quantities import quantity_of
 from live.results.report.page import Html, captioned, element, joined, paragraph, safe
-from live.results.response.evaluate import response_lines, response_title
-from live.results.response.stored import FATE
 from live.results.run_folder import RunFolder
+from live.results.stored_response import FATE
 from live.words.language import of_terminal
 
 _QUALITY = 80

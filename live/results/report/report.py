@@ -26,10 +26,10 @@ from live.results.figures import (
     headline,
     sharpness_line,
 )
-from live.results.finished.answers import MeasuredAgain, belief, checks_line, missing_lines
-from live.results.finished.figures_file import finished_in
+from live.results.finished.figures_file import MeasuredAgain, belief, checks_line, finished_in, missing_lines
 from live.results.finished.findings import NO_FORCE, doubts, findings
 from live.results.finished.finished_test import FinishedTest
+from live.results.layout import LENS
 from live.results.report import curves, record
 from live.results.report.curves import long_sections
 from live.results.report.evaluation import (
@@ -55,9 +55,8 @@ from live.results.report.page import (
     table,
     tiles,
 )
-from live.results.report.practice import PracticeValues, reporting_table
+from live.results.report.record import PracticeValues, reporting_table
 from live.results.report.svg import Plot
-from live.results.row import LENS
 from live.results.run_folder import RunFolder
 from live.words.language import of_terminal, told
 

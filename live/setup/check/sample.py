@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from acquire.errors import DataError
 from acquire.events import EventSink, ignore_event
 from acquire.frame import Burst, CameraInfo, Frame, frozen
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from analysis.picture.pattern import noise_of_picture
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import replace
 
+from acquire.clock import Clock
 from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Frame
@@ -75,7 +75,7 @@ class CardWriter(Consumer):
     name = "status card"
 
     def __init__(
-        self, view: View, card: StatusCard, run_state: RunState, clock: Callable[[], float] = time.monotonic
+        self, view: View, card: StatusCard, run_state: RunState, clock: Clock = time.monotonic
     ) -> None:
         self._clock = clock
         self._view, self._card, self._run_state = view, card, run_state
@@ -106,7 +106,7 @@ class FiguresWriter(Consumer):
 
     name = "figures"
 
-    def __init__(self, view: View, run_state: RunState, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, view: View, run_state: RunState, clock: Clock = time.monotonic) -> None:
         self._view, self._run_state, self._clock = view, run_state, clock
 
     def measurement(self, measurement: Measurement) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.text import Amount, Message, counts, joined, word
-from acquire.text.printable import share_text
+from acquire.text.message import share_text
 from acquire.text.quantity import PLUS_MINUS
 from analysis.field import StrainField, ZoiGrid
 from live.pipeline.measurement import Measurement

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from acquire.events import Event
     from acquire.frame import Frame
     from analysis.field import StrainField
-    from live.pipeline.timed.response import Floats
+    from live.pipeline.timed.course import Floats
 
 MAX_ROWS, MAX_EVENTS = 20_000, 1000
 HISTORY_ROWS = {Kind.MEANS: 5000, Kind.LOADS: 10_000, Kind.POINTS: 800}

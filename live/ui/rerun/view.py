@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from acquire.frame import Frame
     from live.pipeline.measurement import Measurement
     from live.pipeline.snapshot import Snapshot
-    from live.pipeline.timed.response import Floats
+    from live.pipeline.timed.course import Floats
 
 _log = logging.getLogger(__name__)
 
@@ -247,20 +247,24 @@ def spawn_viewer(
         words.close()
         _log.warning(Message("the viewer {path} did not start: {error}", binary, error))
         return None
-    threading.Thread(target=_watch_start, args=(process, words, notify), name="viewer", daemon=True).start()
+
+    def watch() -> None:
+        if why := _not_opened(process, words):
+            notify(why)
+
+    threading.Thread(target=watch, name="viewer", daemon=True).start()
     return process
 
 
-def _watch_start(process: subprocess.Popen[bytes], words: IO[bytes], notify: Callable[[str], None]) -> None:
-    """Report a viewer that ends with an error instead of opening."""
+def _not_opened(process: subprocess.Popen[bytes], words: IO[bytes]) -> str:
+    """Why a viewer ended with an error instead of opening; empty where it opens."""
     with words:
         try:
             failed = process.wait(_OPENING_S) > 0  # below 0: ended by a signal, on purpose
         except subprocess.TimeoutExpired:
-            return
-        if failed:
-            words.seek(0)
-            notify(viewer_failure(words.read().decode(errors="replace")))
+            return ""
+        words.seek(0)
+        return viewer_failure(words.read().decode(errors="replace")) if failed else ""
 
 
 def viewer_failure(words: str) -> str:

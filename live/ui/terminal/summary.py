@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 
 from acquire.text import Amount, Message, counts
-from acquire.text.printable import counted
+from acquire.text.message import counted
 from live.pipeline.consumer import ConsumerReport, Screen
 from live.pipeline.event_log import sentence
 from live.pipeline.history import History
 from live.pipeline.run_state import RunState
 from live.results.figures import alignment_line, elastic_lines, figure_lines, film_line, tare_line
-from live.results.finished.answers import MeasuredAgain, checks_line, missing_lines
+from live.results.finished.figures_file import MeasuredAgain, checks_line, missing_lines
 from live.results.finished.findings import NO_FORCE, findings
 from live.results.finished.finished_test import FinishedTest
 from live.results.summary import file_lines, look_lines, noise_line, summary_lines, valid_line, why_nothing
-from live.ui.terminal.status_line import strain_text
+from live.ui.terminal.screen import strain_text
 
 MOST = 12
 """Lines of the summary."""

@@ -19,7 +19,7 @@ from analysis.field import Status, ZoiGrid
 from live.config.gauges import complete_gauges, gauge_colours
 from live.config.loading import Config
 from live.pipeline.measurement import Measurement
-from live.pipeline.timed.response import shown_names
+from live.pipeline.timed.course import shown_names
 from live.results.maps.colours import MICROSTRAIN, PERCENT
 from live.results.maps.painting import FIELD_MAPS, NO_MAPS, FieldMaps, Floats, Painted, overlay_cells
 from live.results.maps.scale import ColourScale

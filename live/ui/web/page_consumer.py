@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from acquire.clock import Clock
 from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.text import Message
-from acquire.text.printable import printable, share_text
+from acquire.text.message import printable, share_text
 from analysis.evaluate import ExtensionGauge, LineGauge
 from live.config.gauges import complete_gauges, gauge_colours
 from live.config.loading import Config
@@ -26,15 +27,13 @@ from live.pipeline.event_log import Repeats, counted_text, sentence
 from live.pipeline.measurement import AXIAL, Measurement, TimeStep
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import BURST, FORCE, STRESS, ChannelValues, ShownFigure, Snapshot, peak_force
+from live.pipeline.timed.course import shown_names
 from live.pipeline.timed.figure import TimedFigure
-from live.pipeline.timed.response import shown_names
 from live.results.reader import whole_maps
 from live.results.run_folder import STRAIN
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.cameras_panel import CamerasPanel
-from live.ui.web.curve_history import CurveHistory
-from live.ui.web.limits import FigureLimits
 from live.ui.web.map_view import MapView, as_jpeg, gauge_shapes, plate_shapes, shrunk
+from live.ui.web.run_panels import CamerasPanel, CurveHistory, FigureLimits
 
 if TYPE_CHECKING:
     from live.run.camera_run import CameraRun
@@ -78,7 +77,7 @@ class PageConsumer(Consumer):
         self,
         broadcaster: Broadcaster,
         config: Config,
-        now: Callable[[], float] = time.monotonic,
+        now: Clock = time.monotonic,
         picture: bytes = b"",
         side: str = "",
         cameras: int = 1,

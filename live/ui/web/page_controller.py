@@ -20,7 +20,7 @@ import numpy as np
 
 from acquire.errors import PhasedicError
 from acquire.text import Message
-from acquire.text.printable import brief, printable
+from acquire.text.message import brief, printable
 from analysis.evaluate import GAUGE_KINDS
 from live.config.loading import Config
 from live.config.new_files import free_name

@@ -15,16 +15,16 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import sentence
 from live.pipeline.run_state import RunState
 from live.results.figures import TensileRow, beyond_scatter, headline, tensile_table
-from live.results.finished.answers import belief
 from live.results.finished.cycles import creep_lines, shown_figures
+from live.results.finished.figures_file import belief
 from live.results.finished.findings import doubts, findings
 from live.results.finished.finished_test import FinishedTest
 from live.results.report.curves import load_unit, strain_unit, stress_strain
 from live.results.report.evaluation import EvaluatedCurve, intercept_of
 from live.results.summary import why_nothing
 from live.run.outcome import Outcome
-from live.ui.web.cameras_panel import figures_of
 from live.ui.web.page_consumer import PageConsumer
+from live.ui.web.run_panels import figures_of
 
 MAX_TROUBLES = 20
 

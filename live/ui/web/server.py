@@ -27,7 +27,7 @@ from live.config.listen_address import listening_socket
 from live.pipeline.latency import OUTPUT
 from live.ui.web.authorization import HttpError, RequestCheck
 from live.ui.web.broadcaster import Broadcaster, json_bytes
-from live.ui.web.setup.device_lists import kinds_of_devices
+from live.ui.web.setup.config_draft import kinds_of_devices
 from live.words.language import LANGUAGES, entries
 
 log = logging.getLogger(__name__)

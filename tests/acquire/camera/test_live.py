@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquire import opening_thread
+from acquire import opening
 from acquire.camera.live import DeviceFault, Driver, LiveCamera, Picture, RepeatWatch
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import Event
@@ -90,7 +90,7 @@ class Rig:
 
 @pytest.fixture(autouse=True)
 def at_once(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(opening_thread, "RETRY_S", 0.001)
+    monkeypatch.setattr(opening, "RETRY_S", 0.001)
     yield
     assert not [thread for thread in threading.enumerate() if thread.name == "closing"]
 

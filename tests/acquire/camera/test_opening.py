@@ -10,8 +10,7 @@ import pytest
 
 from acquire.addresses import parse_address
 from acquire.camera import CAMERAS, CameraListing, CroppedCamera, list_cameras, with_scheme
-from acquire.camera.contract import CameraBase
-from acquire.camera.opening import without_v4l2
+from acquire.camera.contract import CameraBase, without_v4l2
 from acquire.errors import ConfigError
 from acquire.events import ignore_event
 from acquire.frame import CameraInfo, Frame, frozen

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquire.genicam import camera as camera_module
 from acquire.genicam import device as device_module
-from acquire.genicam import finding, library
+from acquire.genicam import library
+from acquire.genicam.camera import FoundCamera
 from acquire.genicam.device import STATUS, GenicamDevice
-from acquire.genicam.finding import FoundCamera
 from acquire.genicam.library import _ERROR, CALLS, GenicamError, has_aravis
 from tests.acquire.genicam.test_features import Able
 
@@ -162,8 +163,8 @@ def test_a_camera_in_the_list(monkeypatch: pytest.MonkeyPatch) -> None:
             Listed.closed = True
 
     camera = Listed()
-    monkeypatch.setattr(finding, "GenicamDevice", lambda library, name: camera)
-    found = finding._look_at(None, FoundCamera("Maker-1", "Maker", "M1", "1", "10.0.0.2", "GigEVision"))  # type: ignore[arg-type]
+    monkeypatch.setattr(camera_module, "GenicamDevice", lambda library, name: camera)
+    found = camera_module._look_at(None, FoundCamera("Maker-1", "Maker", "M1", "1", "10.0.0.2", "GigEVision"))  # type: ignore[arg-type]
     assert (found.address, found.trouble) == ("genicam:Maker-1?format=Mono12p", "")
     assert found.name == "Maker M1 (1, GigEVision 10.0.0.2)" and Listed.closed
     assert found.details == (

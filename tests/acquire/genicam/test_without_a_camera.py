@@ -8,15 +8,15 @@ from typing import Any, ClassVar
 import pytest
 
 from acquire.addresses import parse_address
-from acquire.camera.opening import open_camera
+from acquire.camera.contract import open_camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.genicam import library
+from acquire.genicam.camera import list_cameras, name_of
 from acquire.genicam.device import GenicamDevice
-from acquire.genicam.finding import list_cameras, name_of
 from acquire.genicam.formats import FORMATS, decode
 from acquire.genicam.library import CALLS, load_aravis
 from acquire.genicam.settings import GenicamSettings
-from acquire.pylon.camera import list_cameras as list_basler_cameras
+from acquire.pylon import list_cameras as list_basler_cameras
 from acquire.settings import read_settings
 
 

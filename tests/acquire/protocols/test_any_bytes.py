@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import Reading
+from acquire.protocols.base import Reading, is_mass, is_unit, newtons_per
 from acquire.protocols.buffers import LineBuffer
-from acquire.protocols.units import is_mass, is_unit, newtons_per
 from tests.acquire.protocols.conversation import ALL, any_parser, parser, read_line
 
 SEEDS = [

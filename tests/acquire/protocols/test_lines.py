@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
-from acquire.protocols.base import find_protocol
+from acquire.protocols.base import find_protocol, newtons_per
 from acquire.protocols.buffers import LineBuffer, number
 from acquire.protocols.lines import PRESETS, load_preset, parser_from
 from acquire.protocols.modbus import ModbusParser, crc16, frame, load_profile, profile_from
-from acquire.protocols.units import newtons_per
 from tests.acquire.protocols.conversation import parser
 
 OWN = r"""

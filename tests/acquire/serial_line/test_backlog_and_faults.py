@@ -21,9 +21,9 @@ from acquire.load_cell.contract import open_load_cell
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.serial_line.cell import SerialCell
 from acquire.serial_line.settings import read_settings
-from hw_mocks.faults import SERIAL_FAULTS, FaultPlan, parse_faults
 from hw_mocks.indicator import AsciiIndicator, Sensing
 from hw_mocks.indicator_server import IndicatorServer, PtyPort
+from hw_mocks.sim_settings import SERIAL_FAULTS, FaultPlan, parse_faults
 
 PERIOD_S = 0.0125
 

@@ -8,7 +8,7 @@ import random
 import pytest
 
 from acquire.clock import DeviceClock
-from acquire.serial_line.clock import ArrivalRate, ArrivalTimes
+from acquire.serial_line.arrivals import ArrivalRate, ArrivalTimes
 
 
 def test_a_byte_began_as_many_byte_times_ago_as_came_after_it() -> None:

@@ -11,7 +11,7 @@ from acquire.addresses import Options, parse_address
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import find_protocol
 from acquire.protocols.modbus import frame
-from acquire.serial_line.echo import Echo
+from acquire.serial_line.arrivals import Echo
 from tests.acquire.serial_line.fake_port import SILENCE, FakeLine
 
 VALUE = 12.31

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from acquire.addresses import Options, parse_address
 from acquire.errors import DeviceError
-from acquire.protocols.base import Reading, find_protocol
-from acquire.protocols.units import is_mass, newtons_per
+from acquire.protocols.base import Reading, find_protocol, is_mass, newtons_per
 from acquire.serial_line import identify as search
 from acquire.serial_line.identify import Finding, guess, listen, pattern_of, proposed
 from acquire.serial_line.ports import LineSettings

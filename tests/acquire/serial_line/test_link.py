@@ -8,7 +8,7 @@ import time
 import pytest
 
 from acquire.errors import DeviceError
-from acquire.opening_thread import Opening
+from acquire.opening import Opening
 from acquire.serial_line import link as link_module
 from acquire.serial_line.link import Link, LinkContext, close_port
 from acquire.serial_line.ports import LineSettings

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import pytest
 
 from acquire.errors import ConfigError, DeviceError
-from acquire.opening_thread import Opening
+from acquire.opening import Opening
 from acquire.serial_line import byte_ports
 from acquire.serial_line import ports as serial_ports
 from acquire.serial_line.byte_ports import TcpPort

@@ -18,7 +18,7 @@ from acquire.hdf5 import damage
 from acquire.session import RotatingWriter, Session
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import FrameCounts
-from live.run.recording.recorder import Recorder
+from live.run.recorder import Recorder
 from tests.acquire.session.fixtures import frame, info, writer
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquire import opening_thread
+from acquire import opening
 from acquire.addresses import parse_address
 from acquire.camera.live import LiveCamera
 from acquire.errors import ConfigError, DeviceError
@@ -44,7 +44,7 @@ class CameraRig:
 
 @pytest.fixture(autouse=True)
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(opening_thread, "RETRY_S", 0.001)
+    monkeypatch.setattr(opening, "RETRY_S", 0.001)
 
 
 def test_request_codes_are_those_of_videodev2_h() -> None:

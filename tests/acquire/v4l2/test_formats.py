@@ -17,11 +17,18 @@ from acquire.events import RateLimiter
 from acquire.settings import read_settings
 from acquire.v4l2 import api
 from acquire.v4l2.api import fourcc, fourcc_text
-from acquire.v4l2.controls import MANUAL, changeable, control_name, exposure_s, list_controls, still_automatic
+from acquire.v4l2.controls import (
+    MANUAL,
+    V4L2Settings,
+    changeable,
+    control_name,
+    exposure_s,
+    list_controls,
+    still_automatic,
+)
 from acquire.v4l2.faults import fault_in_words, why_not_open
 from acquire.v4l2.formats import FORMATS, PLANES, Plane, decode, picture_size, preferred, warning_of
 from acquire.v4l2.listing import list_cameras
-from acquire.v4l2.settings import V4L2Settings
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
 from tests.acquire.v4l2.test_setup import AUTO, EXPOSURE, GAIN, device_with, in_force
 

@@ -11,13 +11,12 @@ from acquire.addresses import parse_address
 from acquire.errors import ConfigError
 from acquire.settings import read_settings
 from acquire.v4l2 import api
-from acquire.v4l2.controls import changeable, exposure_s, list_controls
+from acquire.v4l2.camera import Setup, set_up
+from acquire.v4l2.controls import V4L2Settings, changeable, exposure_s, list_controls
 from acquire.v4l2.device import Identity, SizeRange, V4L2Device
 from acquire.v4l2.faults import find_again
 from acquire.v4l2.formats import preferred
 from acquire.v4l2.listing import _modes
-from acquire.v4l2.settings import V4L2Settings
-from acquire.v4l2.setup import Setup, set_up
 from tests.acquire.v4l2 import fake_kernel
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
 

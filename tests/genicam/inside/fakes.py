@@ -11,7 +11,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from acquire.camera.opening import open_camera
+from acquire.camera.contract import open_camera
 from acquire.events import Event
 from acquire.frame import Frame
 

@@ -9,8 +9,7 @@ from inspect import signature
 import numpy as np
 import pytest
 
-from acquire.camera.contract import Camera
-from acquire.camera.opening import open_camera
+from acquire.camera.contract import Camera, open_camera
 from acquire.genicam.device import GenicamDevice, Received, Take
 from tests.contracts import test_camera_contract as contract
 from tests.genicam.fake_camera import FIRST, PIXEL_FORMATS

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from acquire.camera.opening import list_cameras, open_camera
+from acquire.camera.contract import list_cameras, open_camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.genicam.library import load_aravis
 from live.config.loading import load_config

@@ -15,7 +15,7 @@ import pytest
 from acquire import compiled_loops
 from acquire.errors import ConfigError
 from acquire.system import can_write, private_folder, python_command, python_environment
-from live.commands import environment
+from live.commands import process
 
 ROOT = Path(__file__).parents[3]
 
@@ -107,15 +107,15 @@ def test_all_compiled_loops_are_checked() -> None:
 def test_loops_are_kept_below_the_temporary_folder_where_nothing_else_can_be_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(environment, "can_write", lambda folder: False)
+    monkeypatch.setattr(process, "can_write", lambda folder: False)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setenv("NUMBA_CACHE_DIR", "")
-    environment.keep_loops()
+    process.keep_loops()
     folder = Path(os.environ["NUMBA_CACHE_DIR"])
     assert folder.parent == tmp_path and stat.S_IMODE(folder.stat().st_mode) == 0o700
     assert len(caplog.messages) == 1 and str(folder) in caplog.text and "NUMBA_CACHE_DIR" in caplog.text
-    monkeypatch.setattr(environment, "can_write", can_write)
-    environment.keep_loops()  # a child process, or the next one with that in its environment
+    monkeypatch.setattr(process, "can_write", can_write)
+    process.keep_loops()  # a child process, or the next one with that in its environment
     assert len(caplog.messages) == 1 and os.environ["NUMBA_CACHE_DIR"] == str(folder)
 
 
@@ -135,10 +135,10 @@ def test_a_folder_that_others_can_write_to_is_not_used(
 
 def test_without_compiled_loops_nothing_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "0")
-    environment.check_environment()
+    process.check_environment()
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     with pytest.raises(ConfigError, match="NUMBA_DISABLE_JIT is set: without compiled loops nothing can be"):
-        environment.check_environment()
+        process.check_environment()
 
 
 def test_a_name_that_is_not_utf_8_is_stored_escaped(tmp_path: Path) -> None:

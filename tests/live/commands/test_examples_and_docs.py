@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from hw_mocks.example_pictures import E_PA, NU, STRESSES_PA, STRIP_STRAINS, strain_at
 from live.cli import main as phasedic
+from live.commands.examples import E_PA, NU, STRESSES_PA, STRIP_STRAINS, strain_at
 from live.results.run_folder import open_run
 
 ROOT = Path(__file__).parents[3]

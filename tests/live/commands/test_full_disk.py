@@ -13,7 +13,7 @@ import pytest
 
 from acquire.errors import DataError
 from live.cli import main
-from live.results.maps.map import save
+from live.commands.map import save
 from tests.analysis.speckle import picture
 
 

@@ -191,7 +191,7 @@ def test_the_share_that_is_compiled() -> None:
 
 GIVEN = """
 import os, signal, sys
-from live.commands.signals import signals
+from live.commands.process import signals
 from live.pipeline.consumer import Screen
 stops, screen = [], Screen()
 screen.print = lambda line: print(line, flush=True)

@@ -20,7 +20,7 @@ from live.cli import main
 from live.commands import arguments as arguments_module
 from live.commands.arguments import COMMANDS
 from live.commands.demo import SPECIMENS
-from live.commands.signals import ended_by_sigterm, interrupts
+from live.commands.process import ended_by_sigterm, interrupts
 from live.results.report import saving
 from live.results.report.svg import Plot, PlotLine
 from live.ui.terminal.screen import TerminalScreen

@@ -12,9 +12,9 @@ import pytest
 
 from acquire.errors import ConfigError
 from live.cli import main
-from live.commands import environment, recover
-from live.commands.environment import NonBlockingStream
+from live.commands import process, recover
 from live.commands.options import add_options
+from live.commands.process import NonBlockingStream
 from live.config.loading import load_config
 
 
@@ -52,11 +52,11 @@ def test_a_stopped_terminal_loses_writes_and_says_how_many() -> None:
 
 def test_streams_are_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
     out = io.StringIO()
-    monkeypatch.setattr(environment.sys, "stdout", out)
-    with environment.nonblocking_streams():
+    monkeypatch.setattr(process.sys, "stdout", out)
+    with process.nonblocking_streams():
         print("a line")
-        assert environment.sys.stdout is not out
-    assert environment.sys.stdout is out and out.getvalue() == "a line\n"
+        assert process.sys.stdout is not out
+    assert process.sys.stdout is out and out.getvalue() == "a line\n"
 
 
 @pytest.mark.parametrize(("name", "value", "well"), [
@@ -68,10 +68,10 @@ def test_whole_numbers_of_the_environment(
 ) -> None:
     monkeypatch.setenv(name, value)
     if well:
-        environment.check_environment()
+        process.check_environment()
     else:
         with pytest.raises(ConfigError, match=f"{name}=.* is not possible; give a whole number from"):
-            environment.check_environment()
+            process.check_environment()
 
 
 def test_a_threading_layer_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -84,16 +84,16 @@ def test_a_threading_layer_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) 
         ConfigError,
         match=r"NUMBA_THREADING_LAYER=tbb is not possible \(No threading layer could be loaded\); ",
     ):
-        environment.check_environment()
+        process.check_environment()
 
 
 def test_one_thread_of_openblas_unless_the_user_says_another(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
-    environment.limit_resources()
-    assert environment.os.environ["OPENBLAS_NUM_THREADS"] == "1"
+    process.limit_resources()
+    assert process.os.environ["OPENBLAS_NUM_THREADS"] == "1"
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "3")
-    environment.limit_resources()
-    assert environment.os.environ["OPENBLAS_NUM_THREADS"] == "3"
+    process.limit_resources()
+    assert process.os.environ["OPENBLAS_NUM_THREADS"] == "3"
 
 
 @pytest.mark.parametrize(("unreadable", "code"), [(0, 0), (3, 5), (12, 5)])

@@ -18,10 +18,10 @@ from live.pipeline.measurement import TimeStep
 from live.pipeline.run_state import FrameCounts, RunState
 from live.pipeline.snapshot import Snapshot
 from live.pipeline.timed.figure import TimedFigure
+from live.results.layout import ResultsInfo, StrainRow
 from live.results.report.curves import others
-from live.results.row import ResultsInfo, StrainRow
 from live.ui.rerun.messages import LargeFigures
-from live.ui.terminal.status_line import status_line
+from live.ui.terminal.screen import status_line
 from live.ui.web.page_consumer import fact
 from tests.live.made_up import START, make_measurement
 

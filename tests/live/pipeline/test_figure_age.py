@@ -24,10 +24,10 @@ from live.pipeline.snapshot import ChannelValues
 from live.pipeline.timed.figure import ARRIVALS, OLD_INTERVALS, OLD_S, Arrivals, FigureState, TimedFigure
 from live.pipeline.timed.force_watch import ForceWatch
 from live.run.alarms import ActionMeans, Alarm, AlarmWatch, actions_of
-from live.run.recording.pre_trigger import PreTrigger, PreTriggerBuffer
+from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
 from live.run.strain_output import LineFormat
 from live.ui.rerun.messages import LargeFigures
-from live.ui.terminal.status_line import status_line
+from live.ui.terminal.screen import status_line
 from live.ui.web.broadcaster import Broadcaster, plain
 from live.ui.web.page_consumer import PageConsumer
 from tests.live.made_up import in_ascii, make_frame, make_measurement

@@ -21,7 +21,7 @@ from live.pipeline.run_state import RunState
 from live.ui.rerun.messages import ViewSetup
 from live.ui.rerun.outbox import Outbox, Pending
 from live.ui.rerun.wire import Kind
-from live.ui.web.curve_history import CurveHistory
+from live.ui.web.run_panels import CurveHistory
 from tests.live.made_up import make_grid, make_measurement
 
 LOAD_HZ = 10

@@ -18,7 +18,7 @@ from live.pipeline.measurement import Measurement, TimeStep
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import ChannelValues, Snapshot, peak_force
 from live.results.summary import StatusCard
-from live.ui.terminal.status_line import status_line
+from live.ui.terminal.screen import status_line
 from live.ui.web.broadcaster import Broadcaster, json_bytes
 from live.ui.web.page_consumer import PageConsumer
 from tests.live.made_up import START, in_ascii, make_measurement

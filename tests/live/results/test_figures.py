@@ -316,7 +316,7 @@ def test_the_lag_that_is_advised_is_the_one_found(
     history.add(make_measurement(0).time_step)
     loads.append(LoadSample(START, 5.0))
     monkeypatch.setattr(
-        "live.results.finished.readings.find_lag", lambda *_: Figure(lag, lag - 0.001, lag + 0.001)
+        "live.results.stored_fields.find_lag", lambda *_: Figure(lag, lag - 0.001, lag + 0.001)
     )
     (line,) = lag_line(history, loads, FLAT)
     assert in_ascii(line) == f"lag of the load behind the frames: {1e3 * lag:.1f} +- 1.0 ms (95%; {how})"

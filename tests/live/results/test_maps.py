@@ -16,6 +16,7 @@ from analysis import Roi, ZoiGrid
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
+from live.commands.map import MapRequest, draw
 from live.results.maps import painting
 from live.results.maps.colours import (
     MICROSTRAIN,
@@ -28,7 +29,6 @@ from live.results.maps.colours import (
     ticks,
     unit_for,
 )
-from live.results.maps.map import MapRequest, draw
 from live.results.maps.scale import ColourScale
 from live.results.reader import Strain
 

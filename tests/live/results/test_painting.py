@@ -14,8 +14,8 @@ from acquire.errors import ConfigError, DataError
 from analysis import Roi, ZoiGrid
 from analysis.field import Status
 from analysis.field.strain_field import StrainField
+from live.commands.map import MapRequest, draw, for_display, save
 from live.results.maps.colours import diverging_table, sequential_table
-from live.results.maps.map import MapRequest, draw, for_display, save
 from live.results.maps.painting import Levels, Painter, _mixed, caption, overlay_cells, overlay_quads
 from live.results.maps.scale import OPACITY, AutoRange, ColourScale, range_kind, status_colours
 from live.results.reader import Strain

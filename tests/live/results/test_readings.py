@@ -13,8 +13,8 @@ from analysis.evaluate import Figure, Track
 from analysis.evaluate.cyclic import cycles as of_cycles
 from analysis.evaluate.cyclic.cycles import CycleTable
 from analysis.evaluate.cyclic.loop import BurstStrains
-from live.results.finished import readings as module
-from live.results.finished.readings import Readings
+from live.results import stored_fields
+from live.results.stored_fields import Readings
 
 T = np.arange(1000) / 100
 FORCE = np.random.default_rng(3).normal(size=1000)
@@ -53,8 +53,8 @@ def test_a_thinned_curve_has_the_extremes_of_each_interval_and_the_gaps() -> Non
 
 def test_the_lag_of_a_long_test_is_looked_for_from_the_first_picture(monkeypatch: pytest.MonkeyPatch) -> None:
     given: list[Track] = []
-    monkeypatch.setattr(module, "MOST", 400)
-    monkeypatch.setattr(module, "find_lag", lambda *tracks: given.extend(tracks) or Figure.none(""))
+    monkeypatch.setattr(stored_fields, "MOST", 400)
+    monkeypatch.setattr(stored_fields, "find_lag", lambda *tracks: given.extend(tracks) or Figure.none(""))
     strain = Track(np.arange(4.0, 9.5, 0.25), np.zeros(22))
     in_pieces(T, FORCE, 300).lag_behind(strain)
     assert (given[0].t[0], given[0].t[-1]) == (4.0, 5.75)

@@ -16,17 +16,17 @@ from acquire.errors import ConfigError, DataError
 from analysis.field import Status, StrainField
 from analysis.field.grid import ZoiGrid
 from live.cli import main
+from live.commands.show import playback_messages, view_setup
 from live.config.loading import Config, from_dict
 from live.pipeline.measurement import Measurement
-from live.pipeline.timed.response import ResponseWatch, leaves_name, slope_name
+from live.pipeline.timed.course import ResponseWatch, leaves_name, slope_name
 from live.results import Results, ResultsInfo, Strain
 from live.results.__main__ import main as probed
 from live.results.finished.finished_test import FinishedTest
+from live.results.place_response import check_channel, respond, response_lines, response_of, response_title
 from live.results.report.report import ReportRequest, make_report
-from live.results.response.evaluate import check_channel, respond, response_lines, response_of, response_title
-from live.results.response.stored import FATE, map_names
 from live.results.run_folder import open_run
-from live.ui.rerun.playback import playback_messages, view_setup
+from live.results.stored_response import FATE, map_names
 from live.ui.rerun.wire import Kind
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.made_run import CONFIG, UTC_START

@@ -18,7 +18,7 @@ from acquire.record_mode import RecordMode
 from live.cli import main
 from live.commands.options import add_gauges
 from live.results import Results, ResultsInfo, Strain
-from live.results.row import StrainRow
+from live.results.layout import StrainRow
 from live.results.run_folder import open_run
 from live.results.stored_fields import length_between
 from live.results.strain_h5 import StrainWriter

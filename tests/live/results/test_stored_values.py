@@ -23,8 +23,8 @@ from analysis.field.strain_field import StrainField
 from live.pipeline.measurement import Measurement
 from live.results import Results, ResultsInfo, Strain
 from live.results.__main__ import main as probed
+from live.results.layout import StrainRow, gauge_columns
 from live.results.quantities import Display
-from live.results.row import StrainRow, gauge_columns
 from live.results.stored_fields import length_between, read_field
 from live.results.strain_h5 import StrainWriter, normal_matrices
 from live.results.writer import CsvWriter

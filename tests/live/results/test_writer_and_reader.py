@@ -26,8 +26,7 @@ from analysis.evaluate import GaugeValue
 from analysis.field import PAIR_INDEX
 from live.pipeline.measurement import Measurement
 from live.results import Results, ResultsInfo, Strain
-from live.results.layout import COLUMNS, MAPS, PLAIN_MAPS
-from live.results.row import StrainRow, maps_of
+from live.results.layout import COLUMNS, MAPS, PLAIN_MAPS, StrainRow, maps_of
 from live.results.stored_fields import read_field
 from live.results.strain_h5 import FLUSH_S, StrainWriter, rounded
 from tests.acquire.session.fixtures import writer

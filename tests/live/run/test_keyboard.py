@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 from acquire.events import EventKind
+from live.commands.attended import HELP, LINES_HELP, Keyboard, Keys, listen
 from live.run.control import ENDED, FORCED, UNDO
-from live.run.keyboard import HELP, LINES_HELP, Keyboard, Keys, listen
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.run.test_control import FakeLive
 from tests.live.screens import Terminal
@@ -96,7 +96,8 @@ def test_other_keys_are_answered_with_the_keys_and_arrows_with_nothing() -> None
 def test_a_true_terminal_gives_single_keys_and_is_put_back_as_it_was() -> None:
     """In its own process, since a terminal has one foreground process."""
     program = (
-        "import sys, termios; from live.run.keyboard import listen; from live.ui.terminal.screen import TerminalScreen;"
+        "import sys, termios; from live.commands.attended import listen;"
+        " from live.ui.terminal.screen import TerminalScreen;"
         "from tests.live.run.test_control import FakeLive; live = FakeLive();"
         "before = termios.tcgetattr(0); k = listen(live, sys.stdin, TerminalScreen());"
         "during = termios.tcgetattr(0)\n"
@@ -129,7 +130,8 @@ def test_a_true_terminal_gives_single_keys_and_is_put_back_as_it_was() -> None:
 def test_a_terminal_gives_single_keys_again_after_ctrl_z() -> None:
     """The test is the shell: stops the program, has lines itself, and lets it go on."""
     program = (
-        "import sys, time; from live.run.keyboard import listen; from live.ui.terminal.screen import TerminalScreen;"
+        "import sys, time; from live.commands.attended import listen;"
+        " from live.ui.terminal.screen import TerminalScreen;"
         "from tests.live.run.test_control import FakeLive; live = FakeLive();"
         "k = listen(live, sys.stdin, TerminalScreen())\n"
         "while not live.calls: time.sleep(0.01)\n"
@@ -188,7 +190,7 @@ class FakeTerminal:
 
 
 def keyboard(monkeypatch: pytest.MonkeyPatch, terminal: FakeTerminal | None, lines: str = "") -> Any:
-    monkeypatch.setattr("live.run.keyboard.terminal_of", lambda stream: terminal)
+    monkeypatch.setattr("live.commands.attended.terminal_of", lambda stream: terminal)
     live, printed = FakeLive(), list[str]()
     screen: Any = SimpleNamespace(print=printed.append, prompt=lambda text: None)
     return SimpleNamespace(board=Keyboard(live, io.StringIO(lines), screen), live=live, printed=printed)

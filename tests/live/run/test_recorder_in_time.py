@@ -17,10 +17,10 @@ from live.config.loading import load_config
 from live.pipeline.consumer import Screen
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import FrameCounts, RunState
+from live.run import recorder
 from live.run.control import STOP
 from live.run.outcome import StopSignal
-from live.run.recording import recorder as module
-from live.run.recording.recorder import Recorder, _announce_disk, open_recording
+from live.run.recorder import Recorder, _announce_disk, open_recording
 from tests.live.fakes import frame
 from tests.live.made_up import make_measurement
 from tests.live.run.test_recording import FakeBurstWriter, FakeWriter, RecordingSetup, recorder_of
@@ -33,10 +33,10 @@ class Opened:
         self.given: dict[str, Any] = {}
         self.state, self.stop = RunState.new(0.5), StopSignal()
         for kind in ("SessionWriter", "RotatingWriter"):
-            monkeypatch.setattr(module, kind, lambda *given, kind=kind: (kind, *given))
-        monkeypatch.setattr(module, "Recorder", self._recorder)
-        monkeypatch.setattr(module, "forecast", lambda path, rate: 600.0)
-        monkeypatch.setattr(module, "network_share", lambda path: "")
+            monkeypatch.setattr(recorder, kind, lambda *given, kind=kind: (kind, *given))
+        monkeypatch.setattr(recorder, "Recorder", self._recorder)
+        monkeypatch.setattr(recorder, "forecast", lambda path, rate: 600.0)
+        monkeypatch.setattr(recorder, "network_share", lambda path: "")
         camera = CameraInfo("a:", "a", 100, 80, 8, live, "device", fps=10.0)
         prepared: Any = SimpleNamespace(
             config=load_config(None, {f"record.{key}": value for key, value in settings.items()}),
@@ -99,10 +99,10 @@ def test_room_for_less_than_half_an_hour_is_a_warning(
 ) -> None:
     printed: list[str] = []
     monkeypatch.setattr(Screen, "print", lambda self, text="": printed.append(text))
-    monkeypatch.setattr(module, "forecast", lambda path, rate: room_s)
-    monkeypatch.setattr(module, "network_share", lambda path: "nfs")
+    monkeypatch.setattr(recorder, "forecast", lambda path, rate: room_s)
+    monkeypatch.setattr(recorder, "network_share", lambda path: "nfs")
     camera = CameraInfo("a:", "a", 1000, 500, 8, True, "device", fps=fps)
-    assert _announce_disk(Path("run/session.h5"), camera, module.RecordMode(), Screen()) == room_s
+    assert _announce_disk(Path("run/session.h5"), camera, recorder.RecordMode(), Screen()) == room_s
     assert printed == [words, "warning: run is on a network share (nfs); a local disk is safer"]
 
 
@@ -124,7 +124,7 @@ def test_clocks_are_compared_each_minute_and_the_disk_each_five_seconds(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     rates: list[float] = []
-    monkeypatch.setattr(module, "forecast", lambda path, rate: rates.append(rate) or 200.0)
+    monkeypatch.setattr(recorder, "forecast", lambda path, rate: rates.append(rate) or 200.0)
     writer, health = ClockWriter(), RunState.new(0.5).health
     one = Recorder(writer, FrameCounts(), EventLog(), 10**6, health=health, now=lambda: 100.0)  # type: ignore[arg-type]
     one.close({})
@@ -142,7 +142,7 @@ def test_clocks_are_compared_each_minute_and_the_disk_each_five_seconds(
 def test_a_disk_that_lasts_less_than_three_minutes_is_told(
     monkeypatch: pytest.MonkeyPatch, seconds: float, warned: bool
 ) -> None:
-    monkeypatch.setattr(module, "forecast", lambda path, rate: seconds)
+    monkeypatch.setattr(recorder, "forecast", lambda path, rate: seconds)
     one, _, _, event_log = recorder_of("all")
     one._check_disk(2.0)
     one.close({})

@@ -18,8 +18,8 @@ from live.pipeline.consumer import Screen
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import FrameCounts
 from live.run.control import START, STOP, ControlRefused
-from live.run.recording.pre_trigger import PreTrigger, PreTriggerBuffer
-from live.run.recording.recorder import Recorder, _announce_disk
+from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
+from live.run.recorder import Recorder, _announce_disk
 from tests.live.fakes import frame
 from tests.live.made_up import make_measurement
 from tests.live.ui.waiting import LONG_S
@@ -164,7 +164,7 @@ def test_a_disk_that_fills_is_told_once_until_it_has_room_again(monkeypatch: pyt
         rates.append(rate)
         return next(seconds)
 
-    monkeypatch.setattr("live.run.recording.recorder.forecast", forecast)
+    monkeypatch.setattr("live.run.recorder.forecast", forecast)
     one, _, _, event_log = recorder_of("all")
     for _ in range(4):
         one._check_disk(2.0)
@@ -352,8 +352,8 @@ def test_the_room_on_the_disk_is_announced_for_the_bytes_that_are_recorded(
 ) -> None:
     printed: list[str] = []
     monkeypatch.setattr(Screen, "print", lambda self, text="": printed.append(text))
-    monkeypatch.setattr("live.run.recording.recorder.forecast", lambda path, per_s: 45e9 / per_s)
-    monkeypatch.setattr("live.run.recording.recorder.network_share", lambda path: "")
+    monkeypatch.setattr("live.run.recorder.forecast", lambda path, per_s: 45e9 / per_s)
+    monkeypatch.setattr("live.run.recorder.network_share", lambda path: "")
     camera = CameraInfo("a:", "a", 1000, 500, bits, True, "device", fps=50.0)
     found = _announce_disk(Path("session.h5"), camera, RecordMode.parse(mode), Screen())
     assert found == pytest.approx(45e3 / rate)

@@ -13,7 +13,7 @@ from acquire.frame import Frame
 from live.pipeline.event_log import EventLog
 from live.pipeline.reference import ReferenceBurst
 from live.pipeline.run_state import RunState
-from live.run.recording.pre_trigger import PreTrigger, PreTriggerBuffer
+from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
 from live.run.sources import CameraSource, GrabPlan
 from live.stream.stream import ReferenceWanted, Stream
 from tests.live.fakes import ListCamera, frame

@@ -12,12 +12,12 @@ import pytest
 from acquire.errors import ConfigError
 from analysis import COMPILE_PARTS, Roi, ZoiGrid
 from analysis.optics import Readout
+from live.commands.readout import rounded_ms
 from live.config.loading import Config, load_config
 from live.setup import compiling
 from live.setup.check import check_list
 from live.setup.grid import auto_gauges, grid_for, plates_for, whole_picture
 from live.setup.lens import lens_for
-from live.setup.readout import rounded_ms
 from live.setup.region import Region
 from live.setup.specimen_drawing import (
     BACKGROUND,

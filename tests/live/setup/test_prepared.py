@@ -16,17 +16,17 @@ from acquire.frame import CameraInfo
 from acquire.load_cell.contract import ZeroedLoadCell
 from analysis import StrainField
 from analysis.optics import Readout
+from live.commands import readout as readout_module
+from live.commands.readout import from_lamp, from_motion
 from live.config.loading import load_config
 from live.setup import devices as devices_module
 from live.setup import prepared as prepared_module
-from live.setup import readout as readout_module
 from live.setup.check.sample import FrameStack
 from live.setup.compiling import progress_text
 from live.setup.devices import _open_cropped, at_rest, open_rig
 from live.setup.dry_run import _image, picture_kinds
 from live.setup.pictures import correction, mask_picture, read_mask, with_mask
 from live.setup.prepared import MeasurePlan, PreparedKernel, _focal_px
-from live.setup.readout import from_lamp, from_motion
 from live.setup.region import FirstLook, Region
 from live.setup.rig_proposal import Proposal
 from tests.live.fakes import ListCamera, frame

@@ -8,8 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from acquire.camera.contract import Camera
-from acquire.camera.opening import open_camera
+from acquire.camera.contract import Camera, open_camera
 from acquire.events import Event
 from acquire.frame import Frame
 from tests.v4l2.inside import vivid

@@ -8,7 +8,7 @@ from itertools import islice, pairwise
 import numpy as np
 import pytest
 
-from acquire.camera.opening import open_camera
+from acquire.camera.contract import open_camera
 from acquire.v4l2.formats import FORMATS, PixelFormat
 from tests.v4l2.inside import vivid
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from numpy.typing import NDArray
 
-from acquire.camera.opening import open_camera
+from acquire.camera.contract import open_camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.v4l2.listing import list_cameras
 from live.cli import main

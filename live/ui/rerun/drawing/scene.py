@@ -1,7 +1,4 @@
-"""Draws a test with rerun: pictures, maps, curves, events and status, once for all sinks.
-
-Threads, processes and servers are elsewhere. Rates are per second of the test (``sinks``).
-"""
+"""Draws a test with rerun: pictures, maps, curves, events and status, once for all sinks, at rates of test time."""
 
 from __future__ import annotations
 
@@ -19,7 +16,6 @@ from live.pipeline.queues import Thinned
 from live.results.maps.colours import LINES, LINES_ON_DARK, number
 from live.results.maps.painting import FieldMaps, Painted
 from live.results.maps.scale import AutoRange, ColourScale, range_kind
-from live.ui.rerun.drawing.curve import MAX_POINTS, CurveDrawing
 from live.ui.rerun.drawing.layout import (
     BAR_GAP,
     BAR_HEIGHT,
@@ -27,7 +23,9 @@ from live.ui.rerun.drawing.layout import (
     BAR_TOP,
     BAR_WIDTH,
     LETTER,
+    MAX_POINTS,
     VALUES,
+    CurveDrawing,
     bar_unit,
     gauge_path,
     paint,

@@ -14,7 +14,7 @@ from acquire.errors import DataError, DeviceError, PhasedicError
 from acquire.events import Event
 from acquire.frame import CameraInfo, Frame
 from acquire.system import lower_priority
-from acquire.text.printable import brief, printable
+from acquire.text.message import brief, printable
 from live.pipeline.latency import OUTPUT
 from live.setup.pictures import camera_of
 from live.ui.web.setup.config_draft import ConfigDraft

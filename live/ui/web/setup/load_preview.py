@@ -7,10 +7,11 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 from acquire.addresses import parse_address
+from acquire.clock import Clock
 from acquire.errors import DataError, PhasedicError
 from acquire.events import Event
 from acquire.load_cell import LoadCell
@@ -18,7 +19,7 @@ from acquire.load_cell.check import ListenResult, LoadReport, report, stillness
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.system import lower_priority
 from acquire.text import Message
-from acquire.text.printable import brief, printable
+from acquire.text.message import brief, printable
 from live.pipeline.latency import OUTPUT
 from live.pipeline.timed.figure import OLD_S
 from live.setup.check.lines import CheckLine
@@ -47,7 +48,7 @@ class LoadPreview:
     info : LoadCellInfo or None
     """
 
-    def __init__(self, draft: ConfigDraft, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, draft: ConfigDraft, clock: Clock = time.monotonic) -> None:
         self._draft, self._clock = draft, clock
         self.info: LoadCellInfo | None = None
         self._cell: LoadCell | None = None

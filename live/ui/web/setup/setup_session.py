@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from acquire.frame import CameraInfo, Frame
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from live.config.cameras import BACK
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST
@@ -28,8 +28,7 @@ from live.setup.scale import Board, Scale, from_board
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.map_view import as_jpeg, gauge_shapes, mark_saturated, plate_shapes, shrunk
 from live.ui.web.setup.camera_preview import CameraPreview
-from live.ui.web.setup.config_draft import ConfigDraft
-from live.ui.web.setup.device_lists import DeviceLists
+from live.ui.web.setup.config_draft import ConfigDraft, DeviceLists
 from live.ui.web.setup.load_preview import LoadPreview
 from live.ui.web.setup.specimen_check import SpecimenCheck, camera_values, quality_colours, recent_stack
 from live.ui.web.setup.specimen_region import DrawnRegion, SpecimenRegion

@@ -19,7 +19,7 @@ from acquire.errors import PhasedicError
 from acquire.frame import CameraInfo, Frame
 from acquire.system import lower_priority
 from acquire.text import Message
-from acquire.text.printable import brief, printable
+from acquire.text.message import brief, printable
 from live.config.sections import DEFAULT_REFERENCE_BURST
 from live.pipeline.consumer import Screen
 from live.pipeline.latency import OUTPUT

@@ -25,11 +25,10 @@ from live.replay.batch.campaign import (
     run_campaign,
     write_summary,
 )
-from live.replay.batch.keys import _pictures, _source, key_of
 from live.replay.batch.row import COLUMNS, BatchRow
 from live.replay.batch.scheduler import ChunkPlan, perform_all
 from live.replay.batch.task import ROW_FILE, Task
-from live.replay.batch.test_list import BatchJob, find_tests
+from live.replay.batch.test_list import BatchJob, _of_source, _pictures, find_tests, key_of
 from live.replay.batch.worker import Pool
 from tests.live.screens import RecordingScreen
 
@@ -167,12 +166,12 @@ def test_pictures_are_those_of_a_folder_a_file_or_a_glob_in_order(tmp_path: Path
     assert [path.name for path in _pictures(tmp_path)] == ["a.png", "b.png", "c.tif"]
     assert [path.name for path in _pictures(tmp_path / "c.tif")] == ["c.tif"]
     assert [path.name for path in _pictures(tmp_path / "*.png")] == ["a.png", "b.png"]
-    settings, stamps = _source(f"files:{tmp_path}/*.png?gray=luma")
+    settings, stamps = _of_source(f"files:{tmp_path}/*.png?gray=luma")
     assert settings == {"gray": "luma"}
     about = (tmp_path / "a.png").stat()
     assert stamps[0] == ["a.png", 5, about.st_mtime_ns]
     os.utime(tmp_path / "a.png", (1, 1))
-    assert _source(f"files:{tmp_path}/*.png?gray=luma")[1] != stamps
+    assert _of_source(f"files:{tmp_path}/*.png?gray=luma")[1] != stamps
 
 
 def test_a_list_may_name_its_tests_and_has_paths_beside_it(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ import pytest
 from acquire.errors import ConfigError
 from live.cli import main
 from live.replay.batch import cluster
-from live.replay.batch.keys import deciding_versions
+from live.replay.batch.test_list import deciding_versions
 from live.replay.batch.worker import NEEDED
 from live.results import Strain
 from tests.live.replay.batch.conftest import SETTINGS

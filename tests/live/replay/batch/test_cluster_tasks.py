@@ -14,10 +14,10 @@ import pytest
 from acquire.errors import ConfigError, DataError
 from live.replay.batch import cluster
 from live.replay.batch.cluster import Cluster, advice, check, check_scheduler
-from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow
 from live.replay.batch.scheduler import perform_all
 from live.replay.batch.task import ROW_FILE, Task, TaskProgress
+from live.replay.batch.test_list import deciding_versions
 from live.replay.batch.worker import NEEDED, compile_on_worker
 from tests.live.screens import RecordingScreen
 

@@ -13,9 +13,8 @@ from typing import Any
 import pytest
 
 from acquire.errors import ConfigError, DataError, PhasedicError
-from live.replay.batch.keys import key_of, key_of_chunk
 from live.replay.batch.task import Task, staging_dirs, sweep
-from live.replay.batch.test_list import find_tests
+from live.replay.batch.test_list import find_tests, key_of, key_of_chunk
 
 
 @pytest.fixture

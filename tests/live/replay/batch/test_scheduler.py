@@ -14,7 +14,6 @@ import pytest
 
 from acquire.errors import DataError
 from live.replay.batch import scheduler as module
-from live.replay.batch.keys import key_of_chunk
 from live.replay.batch.row import BatchRow, failed, row_of_chunk
 from live.replay.batch.scheduler import (
     BatchProgress,
@@ -26,6 +25,7 @@ from live.replay.batch.scheduler import (
     sweep_chunks,
 )
 from live.replay.batch.task import FIELDS_FILE, Task, TaskProgress, _host, staging_dir
+from live.replay.batch.test_list import key_of_chunk
 from tests.live.screens import RecordingScreen
 
 

@@ -18,11 +18,10 @@ from acquire.errors import ConfigError, DataError
 from analysis import PICTURE_KINDS, warm_up
 from live.replay.batch import campaign, worker
 from live.replay.batch.campaign import CampaignRequest, run_campaign
-from live.replay.batch.keys import longest_first
 from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.scheduler import perform_all
 from live.replay.batch.task import Task, TaskProgress
-from live.replay.batch.test_list import find_tests
+from live.replay.batch.test_list import find_tests, longest_first
 from live.replay.batch.worker import NEEDED, ONE_THREAD, Pool, WorkerProcess, WorkerProcesses, describe_worker
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.replay.batch.running import is_gone

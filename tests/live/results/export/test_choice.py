@@ -83,7 +83,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing(
         if next(ticks) > 2:
             raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("live.results.export.grids.image", lambda *_: full() or b"")  # type: ignore[func-returns-value]
+    monkeypatch.setattr("live.results.export.maps.image", lambda *_: full() or b"")  # type: ignore[func-returns-value]
     with pytest.raises(DataError, match="No space left on device"):
         export(run, ExportRequest("vtk", tmp_path / "vtk"), Screen())
     assert list(tmp_path.iterdir()) == []

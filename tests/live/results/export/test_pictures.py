@@ -14,7 +14,7 @@ from acquire.errors import ConfigError, DataError
 from analysis.field.strain_field import StrainField
 from live.cli import main
 from live.config.new_files import new_file
-from live.results.export import films
+from live.results.export import maps
 from live.results.export.formats import FORMATS, ExportRequest, export
 from live.results.export.job import ExportJob, ExportOptions, chosen_rows
 from live.results.maps.painting import Levels, Painter
@@ -83,7 +83,7 @@ def test_a_gif_stays_below_its_limit(run_dir: Path, tmp_path: Path, monkeypatch:
     words = ["export", str(run_dir), "--to", "gif", "--from", "1", "--out"]
     assert main([*words, str(tmp_path / "free.gif")]) == 0
     free = (tmp_path / "free.gif").stat().st_size
-    monkeypatch.setattr(films, "MAX_GIF_BYTES", free // 2)
+    monkeypatch.setattr(maps, "MAX_GIF_BYTES", free // 2)
     assert main([*words, str(tmp_path / "small.gif")]) == 0
     assert 1000 < (tmp_path / "small.gif").stat().st_size <= free // 2
 

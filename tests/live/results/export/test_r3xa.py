@@ -13,7 +13,7 @@ import pytest
 from acquire.load_sample import LoadCellInfo
 from live.pipeline.consumer import Screen
 from live.results.export.job import ExportJob
-from live.results.export.r3xa import VERSION, describe
+from live.results.export.tables import VERSION, describe
 from live.results.quantities import Display
 from live.results.run_folder import RunFolder
 from tests.live.made_run import force_of

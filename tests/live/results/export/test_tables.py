@@ -15,7 +15,7 @@ from scipy.io import loadmat
 from acquire.errors import ConfigError
 from analysis.field import Status
 from live.pipeline.consumer import Screen
-from live.results.export import films, grids
+from live.results.export import maps
 from live.results.export.formats import ExportRequest, export
 from live.results.export.job import ExportJob, ExportOptions
 from live.results.quantities import Display, mean_name, quantity_of
@@ -196,10 +196,10 @@ def test_a_tiff_of_more_than_four_gigabytes_is_refused(
     pytest.importorskip("tifffile")
     rows, columns = run.strain.grid.shape
     size = N * (4 * rows * columns + 256)
-    monkeypatch.setattr(grids, "_MAX_BYTES", size - 1)
+    monkeypatch.setattr(maps, "_MAX_BYTES", size - 1)
     with pytest.raises(ConfigError, match=f"12 maps of {columns} x {rows} are more than 4 GB"):
         exported(run, tmp_path / "e.tif", "tiff")
-    monkeypatch.setattr(grids, "_MAX_BYTES", size)
+    monkeypatch.setattr(maps, "_MAX_BYTES", size)
     exported(run, tmp_path / "e.tif", "tiff")
 
 
@@ -215,7 +215,7 @@ def test_films_run_at_their_rate(run: RunFolder, tmp_path: Path, fps: float) -> 
 
 def framed(run: RunFolder, **options: Any) -> list[np.ndarray]:
     job = ExportJob(run, ("eyy",), (0, N - 1), Display(), Screen(), ExportOptions(**options))
-    return [image for _, image in films._frames(job)]
+    return [image for _, image in maps._frames(job)]
 
 
 def test_pictures_lie_under_the_map_or_plain_grey(run: RunFolder) -> None:

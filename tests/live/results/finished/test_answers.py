@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from live.config.sections import SpecimenConfig
-from live.results.finished.answers import MeasuredAgain, checks_line, missing_lines
+from live.results.finished.figures_file import MeasuredAgain, checks_line, missing_lines
 from live.results.finished.findings import findings
 from live.results.finished.finished_test import FinishedTest
 from live.results.report.report import ReportRequest, make_report

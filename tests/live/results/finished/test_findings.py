@@ -17,7 +17,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.run_state import RunState
 from live.results.finished.findings import SHOWN, doubts, findings
 from live.results.finished.finished_test import FinishedTest
-from live.results.finished.readings import Readings
+from live.results.stored_fields import Readings
 from live.words.language import LANGUAGES, said
 from tests.live.made_run import finished
 from tests.live.made_up import in_ascii, make_measurement

@@ -12,12 +12,12 @@ import pytest
 
 from analysis.evaluate import Figure, true_curve
 from live.results.finished.finished_test import FinishedTest
-from live.results.finished.readings import Readings
 from live.results.maps.colours import MICROSTRAIN
 from live.results.report import curves
 from live.results.report.curves import load_unit, strain_unit, stress_strain, true_stress_strain
 from live.results.report.evaluation import EvaluatedCurve, neck_line, time_steps
 from live.results.run_folder import open_run
+from live.results.stored_fields import Readings
 from tests.live.made_run import CONFIG, E_PA, GAUGES, PULLED, force_of, make_run
 
 N = len(PULLED)
@@ -175,7 +175,7 @@ def test_the_lag_is_found_from_readings_since_the_start(
 ) -> None:
     given: list[Any] = []
     monkeypatch.setattr(
-        "live.results.finished.readings.find_lag",
+        "live.results.stored_fields.find_lag",
         lambda *tracks: given.append(tracks) or Figure.none(""),
     )
     with open_run(run_dir) as run:

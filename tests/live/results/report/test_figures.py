@@ -21,8 +21,7 @@ from live.results.finished.finished_test import FinishedTest
 from live.results.report import several as comparison
 from live.results.report.curves import force_unit, stress_strain, valid_share
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, time_steps
-from live.results.report.practice import PracticeValues, reporting_table
-from live.results.report.record import times
+from live.results.report.record import PracticeValues, reporting_table, times
 from live.results.report.report import Report, ReportRequest, make_report
 from live.results.report.several import _quoted as quoted
 from live.results.report.several import summary

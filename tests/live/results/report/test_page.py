@@ -17,7 +17,7 @@ from analysis.evaluate import NoiseFloor
 from live.cli import main
 from live.commands import report as command
 from live.results.report.page import Html, safe
-from live.results.report.practice import PracticeValues, reporting_table
+from live.results.report.record import PracticeValues, reporting_table
 from live.results.report.report import ReportRequest, make_report
 from live.results.report.saving import find_browser
 from live.results.report.svg import MAX_POINTS, Plot, PlotLine, draw

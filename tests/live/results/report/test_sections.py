@@ -26,8 +26,15 @@ from live.results.maps.scale import ColourScale
 from live.results.report import record, report
 from live.results.report.evaluation import EvaluatedCurve, still_phase_of
 from live.results.report.maps import _bar, map_pictures, maps, statuses
-from live.results.report.practice import PracticeValues, reporting_table
-from live.results.report.record import events, gauges, hashes, times, version_table
+from live.results.report.record import (
+    PracticeValues,
+    events,
+    gauges,
+    hashes,
+    reporting_table,
+    times,
+    version_table,
+)
 from live.results.report.report import ReportRequest, make_report, tensile
 from live.results.run_folder import RunFolder, open_run
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run

@@ -18,8 +18,7 @@ from acquire.events import Event, EventKind
 from analysis.field import StrainField
 from analysis.field.grid import Roi, ZoiGrid
 from live.pipeline.snapshot import Snapshot
-from live.ui.rerun.drawing.curve import CurveDrawing, force_axis, strain_axis, stress_axis
-from live.ui.rerun.drawing.layout import blueprint
+from live.ui.rerun.drawing.layout import CurveDrawing, blueprint, force_axis, strain_axis, stress_axis
 from live.ui.rerun.drawing.scene import ViewScene
 from live.ui.rerun.drawing.shapes import (
     ArrowScale,

@@ -17,8 +17,17 @@ from acquire.events import Event, EventKind
 from analysis.field import StrainField
 from live.pipeline.snapshot import Snapshot
 from live.results.maps.colours import diverging_table, sequential_table
-from live.ui.rerun.drawing.curve import CurveDrawing, force_axis, rounded, strain_axis, stress_axis
-from live.ui.rerun.drawing.layout import BAR_HEIGHT, BAR_LABEL, BAR_TOP, blueprint
+from live.ui.rerun.drawing.layout import (
+    BAR_HEIGHT,
+    BAR_LABEL,
+    BAR_TOP,
+    CurveDrawing,
+    blueprint,
+    force_axis,
+    rounded,
+    strain_axis,
+    stress_axis,
+)
 from live.ui.rerun.drawing.scene import ViewScene
 from live.ui.rerun.drawing.sinks import _columns
 from live.ui.rerun.messages import LargeFigures, PictureMessage, ViewSetup

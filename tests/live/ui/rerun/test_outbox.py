@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 
 from acquire.events import Event, EventKind
-from acquire.text.printable import printable
+from acquire.text.message import printable
 from acquire.text.quantity import Amount
+from live.commands import show
+from live.commands.show import ShowRequest, selected_rows, view_setup
 from live.pipeline.snapshot import Snapshot
-from live.results.finished.readings import Readings
 from live.results.run_folder import RunFolder, open_run
-from live.ui.rerun import playback, view
+from live.results.stored_fields import Readings
+from live.ui.rerun import view
 from live.ui.rerun.messages import (
     ViewSetup,
     ViewTarget,
@@ -28,7 +30,6 @@ from live.ui.rerun.messages import (
     setup_of,
 )
 from live.ui.rerun.outbox import Outbox, Pending
-from live.ui.rerun.playback import ShowRequest, selected_rows, view_setup
 from live.ui.rerun.view import View, remote_access, url, viewer_failure
 from live.ui.rerun.wire import Kind, Parcel
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
@@ -223,16 +224,16 @@ def test_the_settings_and_the_words_of_a_finished_run(tmp_path: Path) -> None:
         assert (setup.title, setup.width, setup.height, setup.bits) == ("S1", 128, 96, 12)
         assert (setup.start_monotonic, setup.axis, setup.finished) == (0.0, "y", True)
         assert setup.area_m2 == pytest.approx(20e-6)
-        words = playback._status(run)
+        words = show._status(run)
         axial = run.gauges["axial"]
         assert words.startswith("**S1**, 96 instants, 33 of 34 ZOIs at the end\n\n")
         assert f"gauge **axial** {Amount('strain', axial.value[-1], axial.sigma[-1])} at the end" in words
-        means, *_, loads = playback._curves(run)
+        means, *_, loads = show._curves(run)
         assert rows_of(means)[3][3:5] == (run.strain.values["eyy"][3], run.strain.values["sigma_eyy"][3])
         assert [row[0] for row in rows_of(loads)][:3] == pytest.approx([0.0, 0.1, 0.2], abs=1e-9)
         run.__dict__["readings"] = Readings(lambda: iter(()))
         run.strain.values["force_N"][1] = np.nan
-        *_, loads = playback._curves(run)
+        *_, loads = show._curves(run)
         assert [row[0] for row in rows_of(loads)][:2] == pytest.approx([0.0, 0.2])
         run.__dict__["pictures"] = None
         plain = view_setup(run)
@@ -245,13 +246,13 @@ def test_as_many_instants_as_the_viewer_keeps(tmp_path: Path, monkeypatch: pytes
         # A third of the sides is drawn, 0.35 byte a pixel, and 250 bytes a ZOI.
         each = 0.35 * 3000 * 1000 / 9 + 250 * 34
         for limit, every in ((20 * each, 1), (19.9 * each, 2), (10 * each, 2), (9.9 * each, 3)):
-            monkeypatch.setattr(playback, "MAX_BYTES", limit)
+            monkeypatch.setattr(show, "MAX_BYTES", limit)
             assert selected_rows(run, ShowRequest()) == tuple(range(19, -1, -every))[::-1]
 
 
 def test_means_have_levels_of_the_camera() -> None:
     for bits, kind in ((8, np.uint8), (12, np.uint16)):
-        frame = playback._frame(np.array([[1.4, 1.6]]), 2.5, bits)
+        frame = show._frame(np.array([[1.4, 1.6]]), 2.5, bits)
         assert (
             frame.image.dtype == kind
             and frame.image.tolist() == [[1, 2]]
@@ -262,11 +263,11 @@ def test_means_have_levels_of_the_camera() -> None:
 def test_what_is_missing_is_told() -> None:
     screen = RecordingScreen()
     run: Any = SimpleNamespace(strain=SimpleNamespace(n=5), pictures=None, notes=())
-    playback._report_selection(5, run, screen)
+    show._report_selection(5, run, screen)
     run.notes = ("why",)
-    playback._report_selection(4, run, screen)
-    playback._notify(screen, "a word", "info")
-    playback._notify(screen, "a word", "warning")
+    show._report_selection(4, run, screen)
+    show._notify(screen, "a word", "info")
+    show._notify(screen, "a word", "warning")
     first, second, third, *told = screen.lines
     assert first.endswith("are not here any more; maps alone") and second.startswith(
         "4 of 5 instants are shown"

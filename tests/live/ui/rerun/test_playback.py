@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from live.cli import main
+from live.commands.show import ShowRequest, playback_messages, selected_rows, show, view_setup
 from live.pipeline.consumer import Screen
 from live.results.run_folder import RunFolder, open_run
 from live.ui.rerun.messages import events_of, field_of, picture_of, rows_of
-from live.ui.rerun.playback import ShowRequest, playback_messages, selected_rows, show, view_setup
 from live.ui.rerun.wire import Kind
 from tests.live.ended import code_of
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
@@ -114,7 +114,7 @@ def test_it_serves_until_it_is_stopped(run: RunFolder) -> None:
                 stop.set()
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("live.ui.rerun.playback.spawn_viewer", lambda port, notify: None)
+        patch.setattr("live.commands.show.spawn_viewer", lambda port, notify: None)
         show(run, ShowRequest(every=40), RecordingScreen(), stop, port=19876)
     assert any("this shows it, Ctrl-C ends it" in line for line in lines)
     assert lines[0] == "3 of 96 instants are shown; --from, --to and --every choose others"
@@ -136,7 +136,7 @@ def test_which_rows_are_shown(run: RunFolder, shown: ShowRequest, rows: tuple[in
 def test_a_long_run_is_thinned_to_what_the_viewer_keeps(
     run: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("live.ui.rerun.playback.MAX_BYTES", 1e5)
+    monkeypatch.setattr("live.commands.show.MAX_BYTES", 1e5)
     rows = selected_rows(run, ShowRequest())
     assert 1 < len(rows) < 20
     assert rows[-1] == N - 1

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from live.ui.rerun import supervisor
-from live.ui.rerun.drawing import proxy as viewer_proxy
-from live.ui.rerun.drawing.proxy import ViewerProxy, hidden_address, host_allowed
+from live.ui.rerun.drawing import sinks
+from live.ui.rerun.drawing.sinks import ViewerProxy, hidden_address, host_allowed
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.supervisor import RenderProcess, Stuck, Supervisor
 from live.ui.rerun.wire import Kind, Parcel
@@ -261,7 +261,7 @@ def test_it_passes_on_both_ways_and_refuses_foreign_pages(server: socket.socket)
 def ended(viewer: socket.socket, proxy: ViewerProxy) -> bool:
     """Whether the proxy disconnects a viewer that receives nothing while more and more is drawn."""
     for k in range(1, 40):
-        proxy.drawn(k * (viewer_proxy.STOPPED_BYTES + 1))
+        proxy.drawn(k * (sinks.STOPPED_BYTES + 1))
         try:
             return viewer.recv(100) == b""
         except TimeoutError:
@@ -272,7 +272,7 @@ def ended(viewer: socket.socket, proxy: ViewerProxy) -> bool:
 
 
 def test_a_stopped_viewer_is_disconnected(server: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(viewer_proxy, "STOPPED_S", 0.2)
+    monkeypatch.setattr(sinks, "STOPPED_S", 0.2)
     messages: list[str] = []
     proxy = opened(server, messages)
     with socket.create_connection(("127.0.0.1", proxy.port), 10) as viewer:
@@ -289,7 +289,7 @@ def test_a_stopped_viewer_is_disconnected(server: socket.socket, monkeypatch: py
 def test_no_two_proxies_have_one_port() -> None:
     first = ViewerProxy(0, print)
     second = ViewerProxy(first.port, print)
-    assert first.port < second.port < first.port + viewer_proxy.TRIES
+    assert first.port < second.port < first.port + sinks.TRIES
     first.close()
     second.close()
     with pytest.raises(OSError, match="no free port from 65536"):

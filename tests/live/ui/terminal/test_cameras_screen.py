@@ -17,8 +17,15 @@ from live.pipeline.consumer import ConsumerReport
 from live.pipeline.run_state import FrameCounts, RunState
 from live.pipeline.snapshot import Snapshot
 from live.results.summary import StatusCard, file_lines
-from live.ui.terminal.screen import CamerasScreen, TerminalScreen
-from live.ui.terminal.status_line import cameras_line, fitted, gauge_texts, status_line, strain_text
+from live.ui.terminal.screen import (
+    CamerasScreen,
+    TerminalScreen,
+    cameras_line,
+    fitted,
+    gauge_texts,
+    status_line,
+    strain_text,
+)
 from live.ui.terminal.summary import print_summary, trouble_lines
 from tests.live.made_run import finished
 from tests.live.made_up import START, figures, in_ascii, make_loads, make_measurement

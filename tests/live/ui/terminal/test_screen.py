@@ -17,8 +17,7 @@ from live.pipeline.measurement import TimeStep
 from live.pipeline.run_state import FrameCounts
 from live.pipeline.snapshot import Snapshot
 from live.results.figures import value_text
-from live.ui.terminal.screen import TerminalScreen
-from live.ui.terminal.status_line import status_line
+from live.ui.terminal.screen import TerminalScreen, status_line
 from tests.live.made_up import figures, in_ascii
 from tests.live.screens import Terminal
 

@@ -17,7 +17,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.consumer import ConsumerReport
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
-from live.results.finished.answers import MeasuredAgain, missing_lines
+from live.results.finished.figures_file import MeasuredAgain, missing_lines
 from live.results.summary import summary_lines
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.terminal.summary import brief_lines, print_summary, trouble_lines

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from live.ui.web.map_view import as_jpeg
-from live.ui.web.setup.device_lists import kinds_of_devices
+from live.ui.web.setup.config_draft import kinds_of_devices
 from live.words.language import entries
 from tests.live.ui.web.browser import Page
 from tests.live.ui.web.page_texts import STATIC

@@ -17,13 +17,11 @@ from live.config.loading import load_config
 from live.config.sections import AlarmConfig, SpecimenConfig
 from live.pipeline.run_state import RunState
 from live.results.figures import TensileRow
-from live.results.finished.answers import belief
+from live.results.finished.figures_file import belief
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.cameras_panel import FIGURES_S, CamerasPanel
-from live.ui.web.curve_history import CurveHistory
-from live.ui.web.limits import FigureLimits
 from live.ui.web.map_view import cells_box, cells_png
 from live.ui.web.page_consumer import PageConsumer
+from live.ui.web.run_panels import FIGURES_S, CamerasPanel, CurveHistory, FigureLimits
 from live.ui.web.run_result import MAX_TROUBLES, cameras_result, run_result
 from tests.live.made_run import E_PA, PULLED, THICKNESS_MM, WIDTH_MM, finished, force_of
 from tests.live.made_up import START, make_measurement

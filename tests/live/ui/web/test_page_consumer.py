@@ -25,9 +25,9 @@ from live.pipeline.run_state import RunState
 from live.stream.adapted import Adapted
 from live.stream.stream import Matched
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.curve_history import MAX_POINTS, CurveHistory
 from live.ui.web.map_view import RED, MapView, mark_saturated, plate_shapes, shrunk, traffic_light
 from live.ui.web.page_consumer import PageConsumer, elongation_length
+from live.ui.web.run_panels import MAX_POINTS, CurveHistory
 from tests.live.made_up import make_frame, make_measurement
 from tests.live.screens import StatedRun
 from tests.live.streaming import record_of

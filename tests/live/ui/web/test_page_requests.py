@@ -14,9 +14,9 @@ from analysis.field import Status
 from live.config.loading import load_config
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster, plain
-from live.ui.web.curve_history import CurveHistory
 from live.ui.web.map_view import MapView
 from live.ui.web.page_consumers import PageConsumers
+from live.ui.web.run_panels import CurveHistory
 from tests.live.made_up import make_grid
 from tests.live.ui.web.test_page_values import Run, pictured
 

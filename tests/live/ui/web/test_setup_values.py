@@ -19,9 +19,8 @@ from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.serial_line.ports import PortInfo
 from live.config.loading import load_config
 from live.setup.check.lines import CheckLine
-from live.ui.web.setup import device_lists, specimen_check
-from live.ui.web.setup.config_draft import ConfigDraft
-from live.ui.web.setup.device_lists import DeviceLists
+from live.ui.web.setup import config_draft, specimen_check
+from live.ui.web.setup.config_draft import ConfigDraft, DeviceLists
 from live.ui.web.setup.load_preview import LoadPreview
 from live.ui.web.setup.specimen_check import (
     SpecimenCheck,
@@ -148,13 +147,13 @@ def test_the_devices_that_can_be_chosen(tmp_path: Path, monkeypatch: pytest.Monk
     ]  # fmt: skip
     assert [one["address"] for one in loads[-2:]] == ["sim:", "none:"] and state["finding"] == ""
     finding = SimpleNamespace(address="/dev/ttyUSB0?baud=9600", protocol="ascii")
-    monkeypatch.setattr(device_lists.identify, "listen", lambda port: iter([(0, 0, None), (0, 0, finding)]))
+    monkeypatch.setattr(config_draft.identify, "listen", lambda port: iter([(0, 0, None), (0, 0, finding)]))
     for _ in range(2):
         lists._identify("/dev/ttyUSB0")
     assert lists.state()["loads"] == [{"address": finding.address, "name": "ascii"}, *loads]
     assert lists.state()["finding"] == "found: ascii; choose it in the list"
-    monkeypatch.setattr(device_lists.identify, "listen", lambda port: iter([(0, 0, None)]))
-    monkeypatch.setattr(device_lists.identify, "proposed", lambda line, received: None)
+    monkeypatch.setattr(config_draft.identify, "listen", lambda port: iter([(0, 0, None)]))
+    monkeypatch.setattr(config_draft.identify, "proposed", lambda line, received: None)
     lists._identify("/dev/ttyUSB0")
     assert lists.state()["finding"].startswith("nothing recognised")
 
@@ -165,7 +164,7 @@ def test_a_port_that_talks_and_is_not_understood_offers_a_pattern(
     lists = DeviceLists(drafted(tmp_path), cameras=list, ports=list)
     lines = b"".join(b"#%d;x=%.2f;ok\r\n" % (k % 7, 12.5 + k) for k in range(40))
     heard = [(9600, b"\x80\x13garbage", None), (19200, lines, None)]
-    monkeypatch.setattr(device_lists.identify, "listen", lambda port: iter(heard))
+    monkeypatch.setattr(config_draft.identify, "listen", lambda port: iter(heard))
     lists._identify("/dev/ttyUSB0")
     (offered,) = lists.state()["loads"]
     assert offered["name"] == "lines"

@@ -11,12 +11,12 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from acquire.clock import ClockPair
+from acquire.clock import Clock, ClockPair
 from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst, CameraInfo, Frame
@@ -33,8 +33,8 @@ from live.pipeline.timed.figure import TimedFigure
 from live.pipeline.timed.health import DISK_EVERY_S, Health
 from live.results.folder import versions
 from live.run.outcome import StopSignal
+from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
 from live.run.prepared_run import PreparedRun
-from live.run.recording.pre_trigger import PreTrigger, PreTriggerBuffer
 
 log = logging.getLogger(__name__)
 _SMALL = 512  # bytes counted for a sample or an event
@@ -152,7 +152,7 @@ class Recorder:
         waits: bool = False,
         stop: StopSignal | None = None,
         health: Health | None = None,
-        now: Callable[[], float] = time.monotonic,
+        now: Clock = time.monotonic,
     ) -> None:
         self._writer, self._frame_counts, self._event_log = writer, frame_counts, event_log
         self._buffer: BoundedQueue[Item] = BoundedQueue(limit, waits=waits)

@@ -19,7 +19,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.evaluate.area.affine import AffineFit, Places, affine_fit, covariance_of
+from analysis.evaluate.affine import AffineFit, Places, affine_fit, covariance_of
 from analysis.field import (
     PAIR_INDEX,
     CommonError,

@@ -25,8 +25,8 @@ from acquire.hdf5 import (
     read_attributes,
     reason,
 )
-from acquire.text.printable import printable
-from live.pipeline.timed.response import leaves_name, slope_name
+from acquire.text.message import printable
+from live.pipeline.timed.course import leaves_name, slope_name
 from live.results.quantities import quantity_of
 
 GROUP, CURRENT, CORRELATION, FATE = "response", "current", "correlation", "fate"

@@ -1,20 +1,104 @@
-"""When a message began: from the time a read returned, and from the speed of the line.
+"""What arrives on a serial line: an echo of the poll taken out, and when a message began.
 
-A read returns some time after the last of its bytes arrived; a byte before it came one byte time
-earlier (``ArrivalTimes``). ``ArrivalRate`` finds messages that waited somewhere. Where the device sends its own
-milliseconds ``acquire.clock`` replaces the arrival times.
+Two wires of RS-485 carry both directions, and many adapters hear themselves. An answer may also begin with the poll, or
+be equal to it, where no adapter echoes: what was sent is an echo only where the bytes behind it make more sense without
+it (``Echo``). A read returns some time after the last of its bytes arrived; a byte before it came one byte time earlier
+(``ArrivalTimes``). ``ArrivalRate`` finds messages that waited somewhere. Where the device sends its own milliseconds
+``acquire.clock`` replaces the arrival times.
 """
 
 from __future__ import annotations
 
+import copy
 import math
 import statistics
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from acquire.clock import ClockUnit
-from acquire.protocols.base import Reading
+from acquire.protocols.base import Parser, Reading
+from acquire.text import Message
+
+LIMIT = 1024  # bytes held
+DOUBT = Message("if the adapter echoes, the values are wrong: let the poll end with a line end")
+
+
+class Echo:
+    """Takes the echo out of what follows each poll.
+
+    Until it is known whether the adapter echoes, what begins like the poll is held until the answer behind it is
+    whole, or silence comes. Known, it is taken out as it comes, in pieces or at once.
+
+    Parameters
+    ----------
+    parser : Parser
+        That of the line, at the place where it is; copies of it try what the bytes mean.
+    report : callable taking level and text
+
+    Attributes
+    ----------
+    known : bool
+        The adapter echoes.
+    """
+
+    def __init__(self, parser: Parser, report: Callable[[str, str], None]) -> None:
+        self._parser, self._report = parser, report
+        self._sent = self._held = b""
+        self._told: set[str] = set()
+        self.known = False
+
+    def sent(self, data: bytes) -> None:
+        """A poll was sent, or a command among polls."""
+        self._sent += data
+
+    def take(self, data: bytes) -> bytes:
+        """What of the bytes that came, and of those held, goes on to the parser now."""
+        self._held += data
+        if not self._sent or len(self._held) > LIMIT:
+            return self.release()
+        if not (self._held.startswith(self._sent) or self._sent.startswith(self._held)):
+            self.known = False
+            return self.release()
+        rest = self._held[len(self._sent) :]
+        if len(self._held) < len(self._sent) or not (self.known or self._decided(rest)):
+            return b""
+        whole = self.release()
+        return rest if self.known else whole
+
+    def release(self) -> bytes:
+        """What is held: it is no echo."""
+        held, self._held, self._sent = self._held, b"", b""
+        return held
+
+    def _decided(self, rest: bytes) -> bool:
+        """Whether the answer is whole, with the echo or without."""
+        raw, bare = self._values(self._held), self._values(rest)
+        self.known = any(bare) and not (all(raw) and len(raw) == len(bare))
+        if self.known:
+            self._tell(
+                "info", Message("the adapter sends back what is sent to it (an echo): it is taken out")
+            )
+        elif any(bare):
+            self._tell(
+                "warning",
+                Message(
+                    "answers begin with the poll itself, {sent}, and are taken whole: {DOUBT}",
+                    repr(self._sent),
+                    DOUBT,
+                ),
+            )
+        return any(bare) or (bool(bare) and all(raw))
+
+    def _tell(self, level: str, text: str) -> None:
+        if text not in self._told:
+            self._told.add(text)
+            self._report(level, text)
+
+    def _values(self, data: bytes) -> list[bool]:
+        """Whether each reading in the bytes is a value."""
+        parser = copy.deepcopy(self._parser)
+        return [not math.isnan(reading.value) for reading in (*parser.feed(data), *parser.silence())]
 
 
 class ArrivalTimes:

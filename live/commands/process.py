@@ -1,6 +1,6 @@
-"""Environment variables: what numba and reproducible builds cannot use is refused, and where loops are kept.
+"""The process of a command: signals, environment variables, and standard streams that never block.
 
-Standard output and error that never block.
+What numba and reproducible builds cannot use of the environment is refused; loops are kept where it says.
 
 A terminal stopped with Ctrl-S, or a pipe that nobody reads, would block its writers: the measurement and, through
 the log, the grabbing of frames. Here a thread writes; writes beyond its queue are dropped and counted.
@@ -11,22 +11,79 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import signal
 import sys
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TextIO
+from types import FrameType
+from typing import TYPE_CHECKING, TextIO
 
 from acquire.errors import ConfigError
-from acquire.system import can_write, limit_memory_pools, private_folder
+from acquire.system import HANGUP, can_write, limit_memory_pools, private_folder, signal_handler
 from acquire.text import Message
+
+if TYPE_CHECKING:
+    from live.pipeline.consumer import Screen
 
 log = logging.getLogger(__name__)
 
 _LEAST = {"NUMBA_NUM_THREADS": 1, "SOURCE_DATE_EPOCH": 0}
 """Whole numbers in the environment for which numba ends the program where they are none."""
 _LAYERS = ("NUMBA_THREADING_LAYER", "NUMBA_THREADING_LAYER_PRIORITY")
+
+
+@contextlib.contextmanager
+def signals(stop: Callable[[], None], screen: Screen | None) -> Iterator[None]:
+    """SIGINT and SIGTERM call ``stop``, the third one kills; the loss of the terminal is ignored."""
+    times = 0
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        nonlocal times
+        times += 1
+        if times > 2:
+            signal.signal(number, signal.SIG_DFL)
+            signal.raise_signal(number)
+        again = Message("still closing; a third signal ends it at once")
+        if screen is not None:
+            screen.print(Message("closing the files ...") if times == 1 else again)
+        stop()
+
+    with signal_handler(handle, signal.SIGINT, signal.SIGTERM), signal_handler(signal.SIG_IGN, *HANGUP):
+        yield
+
+
+@contextlib.contextmanager
+def ended_by_sigterm() -> Iterator[None]:
+    """SIGTERM and the loss of the terminal end a command as Ctrl-C does, where it has no handler of its own.
+
+    A loss of the terminal that is ignored (nohup) stays so.
+    """
+
+    def end(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    heard = [number for number in HANGUP if signal.getsignal(number) != signal.SIG_IGN]
+    with signal_handler(end, signal.SIGTERM, *heard):
+        yield
+
+
+@contextlib.contextmanager
+def interrupts() -> Iterator[threading.Event]:
+    """An event that the first Ctrl-C sets; the second one ends the program, where nothing can be lost."""
+    stop = threading.Event()
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+        stop.set()
+
+    with signal_handler(handle, signal.SIGINT):
+        yield stop
 
 
 def limit_resources() -> None:

@@ -1,14 +1,36 @@
-"""Opening and closing devices in threads of their own, since a driver or a network may take as long as it likes."""
+"""Devices and files opened and closed: ``with`` closes at the end, and a driver or a network that takes as long as it
+likes is opened and closed by a thread of its own.
+"""
 
 from __future__ import annotations
 
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Generic, TypeVar
+from types import TracebackType
+from typing import Generic, Self, TypeVar
+
+from acquire.clock import Clock
 
 Opened = TypeVar("Opened")
 RETRY_S, LOOK_S = 0.5, 0.1
+
+
+class Closing(ABC):
+    """Base of context managers that end by ``close``; one that begins something on entry overrides that."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release what is held; idempotent."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
 
 class Opening(Generic[Opened]):
@@ -90,7 +112,7 @@ class Reopening(Generic[Opened]):
         failed: Callable[[Exception], object] = lambda error: None,
         *,
         after_s: float = 0.0,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Clock = time.monotonic,
     ) -> None:
         self._attempt, self._close, self._errors = attempt, close, errors
         self._sleep, self._failed, self._clock = sleep, failed, clock

@@ -26,14 +26,14 @@ from analysis.evaluate.programme import KindOfTest
 from analysis.evaluate.response import FIRST, NOT_USED, WINDOW, Departures, ResponseSums
 from analysis.picture.pattern import gauge_length
 from live.config.loading import Config
-from live.pipeline.timed.response import CHANNELS, MEAN, STRESS, TIME, leaves_name, slope_name
+from live.pipeline.timed.course import CHANNELS, MEAN, STRESS, TIME, leaves_name, slope_name
+from live.results.layout import gauge_columns
 from live.results.maps.scale import shown_unit
 from live.results.quantities import quantity_of
 from live.results.reader import Strain
-from live.results.response.stored import FATE, StoredResponse, fill_group, read_noise
-from live.results.row import gauge_columns
 from live.results.run_folder import STRAIN, RunFolder, open_run
 from live.results.stored_fields import window_of
+from live.results.stored_response import FATE, StoredResponse, fill_group, read_noise
 
 
 def response_title(strain: Strain, name: str) -> str:

@@ -1,1 +1,0 @@
-"""Basler cameras through the maker's pypylon (extra ``pylon``); ``genicam:`` opens the same cameras without it."""

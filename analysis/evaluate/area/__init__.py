@@ -1,1 +1,0 @@
-"""The strain of an area: one affine displacement field through all its ZOIs."""
