@@ -39,8 +39,8 @@ class EventKind(StrEnum):
 
 
 SOURCES = (
-    "alarm", "burst", "force", "measurement", "operator", "pattern", "phasedic", "picture", "plates", "recorder",
-    "reference", "region", "sharpness", "strain", "view",
+    "alarm", "burst", "force", "gauges", "measurement", "operator", "pattern", "phasedic", "picture", "plates",
+    "recorder", "reference", "region", "sharpness", "strain", "view",
 )  # fmt: skip
 """Parts of the program that events come from; other sources are addresses and names."""
 

@@ -22,7 +22,7 @@ from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
 from acquire.text import Message
 from live.config.figures import CYCLE_CHANNELS, channel_names
-from live.config.gauges import DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_checks
+from live.config.gauges import AUTO_GAUGES, DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_checks
 from live.config.sections import (
     AlarmConfig,
     CameraConfig,
@@ -79,8 +79,6 @@ class Config:
         return plain | {"alarm": {str(n): alarm for n, alarm in enumerate(plain["alarm"], 1)}}
 
 
-AUTO_GAUGES = ("extension", "width", "area")
-"""The gauges that ``live.setup.grid`` places on the specimen."""
 _SHAPES = (
     frozenset({"specimen.width_mm", "specimen.thickness_mm"}),
     frozenset({"specimen.diameter_mm"}),

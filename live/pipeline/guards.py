@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -34,23 +35,26 @@ class Guard(Protocol):
         """Check a field and its means; an event where it is not valid as it stands."""
 
 
-class RepetitionGuard:
-    """Warns at the first field where the pattern of the reference repeats.
+class StartGuard:
+    """Warns at the first field of what is so from the start.
 
     Parameters
     ----------
-    kernel : PhaseKernel
+    source : str
+        Of the events.
+    texts : sequence of str
+        Empty ones say nothing.
     on_event : callable taking an Event
     """
 
-    def __init__(self, kernel: PhaseKernel, on_event: EventSink) -> None:
-        self._text, self._on_event = repetition_text(kernel.period), on_event
+    def __init__(self, source: str, texts: Sequence[str], on_event: EventSink) -> None:
+        self._source, self._texts, self._on_event = source, [text for text in texts if text], on_event
 
     def check(self, field: StrainField, step: TimeStep) -> None:
         """Warn once, at the time of ``step``."""
-        if self._text:
-            self._on_event(Event(step.t, EventKind.MEASUREMENT, "pattern", self._text, "warning"))
-            self._text = ""
+        for text in self._texts:
+            self._on_event(Event(step.t, EventKind.MEASUREMENT, self._source, text, "warning"))
+        self._texts = []
 
 
 class PartsGuard:
@@ -342,7 +346,7 @@ def _blur_words(blur: Blur, field: StrainField) -> str:
 def standard_guards(kernel: PhaseKernel, strain: Measure, on_event: EventSink) -> list[Guard]:
     """Those of every measurement, whatever is known of specimen and camera."""
     return [
-        RepetitionGuard(kernel, on_event),
+        StartGuard("pattern", [repetition_text(kernel.period)], on_event),
         PartsGuard(on_event),
         StrainGuard(strain, on_event),
         PictureGuard(on_event),

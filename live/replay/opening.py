@@ -21,8 +21,8 @@ from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from acquire.session import Session
 from acquire.text import Message
-from live.config.gauges import gauges_for
-from live.config.loading import AUTO_GAUGES, Config, from_dict, laid_over, load_config, settings_in
+from live.config.gauges import AUTO_GAUGES, gauges_for
+from live.config.loading import Config, from_dict, laid_over, load_config, settings_in
 from live.config.values import AUTO
 from live.pipeline.consumer import Screen
 from live.pipeline.measure import NewReference

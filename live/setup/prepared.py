@@ -15,10 +15,10 @@ from acquire.frame import QUANTISATION, Burst, CameraInfo
 from acquire.load_cell import LoadLog
 from acquire.text import Message
 from analysis.optics import LensCorrection, LensModel, PlateFit, ShutterCorrection
-from live.config.gauges import gauges_for
+from live.config.gauges import gauges_for, partly
 from live.config.loading import Config
 from live.pipeline.consumer import Screen
-from live.pipeline.guards import DilatationGuard, TiltGuard, standard_guards
+from live.pipeline.guards import DilatationGuard, StartGuard, TiltGuard, standard_guards
 from live.pipeline.measure import Corrections, NewReference, OnFailure, PlateCorrection, Tracker, measure
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import Correction, prepare
@@ -156,6 +156,7 @@ class PreparedKernel:
         settings, nu = config.measure, config.specimen.nu
         strain = cast(Any, settings.strain)
         guards = [
+            StartGuard("gauges", [partly(one, plan.grid) for one in plan.gauges], on_event),
             *standard_guards(self.kernel, strain, on_event),
             DilatationGuard(nu, config.scale.stand_off_mm, on_event),
             TiltGuard(_focal_px(config), on_event, dilatation=nu is None),

@@ -20,7 +20,7 @@ from acquire.frame import Burst
 from analysis.evaluate import AreaStrain, GaugeSet
 from analysis.field import StrainField
 from analysis.picture.pattern import gauge_length, l10_strain
-from live.config.gauges import gauges_for
+from live.config.gauges import gauges_for, partly
 from live.pipeline.guards import picture_words
 from live.pipeline.reference import averaged, prepare, repetition_text
 from live.setup.check.sample import CheckSample
@@ -195,11 +195,12 @@ def _filled(noises: list[StrainNoise], sample: CheckSample) -> Iterator[StrainNo
 
 @dataclass(frozen=True, slots=True)
 class GaugeNoise:
-    """Predicted strain noise of a gauge for one burst of the test; NaN with the reason."""
+    """Predicted strain noise of a gauge for one burst; NaN with the reason. ``part``: what lies off the region."""
 
     name: str
     sigma: float
     reason: str = ""
+    part: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -267,5 +268,6 @@ def _gauges(config: Config, field: StrainField, factor: float) -> Iterator[Gauge
     yield GaugeNoise("", factor * (math.nan if region is None else region.sigma(along)))
     config = with_auto_gauges(config, field.grid)
     gauges = gauges_for(config.gauges, config.specimen.first_axis, field.grid)
-    for name, value in GaugeSet(gauges).read(field).items():
-        yield GaugeNoise(name, factor * value.sigma, value.reason)
+    for gauge, value in zip(gauges, GaugeSet(gauges).read(field).values(), strict=True):
+        part = partly(gauge, field.grid)
+        yield GaugeNoise(gauge.name, factor * value.sigma, value.reason, part)

@@ -311,6 +311,8 @@ def _gauges(f: CheckFigures) -> Iterator[CheckLine]:
         name = Message("noise of {name}", gauge.name) if gauge.name else Message("noise of the region")
         value = Message("{sigma:.1f} µm/m predicted (burst of {burst})", gauge.sigma * 1e6, f.burst)
         yield CheckLine(name, gauge.reason or value, not gauge.reason, "move it, or take smaller ZOIs")
+        if gauge.part:
+            yield CheckLine("gauge", gauge.part, False, "")
 
 
 # -- advice on the strain noise -----------------------------------------------------------------

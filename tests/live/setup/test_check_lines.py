@@ -233,11 +233,14 @@ def test_the_noise_of_gauges_is_in_microstrain_and_one_without_zois_is_bad() -> 
         GaugeNoise("", 2.34e-6),
         GaugeNoise("axial", 5e-6),
         GaugeNoise("hole", math.nan, "no ZOI is there"),
+        GaugeNoise("edge", 6e-6, part="gauge edge: half of it is off"),
     )
     assert [(line.what, line.value, line.good) for line in _gauges(made(gauges=gauges))] == [
         ("noise of the region", "2.3 µm/m predicted (burst of 4)", True),
         ("noise of axial", "5.0 µm/m predicted (burst of 4)", True),
         ("noise of hole", "no ZOI is there", False),
+        ("noise of edge", "6.0 µm/m predicted (burst of 4)", True),
+        ("gauge", "gauge edge: half of it is off", False),
     ]
 
 

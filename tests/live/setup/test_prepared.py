@@ -77,7 +77,7 @@ def test_a_measurement_has_what_was_configured(monkeypatch: pytest.MonkeyPatch, 
     PreparedKernel(made, kernel, 1.5).measurements([], None, [].append)  # type: ignore[arg-type]
     guards = {type(guard).__name__: guard for guard in given["guards"]}
     assert list(guards) == [
-        "RepetitionGuard", "PartsGuard", "StrainGuard", "PictureGuard", "BlurGuard", "DilatationGuard", "TiltGuard",
+        "StartGuard", "PartsGuard", "StrainGuard", "PictureGuard", "BlurGuard", "DilatationGuard", "TiltGuard",
     ]  # fmt: skip
     dilatation, tilt = guards["DilatationGuard"], guards["TiltGuard"]
     assert (dilatation._nu, dilatation._stand_off_mm) == (nu, 400.0)
@@ -86,6 +86,22 @@ def test_a_measurement_has_what_was_configured(monkeypatch: pytest.MonkeyPatch, 
     tracker = given["tracker"]
     assert (tracker._noise_GL, tracker._renew_at) == (1.5, 0.4)
     assert given["corrections"].plates is None and given["corrections"].lens is None
+
+
+def test_a_gauge_that_is_partly_off_the_region_is_an_event_of_the_first_field(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    given: dict[str, Any] = {}
+    monkeypatch.setattr(prepared_module, "measure", lambda *_, **more: given.update(more))
+    made = plan(measure__roi=[64, 0, 64, 96], gauges__mid={"kind": "area", "box": [0, 0, 128, 96]})
+    kernel: Any = SimpleNamespace(period=np.full((2, 2), np.inf))
+    events: list[Any] = []
+    PreparedKernel(made, kernel, 1.5).measurements([], None, events.append)  # type: ignore[arg-type]
+    for t in (3.0, 4.0):
+        given["guards"][0].check(None, SimpleNamespace(t=t))
+    told = [(one.t, one.source, one.level) for one in events]
+    assert told == [(3.0, "gauges", "warning")]
+    assert "of its area lies where nothing is measured" in events[0].text
 
 
 @pytest.mark.parametrize(("bits", "kinds"), [(8, ("uint8", "float32")), (9, ("uint16", "float32"))])
