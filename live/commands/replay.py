@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from acquire.errors import exit_code_of_all
 from live.commands import options
-from live.commands.finishing import finish_test
+from live.commands.consumers import finish_test
 from live.commands.process import signals
 from live.results.folder import check_folder, make_folder
 from live.ui.terminal.screen import CamerasScreen, TerminalScreen
