@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from numpy.typing import NDArray
-
 from acquire.addresses import Address, expanded
 from acquire.camera import CameraBase
 from acquire.cv2_loader import load_cv2
@@ -118,14 +116,11 @@ class VideoFile(CameraBase):
                 t = index / self._fps
             else:
                 t = stamp if stamp > t or index == 0 else t + 1 / self._fps
-            yield Frame(frozen(self._grey(picture, index)), index, t, "nominal", 0, 8, stamp)
+            image = to_gray(picture, self._settings.gray, str(self._path))
+            if image.shape != (self.info.height, self.info.width):
+                raise DataError("{path}: frame {index} is of another size than the first", self._path, index)
+            yield Frame(frozen(image), index, t, "nominal", 0, 8, stamp)
             index += 1
-
-    def _grey(self, picture: NDArray[Any], index: int) -> NDArray[Any]:
-        image = to_gray(picture, self._settings.gray, str(self._path))
-        if image.shape != (self.info.height, self.info.width):
-            raise DataError("{path}: frame {index} is of another size than the first", self._path, index)
-        return image
 
     def _count(self) -> int | None:
         """Frames of the file; None where only their number times their duration is known, and it is large."""
