@@ -125,7 +125,7 @@ def open_none(address: Address, on_event: EventSink) -> NoLoadCell:
     return NoLoadCell()
 
 
-class ZeroedLoadCell:
+class ZeroedLoadCell(Closing):
     """A load cell whose forces count from another force: the zero that was taken before the test.
 
     A tare makes the present load zero whatever was subtracted before.
@@ -149,11 +149,6 @@ class ZeroedLoadCell:
     def __enter__(self) -> Self:
         self._cell.__enter__()
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._cell.__exit__(kind, error, trace)
 
     def __iter__(self) -> Iterator[LoadSample]:
         for sample in self._cell:
