@@ -249,9 +249,7 @@ class CroppedCamera(CameraBase):
         self._camera, self._cut = camera, RecordMode(crop=crop)
         self._cut.check(camera.info.width, camera.info.height)
         controls = {**camera.info.controls, "crop": list(crop)}
-        self.info = dataclasses.replace(
-            camera.info, width=crop[2], height=crop[3], controls=controls
-        )
+        self.info = dataclasses.replace(camera.info, width=crop[2], height=crop[3], controls=controls)
 
     def __iter__(self) -> Iterator[Frame]:
         for frame in self._camera:
