@@ -21,8 +21,9 @@ from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
 from acquire.text import Message
+from analysis.evaluate import AUTO_GAUGES
 from live.config.figures import CYCLE_CHANNELS, channel_names
-from live.config.gauges import AUTO_GAUGES, DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_checks
+from live.config.gauges import DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_checks
 from live.config.sections import (
     AlarmConfig,
     CameraConfig,
@@ -194,6 +195,11 @@ def _read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     tree = _plain_toml(path, text)
     if isinstance(tree.get("lens"), str):
         tree["lens"] = lens_in(Path(tree["lens"]))
+    specimen = tree.get("specimen")
+    given = {f"specimen.{key}" for key in specimen} if isinstance(specimen, Mapping) else set()
+    if len(ways := [shape & given for shape in _SHAPES if shape & given]) > 1:
+        one, other, *_ = (" and ".join(sorted(way, reverse=True)) for way in ways)
+        raise ConfigError("{path}: {one} and {other} are two sections; leave out one", path, one, other)
     return tree
 
 

@@ -357,6 +357,17 @@ def test_a_section_given_in_another_way_replaces_that_of_the_file(
         rig.write_text(before)
 
 
+def test_two_sections_in_one_file_are_refused(tmp_path: Path) -> None:
+    rig = written(tmp_path, "[specimen]\nwidth_mm = 20\nthickness_mm = 2\ndiameter_mm = 10")
+    named = "specimen.width_mm and specimen.thickness_mm and specimen.diameter_mm are two sections"
+    with pytest.raises(ConfigError, match=named):
+        load_config(rig, {})
+    stored = {"specimen": {"width_mm": 20.0, "thickness_mm": 2.0, "diameter_mm": 10.0}}
+    assert (
+        from_dict(stored, {}, "").specimen.section_text == "20 mm x 2 mm"
+    )  # of a session that has been recorded
+
+
 @pytest.mark.parametrize(
     ("given", "text"),
     [
