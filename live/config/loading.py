@@ -188,7 +188,18 @@ def _overlaid(tree: Mapping[str, Any], overrides: Mapping[str, Any], where: str)
             section[key] = value
     for name, _, key in (dotted.partition(".") for dotted in other_shapes(overrides)):
         merged[name].pop(key, None)
+    _check_given(overrides, merged, where)
     return _build(merged, where)
+
+
+def _check_given(overrides: Mapping[str, Any], merged: Mapping[str, Any], where: str) -> None:
+    """What is impossible on the command line is not to be looked for in the file ``where``."""
+    told, px_per_mm = Message("command line"), None
+    for name in ("scale", *(name for name in _SECTIONS if name != "scale")):
+        content = {key.partition(".")[2]: one for key, one in overrides.items() if key.startswith(f"{name}.")}
+        if content:
+            _section(_SECTIONS[name], name, content, told, px_per_mm)
+        px_per_mm = px_per_mm or _px_per_mm(merged, where)
 
 
 def _read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
