@@ -74,6 +74,9 @@ class ZoiGauge(Gauge):
     def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         return (zois_near(grid, self.at, 0),)
 
+    def share(self, grid: ZoiGrid) -> float:
+        return 1.0
+
     @property
     def reading(self) -> GaugeReading:
         return GaugeReading("largest", self.value)
