@@ -1,7 +1,4 @@
-"""The plots of a report.
-
-The sections of cyclic tests, figures of cycles against the logarithm of their number, and of a creep.
-"""
+"""The plots of a report: those of every test, of cycles against the logarithm of their number, and of a creep."""
 
 from __future__ import annotations
 
