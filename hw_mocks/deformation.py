@@ -4,10 +4,9 @@
 ``SpecimenDeformation`` is that of a specimen at one instant. Displacements are px on the reference grid,
 x right and y down: ``deformed(x + u, y + v) = reference(x, y)``.
 
-The strain fields of the virtual specimens, each linear in the two mean strains.
-
-A field is ``axial * A(x, y) + transverse * T(x, y)``; A and T are closed forms with exact
-gradients, so that they are computed once for the places that matter and combined at each instant.
+The strain fields of the virtual specimens are linear in the two mean strains. A field is ``axial * A(x, y) + transverse
+* T(x, y)``; A and T are closed forms with exact gradients, so that they are computed once for the places that matter
+and combined at each instant.
 
 - uniform: homogeneous.
 - hole: Kirsch's plate with a round hole in uniaxial tension, plane stress and small strain

@@ -1,9 +1,10 @@
-"""The readout time of a rolling shutter: from the bands of a flickering lamp, or from a specimen that was moved.
+"""A rolling shutter: its readout time, and the strain that it makes of a motion.
+
+Lines are read one after the other, so that motion at v px/s shows v T / H as strain along their normal. The time T is
+found from the bands of a flickering lamp, or from a specimen that was moved.
 
 A lamp on mains of 50 or 60 Hz flickers at F = 100 or 120 Hz: a picture whose lines are read over T shows F T bands.
 A specimen that moves along the lines' normal at v shows the strain v T / (H - 1), and along the lines a shear.
-
-A rolling shutter: lines are read one after the other, so that motion at v px/s shows v T / H as strain along them.
 
 The picture is stamped at its middle line. The velocity is that of the mean displacement since the burst before, so it
 holds for rigid motion, not for the strain rate within the picture.

@@ -5,12 +5,11 @@ beyond one for each picture is the lens. A homography is also what the tangentia
 axis make of a shift, to the first order: these are not found, and the axis is taken in the middle of the picture,
 give or take ``AXIS_SIGMA``. Where the camera is square to the specimen, stretch and shear are the tangential terms.
 
-What the motion during a burst does to its strain: the mean of its frames is that at its time only at a steady rate.
-
-The mean of a burst during T, in which the strain rate changes by r at s after its middle, is off by
-``r (T/2 - |s|)^2 / (2 T)``, at most ``r T / 8``. From the bursts before, its strain is then off by as much or more:
-that is the bound which is taken as its standard uncertainty, where noise does not explain it. At a steady rate
-nothing is added: blur that is alike on both sides does not shift a picture.
+``BurstMotion`` is what an uneven motion during a burst does to its strain: the mean of its frames is that at its time
+only at a steady rate. The mean of a burst during T, in which the strain rate changes by r at s after its middle, is off
+by ``r (T/2 - |s|)^2 / (2 T)``, at most ``r T / 8``. From the bursts before, its strain is then off by as much or more:
+that is the bound which is taken as its standard uncertainty, where noise does not explain it. At a steady rate nothing
+is added: blur that is alike on both sides does not shift a picture.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 The module of a command is imported only when the command is called, so that ``phasedic --help`` starts fast. Each
 module has ``add_arguments(parser)`` and ``command(arguments) -> exit code``.
 
-Words of a command line as people type and drop them: quotes that stayed, and patterns that the shell expanded.
+Words are taken as people type and drop them: with quotes that stayed, and patterns that the shell expanded.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=_windows,
         default=["gaussian"],
         metavar="NAME,NAME",
-        help="weights (default gaussian)",
+        help="weights: gaussian, uniform, tukey, bi-triangular (default gaussian)",
     )
     words = "time without motion, s (default: from the force)"
     words += "; none: no such time, the noise is predicted"

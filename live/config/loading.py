@@ -21,9 +21,10 @@ from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
 from acquire.text import Message
+from analysis.evaluate import AUTO_GAUGES
 from live.config import sections
 from live.config.figures import CYCLE_CHANNELS, channel_names
-from live.config.gauges import AUTO_GAUGES, DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_checks
+from live.config.gauges import DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_checks
 from live.config.values import AUTO, Check, Option, in_px
 
 Section = TypeVar("Section")
@@ -173,13 +174,29 @@ def _overlaid(tree: Mapping[str, Any], overrides: Mapping[str, Any], where: str)
             section[key] = value
     for name, _, key in (dotted.partition(".") for dotted in other_shapes(overrides)):
         merged[name].pop(key, None)
+    _check_given(overrides, merged, where)
     return _build(merged, where)
+
+
+def _check_given(overrides: Mapping[str, Any], merged: Mapping[str, Any], where: str) -> None:
+    """What is impossible on the command line is not to be looked for in the file ``where``."""
+    told, px_per_mm = Message("command line"), None
+    for name in ("scale", *(name for name in _SECTIONS if name != "scale")):
+        content = {key.partition(".")[2]: one for key, one in overrides.items() if key.startswith(f"{name}.")}
+        if content:
+            _section(_SECTIONS[name], name, content, told, px_per_mm)
+        px_per_mm = px_per_mm or _px_per_mm(merged, where)
 
 
 def _read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     tree = _plain_toml(path, text)
     if isinstance(tree.get("lens"), str):
         tree["lens"] = lens_in(Path(tree["lens"]))
+    specimen = tree.get("specimen")
+    given = {f"specimen.{key}" for key in specimen} if isinstance(specimen, Mapping) else set()
+    if len(ways := [shape & given for shape in _SHAPES if shape & given]) > 1:
+        one, other, *_ = (" and ".join(sorted(way, reverse=True)) for way in ways)
+        raise ConfigError("{path}: {one} and {other} are two sections; leave out one", path, one, other)
     return tree
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -9,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 
 from analysis.evaluate.gauges import geometry
-from analysis.evaluate.gauges.gauge import Gauge, Parameter
-from analysis.evaluate.gauges.readings import GaugeReading
+from analysis.evaluate.gauges.gauge import OFF_REGION, Gauge, Parameter
+from analysis.evaluate.gauges.readings import GaugeReading, distance
 from analysis.field import ZoiGrid
 
 BOX = Parameter("box", "x, y, width, height of an area, extension or transverse gauge")
@@ -62,6 +63,11 @@ class LineGauge(Gauge):
     def outline(self, zoi: float) -> tuple[geometry.Line, ...]:
         reach = self.radius_px or zoi / 2
         return (self.start, self.end), geometry.circle(self.start, reach), geometry.circle(self.end, reach)
+
+    def share(self, grid: ZoiGrid) -> float:
+        """Of its length, that between the ZOIs at its ends; 1 where that is nearly all."""
+        found = distance(grid, self.zois(grid)) / math.dist(self.start, self.end)
+        return found if found <= 1 - OFF_REGION else 1.0
 
     def handles(self) -> tuple[geometry.Point, ...]:
         return self.start, self.end
@@ -169,6 +175,10 @@ class RegionStrips:
         x, y = grid.x[columns[0]] - grid.step / 2, grid.y[rows[0]] - grid.step / 2
         width, height = (float(np.ptp(found) + 1) * grid.step for found in (columns, rows))
         return ExtensionGauge("", (float(x), float(y), width, height), self.along).zois(grid)
+
+    def share(self, grid: ZoiGrid) -> float:
+        """All of it."""
+        return 1.0
 
 
 REGION = RegionStrips("x"), RegionStrips("y")

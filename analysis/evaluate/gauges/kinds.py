@@ -62,6 +62,9 @@ class ZoiGauge(Gauge):
     def select(self, grid: ZoiGrid) -> tuple[geometry.Mask, ...]:
         return (geometry.zois_near(grid, self.at, 0),)
 
+    def share(self, grid: ZoiGrid) -> float:
+        return 1.0
+
     @property
     def reading(self) -> GaugeReading:
         return GaugeReading("largest", self.value)

@@ -1,6 +1,6 @@
 """The check of the still specimen during set-up: a thread judges the newest frames; the whole check on request.
 
-The check of the still specimen as the page shows it: plain values and colours.
+What the page gets of it are plain values and colours.
 """
 
 from __future__ import annotations
