@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar, overload
 from urllib.parse import quote, unquote
 
-from acquire.bounds import NotAllowed, integer_of, number_of, one_of, yes_or_no
+from acquire.bounds import NotAllowed, integer_of, not_possible, number_of, one_of, yes_or_no
 from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
 from acquire.text import Message
@@ -206,13 +206,7 @@ class Options:
         try:
             return check(word)
         except NotAllowed as allowed:
-            raise ConfigError(
-                "{text}: {key}={value} is not possible; allowed: {allowed}",
-                self.address.text,
-                key,
-                word,
-                str(allowed),
-            ) from None
+            raise not_possible(self.address.text, key, word, allowed) from None
 
     def rest(self) -> dict[str, str]:
         """All settings not taken yet, for a scheme with keys of its own choosing."""

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 from acquire.addresses import Address, Options
 from acquire.bounds import NotAllowed, integer_of, number_of, one_of, yes_or_no
+from acquire.errors import ConfigError
 
 Settings = TypeVar("Settings")
 Check = Callable[[str], Any]
@@ -105,6 +106,13 @@ def settings_of(kind: type) -> Iterator[Setting]:
 def keys_of(kind: type) -> str:
     """The keys that a class declares, for messages."""
     return ", ".join(one.key for one in settings_of(kind) if one.key)
+
+
+def no_feature(where: str, name: str, kind: type) -> ConfigError:
+    """The error of a feature that a camera does not have, beside the settings that ``kind`` declares."""
+    return ConfigError(
+        "{where}: this camera has no feature {name}; known settings: {known}", where, name, keys_of(kind)
+    )
 
 
 def read_settings(kind: type[Settings], address: Address) -> Settings:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from acquire.bounds import NotAllowed, as_number, same_value
+from acquire.bounds import NotAllowed, as_number, not_kept, not_possible, same_value
 from acquire.camera.timing import Bounded, exposure_and_gain, longest_pause_s
 from acquire.errors import ConfigError, DeviceError
 from acquire.frame import CameraInfo
@@ -16,7 +16,7 @@ from acquire.genicam.device import NO_ADJUSTMENT, GenicamDevice
 from acquire.genicam.formats import FORMATS, MonoFormat, preferred, readable
 from acquire.genicam.library import GenicamError
 from acquire.genicam.settings import NO_TRIGGER, GenicamSettings
-from acquire.settings import keys_of
+from acquire.settings import no_feature
 from acquire.text import Message
 
 # Set to "Off", so that nothing changes by itself during a test.
@@ -116,18 +116,10 @@ def _put_on_manual(device: GenicamDevice) -> None:
 
 def _set_feature(device: GenicamDevice, feature: str, value: str, where: str) -> None:
     if not device.has(feature):
-        raise ConfigError(
-            "{where}: this camera has no feature {feature}; known settings: {listed}",
-            where,
-            repr(feature),
-            keys_of(GenicamSettings),
-        )
+        raise no_feature(where, repr(feature), GenicamSettings)
     kind = device.kind(feature)
     if kind == "Enumeration" and value not in device.choices(feature):
-        offered = ", ".join(device.choices(feature))
-        raise ConfigError(
-            "{where}: {feature}={value} is not possible; allowed: {offered}", where, feature, value, offered
-        )
+        raise not_possible(where, feature, value, ", ".join(device.choices(feature)))
     try:
         device.set_text(feature, value)
     except GenicamError as error:
@@ -135,9 +127,7 @@ def _set_feature(device: GenicamDevice, feature: str, value: str, where: str) ->
             "{where}: {feature}={value}: the camera refuses it ({error})", where, feature, value, error
         ) from error
     if kind != "Command" and not same_value(got := device.text(feature), value):
-        raise ConfigError(
-            "{where}: {feature}={value}: the camera makes it {got}; ask for that", where, feature, value, got
-        )
+        raise not_kept(where, feature, value, got)
 
 
 def _choose_format(device: GenicamDevice, asked: str | None, where: str) -> MonoFormat:
@@ -151,17 +141,10 @@ def _choose_format(device: GenicamDevice, asked: str | None, where: str) -> Mono
         )
     name = preferred(offered) if asked is None else asked
     if name not in usable:
-        raise ConfigError(
-            "{where}: format={asked} is not possible; the camera offers {listed}",
-            where,
-            asked,
-            ", ".join(usable),
-        )
+        raise not_possible(where, "format", asked, ", ".join(usable))
     device.set_text("PixelFormat", name)
     if (got := device.text("PixelFormat")) != name:
-        raise ConfigError(
-            "{where}: asked for format={name}, the camera gives {got}; ask for that", where, name, got
-        )
+        raise not_kept(where, "format", name, got)
     return FORMATS[name]
 
 
@@ -186,20 +169,11 @@ def _set_whole(device: GenicamDevice, feature: str, key: str, value: int, where:
     low, high, step = device.integer_bounds(feature)
     if not low <= value <= high or (value - low) % max(step, 1):
         steps = Message(" in steps of {step}", step) if step > 1 else ""
-        raise ConfigError(
-            "{where}: {key}={value} is not possible; allowed: {low} to {high}{steps}",
-            where,
-            key,
-            value,
-            low,
-            high,
-            steps,
-        )
+        allowed = Message("{low} to {high}{steps}", low, high, steps)
+        raise not_possible(where, key, value, allowed)
     device.set_integer(feature, value)
     if (got := device.integer(feature)) != value:
-        raise ConfigError(
-            "{where}: {key}={value}: the camera makes it {got}; ask for that", where, key, value, got
-        )
+        raise not_kept(where, key, value, got)
 
 
 def _set_trigger(device: GenicamDevice, settings: GenicamSettings, where: str) -> None:
@@ -209,12 +183,7 @@ def _set_trigger(device: GenicamDevice, settings: GenicamSettings, where: str) -
         return
     offered = device.choices("TriggerSource") if device.has("TriggerSource") else []
     if settings.trigger not in offered:
-        raise ConfigError(
-            "{where}: trigger={trigger} is not possible; allowed: {listed}",
-            where,
-            settings.trigger,
-            ", ".join([NO_TRIGGER, *offered]),
-        )
+        raise not_possible(where, "trigger", settings.trigger, ", ".join([NO_TRIGGER, *offered]))
     if settings.fires_triggers and settings.fps is None:
         raise ConfigError(
             "{where}: trigger=Software needs fps=, the rate at which pictures are triggered", where
@@ -222,13 +191,7 @@ def _set_trigger(device: GenicamDevice, settings: GenicamSettings, where: str) -
     device.ask("arv_camera_set_trigger", settings.trigger)
     got = device.text("TriggerMode"), device.text("TriggerSource")
     if got != ("On", settings.trigger):
-        raise ConfigError(
-            "{where}: trigger={trigger}: the camera makes it {got}, {got2}",
-            where,
-            settings.trigger,
-            got[1],
-            got[0],
-        )
+        raise not_kept(where, "trigger", settings.trigger, f"{got[1]}, {got[0]}")
 
 
 def _set_number(device: GenicamDevice, what: str, key: str, value: float, where: str) -> None:
@@ -239,15 +202,11 @@ def _set_number(device: GenicamDevice, what: str, key: str, value: float, where:
     try:
         as_number(value, *device.bounds_of(what))
     except NotAllowed as allowed:
-        raise ConfigError(
-            "{where}: {key}={value:g} is not possible; allowed: {allowed}", where, key, value, allowed
-        ) from None
+        raise not_possible(where, key, f"{value:g}", allowed) from None
     device.ask(f"arv_camera_set_{what}", value)
     got = device.ask(f"arv_camera_get_{what}")
     if abs(got - value) > 0.01 * abs(value):
-        raise ConfigError(
-            "{where}: {key}={value:g}: the camera makes it {got:g}; ask for that", where, key, value, got
-        )
+        raise not_kept(where, key, f"{value:g}", f"{got:g}")
 
 
 def _set_packets(device: GenicamDevice, settings: GenicamSettings, where: str) -> None:
@@ -263,12 +222,7 @@ def _set_packets(device: GenicamDevice, settings: GenicamSettings, where: str) -
     device.ask("arv_camera_gv_set_packet_size", settings.packet_size)
     got = device.ask("arv_camera_gv_get_packet_size")
     if got != settings.packet_size:
-        raise ConfigError(
-            "{where}: packet_size={packet_size}: the camera makes it {got}; ask for that",
-            where,
-            settings.packet_size,
-            got,
-        )
+        raise not_kept(where, "packet_size", settings.packet_size, got)
 
 
 def _in_force(

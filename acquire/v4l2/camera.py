@@ -14,6 +14,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from acquire.addresses import Address
+from acquire.bounds import not_kept, not_possible
 from acquire.camera.live import DeviceFault, Driver, LiveCamera, Picture
 from acquire.camera.timing import StampOf, longest_pause_s
 from acquire.errors import ConfigError, DataError, DeviceError
@@ -94,9 +95,7 @@ def _choose_format(device: V4L2Device, asked: str | None, where: str) -> str:
             )
         return best
     if asked not in usable:
-        raise ConfigError(
-            "{where}: format={asked} is not possible; the camera offers {list}", where, asked, _list(usable)
-        )
+        raise not_possible(where, "format", asked, _list(usable))
     return asked
 
 
@@ -117,12 +116,7 @@ def _set_format(device: V4L2Device, fourcc: str, settings: V4L2Settings, where: 
             api.FIELDS_APART[got.field],
         )
     if got.fourcc != fourcc:
-        raise ConfigError(
-            "{where}: asked for format={fourcc}, the driver gives {fourcc2}; ask for that",
-            where,
-            fourcc,
-            got.fourcc,
-        )
+        raise not_kept(where, "format", fourcc, got.fourcc)
     asked = (settings.width or got.width, settings.height or got.height)
     if (got.width, got.height) != asked:
         sizes = _list([str(size) for size in device.sizes(fourcc)])

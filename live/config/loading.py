@@ -12,7 +12,8 @@ import difflib
 import math
 import reprlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -203,8 +204,20 @@ def _read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
 def _plain_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     if text is None and not path.exists():
         raise ConfigError("{path}: there is no such configuration file", path)
+    with as_toml(path):
+        return tomllib.loads(toml_text(path) if text is None else text)
+
+
+def toml_text(path: Path) -> str:
+    """The text of a file."""
+    return read_bytes(path, MAX_BYTES).decode("utf-8-sig")
+
+
+@contextmanager
+def as_toml(path: Path) -> Iterator[None]:
+    """Around the reading of a file and of its TOML: raises ConfigError where that fails."""
     try:
-        return tomllib.loads(read_bytes(path, MAX_BYTES).decode("utf-8-sig") if text is None else text)
+        yield
     except (DataError, UnicodeDecodeError) as error:
         raise ConfigError("{path}: cannot be read ({error}); give a text file in TOML", path, error) from None
     except RecursionError:

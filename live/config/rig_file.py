@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquire.errors import ConfigError, DataError
-from acquire.files.picture import read_bytes
-from live.config.loading import MAX_BYTES, Config, load_config
+from live.config.loading import Config, as_toml, load_config, toml_text
 from live.config.new_files import replaced_file
 
 if TYPE_CHECKING:
@@ -80,24 +79,19 @@ def _changed(document: TOMLDocument, changes: Mapping[str, Any], path: Path) -> 
 
 
 def _read(path: Path) -> TOMLDocument:
-    if not path.exists():
-        return _parsed("", path)
-    try:
-        return _parsed(read_bytes(path, MAX_BYTES).decode("utf-8-sig"), path)
-    except (DataError, UnicodeDecodeError) as error:
-        raise ConfigError("{path}: cannot be read ({error}); give a text file in TOML", path, error) from None
+    with as_toml(path):
+        return _parsed(toml_text(path) if path.exists() else "", path)
 
 
 def _parsed(text: str, path: Path) -> TOMLDocument:
     import tomlkit
     from tomlkit.exceptions import TOMLKitError
 
-    try:
-        return tomlkit.parse(text)
-    except RecursionError:
-        raise ConfigError("{path}: not valid TOML: too many brackets within brackets", path) from None
-    except (TOMLKitError, ValueError) as error:
-        raise ConfigError("{path}: not valid TOML: {error}", path, error) from None
+    with as_toml(path):
+        try:
+            return tomlkit.parse(text)
+        except TOMLKitError as error:  # some are no ValueError
+            raise ValueError(error) from None
 
 
 def _change(document: TOMLDocument, section: str, key: str, value: Any, path: Path) -> None:

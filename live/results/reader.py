@@ -18,13 +18,14 @@ from numpy.typing import NDArray
 from acquire import hdf5
 from acquire.errors import ConfigError, DataError
 from acquire.opening import Closing
-from acquire.text.message import Message, about, word
+from acquire.text.message import Message, word
 from analysis.field import ZoiGrid
 from live.results import layout
 from live.results.quantities import Display, mean_name, quantity_of
 from live.results.stored_response import StoredResponse, read_response
 
 _log = logging.getLogger(__name__)
+_ROUNDING_S = 1e-6  # of times that were typed
 _LENGTH, _POSITION = hdf5.JsonField(int, 1, layout.MAX_SIDE_PX), hdf5.JsonField(int, 0, layout.MAX_SIDE_PX)
 
 
@@ -106,6 +107,38 @@ class Strain(Closing):
         """Maps of the whole test: those of ``response``."""
         return () if self.response is None else self.response.names
 
+    def check_measured(self) -> None:
+        """Raises DataError where there is no row."""
+        if not self.n:
+            raise DataError("{path}: holds no measurement", self.path)
+
+    def rows_between(self, start_s: float | None, end_s: float | None, options: str) -> tuple[int, ...]:
+        """The rows between two times, s since the start of the test, both included.
+
+        Parameters
+        ----------
+        start_s, end_s : float or None, s
+        options : str
+            Which give them, for the message.
+
+        Raises
+        ------
+        ConfigError
+            There is none.
+        DataError
+            The file holds no measurement.
+        """
+        self.check_measured()
+        t = self.time_s
+        low, high = -np.inf if start_s is None else start_s, np.inf if end_s is None else end_s
+        rows = np.flatnonzero((t >= low - _ROUNDING_S) & (t <= high + _ROUNDING_S))
+        if not rows.size:
+            raise ConfigError(
+                "{options}: no measurement between {low:g} and {high:g} s; the test has {first:.6g} to {last:.6g} s",
+                *(options, low, high, t[0], t[-1]),
+            )
+        return tuple(rows.tolist())
+
     def maps(self, name: str, row: int | slice = slice(None)) -> NDArray[Any]:
         """(T, R, C) maps of ``name`` (see ``names``), or the (R, C) map of one row.
 
@@ -120,12 +153,8 @@ class Strain(Closing):
                 "{path}: no map {name}; there are {known}", self.path, repr(name), ", ".join(names)
             )
         if isinstance(row, int) and not -self.n <= row < self.n:
-            there = (
-                Message("no row {row}; there are {n}", row, self.n)
-                if self.n
-                else Message("holds no measurement")
-            )
-            raise DataError(about(self.path, there))
+            self.check_measured()
+            raise DataError("{path}: no row {row}; there are {n}", self.path, row, self.n)
         rows = range(self.n)[row]
         try:
             if self.response is not None and name in self.response.names:

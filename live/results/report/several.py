@@ -9,7 +9,7 @@ from typing import TextIO
 
 import numpy as np
 
-from acquire.errors import ConfigError, DataError
+from acquire.errors import ConfigError
 from acquire.text import Message, word
 from analysis.evaluate import CONFIDENCE, TensileFigures
 from live.config.cameras import BACK, FRONT
@@ -188,8 +188,7 @@ def tests_of(runs: Sequence[RunFolder]) -> list[ComparedTest]:
     if len(runs) < _MIN_RUNS:
         raise ConfigError("--compare needs at least two runs")
     for run in runs:
-        if not run.strain.n:
-            raise DataError("{path}: holds no measurement, there is nothing to compare", run.strain.path)
+        run.strain.check_measured()
     found = [ComparedTest(run.title, str(run.path), EvaluatedCurve.of(run)) for run in runs]
     if len({test.curve.is_stress for test in found}) > 1:
         without = ", ".join(test.path for test in found if not test.curve.is_stress)

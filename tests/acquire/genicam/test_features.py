@@ -72,7 +72,7 @@ def test_a_gain_below_zero_is_in_force_within_a_hundredth_too(got: float, words:
         ("Gamma=0.5", {"Gamma": 0.7}, "Gamma=0.5: the camera makes it 0.7; ask for that"),
         ("fps=0.5", {}, "fps=0.5 is not possible; allowed: a number from 1 to 100"),
         ("y=513", {}, "y=513 is not possible; allowed: 0 to 512"),
-        ("format=BayerRG8", {}, "format=BayerRG8 is not possible; the camera offers Mono12p, Mono8"),
+        ("format=BayerRG8", {}, "format=BayerRG8 is not possible; allowed: Mono12p, Mono8"),
     ],
 )
 def test_what_the_camera_does_not_do_is_refused(query: str, makes: dict[str, Any], words: str) -> None:

@@ -107,7 +107,7 @@ def test_what_was_asked_is_asked_again_after_the_camera_was_away() -> None:
         ("exposure_us=5", "from 10 to"),
         ("format=Mono8&bits=9", "bits=9 is not possible with Mono8"),
         ("format=Mono12p&bits=8", "bits=8 is not possible with Mono12p"),
-        ("format=Mono16", "the camera offers Mono12p, Mono8"),
+        ("format=Mono16", "format=Mono16 is not possible; allowed: Mono12p, Mono8"),
         ("packet_size=8000", "is for GigE cameras"),
     ],
 )
@@ -123,7 +123,7 @@ def test_what_is_not_possible_is_refused_with_what_is(query: str, words: str) ->
         ("gain=6", {"gain": 6.1}, "gain=6: the camera makes it 6.1"),
         ("fps=30", {"frame_rate": 29.0}, "fps=30: the camera makes it 29"),
         ("width=320", {"Width": 336}, "width=320: the camera makes it 336"),
-        ("format=Mono8", {"PixelFormat": "Mono12p"}, "asked for format=Mono8, the camera gives Mono12p"),
+        ("format=Mono8", {"PixelFormat": "Mono12p"}, "format=Mono8: the camera makes it Mono12p"),
     ],
 )
 def test_another_value_than_asked_is_refused_beyond_one_percent(

@@ -109,6 +109,13 @@ class CameraPreview:
             self._draft.change_all({"camera.address": before})
             raise error
 
+    @property
+    def known(self) -> CameraInfo:
+        """What is known of the camera; raises DataError before it is open."""
+        if self.info is None:
+            raise DataError("the camera has given no picture yet")
+        return self.info
+
     def recent(self, least: int = RECENT) -> list[Frame]:
         """The last frames of this camera, ``least`` to ``RECENT``, or all of a shorter recording; else none."""
         with self._lock:
@@ -116,11 +123,9 @@ class CameraPreview:
 
     def collect(self) -> None:
         """Keep the next frames, as many as a whole check needs; the first ones of a recording."""
-        info = self.info
-        if info is None:
-            raise DataError("the camera has given no picture yet")
+        needed = self._viewer.frames_needed(self.known)
         with self._lock:
-            self._collected = deque(maxlen=max(self._viewer.frames_needed(info), 1))
+            self._collected = deque(maxlen=max(needed, 1))
             if self._whole:
                 self._collect_first()
 
