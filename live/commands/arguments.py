@@ -9,7 +9,6 @@ Words are taken as people type and drop them: with quotes that stayed, and patte
 from __future__ import annotations
 
 import argparse
-import difflib
 import importlib
 import os
 import sys
@@ -20,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import EXIT_CODES, USAGE, ConfigError, PhasedicError
-from acquire.text import Message
+from acquire.text.message import Message, did_you_mean
 from live.words.language import said_here
 
 OF_PICTURES = ("replay", "check", "scale", "lens", "readout", "study", "average", "init", "run", "page")
@@ -254,8 +253,7 @@ def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
         parser.exit(USAGE)
     wanted = next((word for word in argv if not word.startswith("-")), "")
     if wanted and wanted not in COMMANDS:
-        near = difflib.get_close_matches(wanted, COMMANDS, 1)
-        meant = Message(" (did you mean {near}?)", near[0]) if near else ""
+        meant = did_you_mean(wanted, COMMANDS)
         text = Message("there is no command {name}{meant}; phasedic --help lists all", repr(wanted), meant)
         parser.error(said_here(text))
     arguments = parser.parse_args(argv)

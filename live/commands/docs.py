@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import pydoc
 import re
 import sys
@@ -11,6 +10,7 @@ from pathlib import Path
 
 from acquire.errors import ConfigError, DataError
 from acquire.text import Message
+from acquire.text.message import did_you_mean
 from live.ui.terminal.screen import print_line
 
 TOP = Path(__file__).parents[2]
@@ -35,8 +35,7 @@ def command(arguments: argparse.Namespace) -> int:
     page, _, anchor = arguments.name.partition("#")
     name = page.removeprefix("docs/").removesuffix(".md")
     if name not in pages:
-        near = difflib.get_close_matches(name, pages, 1)
-        meant = Message(" (did you mean {near}?)", near[0]) if near else ""
+        meant = did_you_mean(name, pages)
         raise ConfigError("there is no page {name}{meant}; phasedic docs lists all", repr(name), meant)
     text = _section(pages[name].read_text(encoding="utf-8"), anchor)
     if not text:

@@ -8,7 +8,6 @@ JSON (``as_dict``); ``from_dict`` reads it back.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import reprlib
 import tomllib
@@ -22,6 +21,7 @@ from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
 from acquire.text import Message
+from acquire.text.message import did_you_mean
 from analysis.evaluate import AUTO_GAUGES
 from live.config import sections
 from live.config.figures import CYCLE_CHANNELS, channel_names
@@ -385,6 +385,4 @@ def _short_repr(value: Any) -> str:
 
 
 def _suggestion(word: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(word, known, 1)
-    meant = Message(" (did you mean {near}?)", near[0]) if near else ""
-    return Message("{meant}; known: {listed}", meant, ", ".join(known))
+    return Message("{meant}; known: {listed}", did_you_mean(word, known), ", ".join(known))

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from acquire.errors import ConfigError, DataError
 from live.config.loading import Config, as_toml, load_config, toml_text
-from live.config.new_files import replaced_file
+from live.config.new_files import check_free, replaced_file
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument
@@ -28,8 +28,7 @@ def new_rig(path: Path, text: str, changes: Mapping[str, Any] | None = None) -> 
     ConfigError
         The file exists (nothing is overwritten) or cannot be written, or the text is not a configuration.
     """
-    if path.exists() or path.is_symlink():
-        raise ConfigError("{path} exists; nothing is overwritten, choose another name", path)
+    check_free(path)
     return _write_checked(path, _changed(_parsed(text, path), changes or {}, path))
 
 
