@@ -310,9 +310,6 @@ class Registry(Generic[Device]):
     def open(self, text: str, on_event: EventSink = ignore_event) -> Device:
         """Open what ``text`` names; see ``Camera`` and ``LoadCell`` for what is raised."""
         address = parse_address(text)
-        return self._find(address)(address, on_event)
-
-    def _find(self, address: Address) -> Opener[Device]:
         opener = self._openers.get(address.scheme)
         if opener is None:
             for entry in entry_points(group=self._group, name=address.scheme):
@@ -330,7 +327,7 @@ class Registry(Generic[Device]):
                 address.scheme,
                 known,
             )
-        return _load(opener) if isinstance(opener, str) else opener
+        return (_load(opener) if isinstance(opener, str) else opener)(address, on_event)
 
 
 def _load(path: str) -> Any:

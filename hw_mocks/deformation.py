@@ -103,7 +103,8 @@ class StrainModes:
         elif self.kind == "woven":
             pair = _woven(along, across, self.cell, self.overstrain)
         else:
-            pair = _uniform(along, across)
+            zero, one = np.zeros_like(along), np.ones_like(along)
+            pair = (along, zero, one, zero, zero, zero), (zero, across, zero, zero, zero, one)
         neck = _necked(along, across, *self.neck) if self.neck[1] else None
         if self.kind == "halves":
             neck = _first_half(along, across)
@@ -116,11 +117,6 @@ class StrainModes:
 def _swapped(mode: Mode) -> Mode:
     along, across, aa, ac, ca, cc = mode
     return across, along, cc, ca, ac, aa
-
-
-def _uniform(along: Array, across: Array) -> tuple[Mode, Mode]:
-    zero, one = np.zeros_like(along), np.ones_like(along)
-    return (along, zero, one, zero, zero, zero), (zero, across, zero, zero, zero, one)
 
 
 def _necked(along: Array, across: Array, middle: float, width: float) -> tuple[Mode, Mode]:

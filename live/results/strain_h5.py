@@ -109,7 +109,9 @@ class StrainWriter:
         else:
             with self._guard():
                 self._flush()
-                self._write_default_slice()
+                # Viewers begin with the last instant; with the first, where the file was never closed.
+                shown = _slice_of(max(self._values.length - 1, 0))
+                self._file["entry/strain"].attrs.modify("default_slice", shown)
                 self._write_axis()
                 self._file.close()
 
@@ -117,7 +119,9 @@ class StrainWriter:
         values = self._values.row(row.values)
         if row.pattern is not None and row.pattern is not self._pattern:
             self._pattern = row.pattern
-            self._append_normal(normal_matrices(row.pattern, self._grid))
+            self._normal.append(normal_matrices(row.pattern, self._grid))
+            self._first_row.resize((self._normal.length,))
+            self._first_row[-1] = next(iter(self._maps.values())).length
             if row.noise is not None:
                 self._noise[1].append(row.noise[1][None].astype(np.float32))
         for name, stored in rounded(row.maps).items():
@@ -126,22 +130,12 @@ class StrainWriter:
             self._noise[0].append(np.array([row.noise[0]], np.float32))
         self._values.hold(values)
 
-    def _append_normal(self, normal: NDArray[np.float32]) -> None:
-        self._normal.append(normal)
-        self._first_row.resize((self._normal.length,))
-        self._first_row[-1] = next(iter(self._maps.values())).length
-
     def _flush(self) -> None:
         self._timer.began()
         self._values.write()
         self._file.flush()
         self._timer.done()
         self._flushed = self._values.length
-
-    def _write_default_slice(self) -> None:
-        """Viewers begin with the last instant; with the first, where the file was never closed."""
-        shown = _slice_of(max(self._values.length - 1, 0))
-        self._file["entry/strain"].attrs.modify("default_slice", shown)
 
     def _write_axis(self) -> None:
         """The axis of the load, and the angle from it to the largest strain, found from all means."""

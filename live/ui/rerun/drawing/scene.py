@@ -296,12 +296,9 @@ class ViewScene:
             if any(math.isfinite(value) for value in values[::2]):
                 row = (self._since_start(t), *values)
                 self._strains.append(row)
-                self._add_strains(t, row)
+                for k, name in enumerate(STRAINS):
+                    self._add(t, f"strain/{name}", (row[0], *row[2 * k + 1 : 2 * k + 3]))
         self._send_again()
-
-    def _add_strains(self, t: float, row: Row) -> None:
-        for k, name in enumerate(STRAINS):
-            self._add(t, f"strain/{name}", (row[0], *row[2 * k + 1 : 2 * k + 3]))
 
     def _add(self, t: float, path: str, row: Row) -> None:
         for sink in self._sinks:
