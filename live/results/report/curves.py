@@ -11,7 +11,7 @@ import numpy as np
 
 from acquire.text import Amount, Message, joined
 from acquire.text.quantity import unit_of
-from analysis.evaluate import true_curve
+from analysis.evaluate import AT_LEAST, true_curve
 from analysis.evaluate.programme import Creep
 from live.config.figures import FIGURES
 from live.config.gauges import gauge_colours
@@ -101,7 +101,10 @@ def _highest(curve: EvaluatedCurve, e: Unit, load: Unit) -> Mark:
     """The point of the highest stress or force."""
     top, name = curve.figures.Rm.value * load.factor, "Rm" if curve.is_stress else "Fm"
     strain = curve.axial[int(np.nanargmax(np.where(np.isfinite(curve.axial), curve.load, np.nan)))]
-    return Mark(strain * e.factor, top, name, Message("{top:.4g} {unit}", top, load.name))
+    text = Message("{top:.4g} {unit}", top, load.name)
+    return Mark(
+        strain * e.factor, top, name, joined(" ", (AT_LEAST, text)) if curve.figures.Rm.is_bound else text
+    )
 
 
 def _straight(curve: EvaluatedCurve, label: str, offset: float, e: Unit, load: Unit) -> PlotLine:
