@@ -8,7 +8,6 @@ JSON (``as_dict``); ``from_dict`` reads it back.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import reprlib
 import tomllib
@@ -20,7 +19,7 @@ from typing import Any, TypeVar
 from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
-from acquire.text import Message
+from acquire.text import Message, meant
 from analysis.evaluate import AUTO_GAUGES
 from live.config import sections
 from live.config.figures import CYCLE_CHANNELS, channel_names
@@ -372,6 +371,4 @@ def _short_repr(value: Any) -> str:
 
 
 def _suggestion(word: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(word, known, 1)
-    meant = Message(" (did you mean {near}?)", near[0]) if near else ""
-    return Message("{meant}; known: {listed}", meant, ", ".join(known))
+    return Message("{meant}; known: {listed}", meant(word, known), ", ".join(known))
