@@ -225,9 +225,9 @@ def brief(text: object) -> str:
     return changed(text, lambda words: _ADDRESS.sub(r"\1", words))
 
 
-def did_you_mean(given: str, known: Iterable[str]) -> str:
-    """The one of those ``known`` that is nearest to what was given, in brackets; "" where none is near."""
-    near = difflib.get_close_matches(given, known, 1)
+def meant(given: str, known: Iterable[str]) -> str:
+    """Which of the ``known`` words is nearest to ``given``, in brackets to be added to a message; else empty."""
+    near = difflib.get_close_matches(given, list(known), 1)
     return Message(" (did you mean {near}?)", near[0]) if near else ""
 
 

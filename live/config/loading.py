@@ -20,8 +20,7 @@ from typing import Any, TypeVar
 from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
-from acquire.text import Message
-from acquire.text.message import did_you_mean
+from acquire.text import Message, meant
 from analysis.evaluate import AUTO_GAUGES
 from live.config import sections
 from live.config.figures import CYCLE_CHANNELS, channel_names
@@ -385,4 +384,4 @@ def _short_repr(value: Any) -> str:
 
 
 def _suggestion(word: str, known: list[str]) -> str:
-    return Message("{meant}; known: {listed}", did_you_mean(word, known), ", ".join(known))
+    return Message("{meant}; known: {listed}", meant(word, known), ", ".join(known))

@@ -96,9 +96,12 @@ def true_stress_strain(curve: EvaluatedCurve) -> Plot | None:
 
 def _highest(curve: EvaluatedCurve, e: Unit, load: Unit) -> Mark:
     """The point of the highest stress or force."""
-    top, name = curve.figures.Rm.value * load.factor, "Rm" if curve.is_stress else "Fm"
+    highest, name = curve.figures.Rm, "Rm" if curve.is_stress else "Fm"
+    top = highest.value * load.factor
     strain = curve.axial[int(np.nanargmax(np.where(np.isfinite(curve.axial), curve.load, np.nan)))]
-    return Mark(strain * e.factor, top, name, Message("{top:.4g} {unit}", top, load.name))
+    return Mark(
+        strain * e.factor, top, name, Message("{top:.4g} {unit}", top, load.name), is_bound=highest.is_bound
+    )
 
 
 def _straight(curve: EvaluatedCurve, label: str, offset: float, e: Unit, load: Unit) -> PlotLine:

@@ -33,7 +33,7 @@ def test_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "mine").mkdir()
     assert make_folder("mine", now) == Path("mine")
     (tmp_path / "mine" / "strain.h5").touch()
-    with pytest.raises(ConfigError, match="is not overwritten"):
+    with pytest.raises(ConfigError, match="nothing is overwritten"):
         make_folder("mine", now)
     (tmp_path / "file").touch()
     with pytest.raises(ConfigError, match="cannot be made"):

@@ -96,7 +96,7 @@ def test_the_highest_stress_and_the_lines_of_e(run_dir: Path) -> None:
     assert (highest.name, highest.value) == ("Rm", "210.5 MPa") and highest.y == pytest.approx(
         1e-6 * top, rel=1e-6
     )
-    assert highest.x == pytest.approx(1e6 * curve.axial[-1])
+    assert highest.x == pytest.approx(1e6 * curve.axial[-1]) and highest.is_bound
     elastic = plot.curves[1]
     assert elastic.label == "E" and elastic.dashed and elastic.y.tolist() == pytest.approx([0, 1.05e-6 * top])
     assert np.diff(elastic.y)[0] / np.diff(elastic.x)[0] == pytest.approx(E_PA * 1e-12, rel=0.01)
