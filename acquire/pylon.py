@@ -13,10 +13,10 @@ from typing import Any
 
 from acquire.addresses import Address
 from acquire.bounds import not_kept, not_possible, same_value
-from acquire.camera import CameraListing
+from acquire.camera.contract import CameraListing, not_one
 from acquire.camera.live import DeviceFault, LiveCamera, Picture
 from acquire.camera.timing import Bounded, exposure_and_gain, longest_pause_s
-from acquire.errors import ConfigError, DataError, DeviceError
+from acquire.errors import DataError, DeviceError
 from acquire.events import EventSink
 from acquire.frame import CameraInfo
 from acquire.genicam.formats import FORMATS, decode, preferred, readable
@@ -232,15 +232,7 @@ def _only(address: Address) -> str:
     here = list_cameras()
     found = [one.address for one in here if address.target in ("", one.address.removeprefix("pylon:"))]
     if len(found) != 1:
-        listed = "; ".join(f"{one.address}  {one.name}" for one in here) or Message("none")
-        raise (ConfigError if found else DeviceError)(
-            Message(
-                "{text}: {count} cameras are meant; give a serial number. Cameras here: {listed}",
-                address.text,
-                len(found),
-                listed,
-            )
-        )
+        raise not_one(address.text, len(found), [f"{one.address}  {one.name}" for one in here])
     return found[0].removeprefix("pylon:")
 
 

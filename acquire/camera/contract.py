@@ -12,14 +12,14 @@ import dataclasses
 import logging
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
 from acquire.addresses import RECORDING, Address, Registry, expanded, parse_address
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DeviceError, PhasedicError
 from acquire.events import EventSink, ignore_event
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.opening import Closing
@@ -183,6 +183,20 @@ def list_cameras() -> list[CameraListing]:
                 CameraListing(f"{scheme}:", "", Message("its cameras cannot be listed: {error}", error))
             )
     return found
+
+
+def not_one(where: str, meant: int, here: Sequence[str]) -> PhasedicError:
+    """The error of an address that means several of the cameras ``here``, or none of them."""
+    listed = "; ".join(here) or Message("none")
+    if meant:
+        return ConfigError(
+            "{where}: {count} cameras are meant; give one of them. Cameras here: {here}", where, meant, listed
+        )
+    return DeviceError(
+        "{where}: no such camera answers. Cameras here: {here}. Check cable, power and address "
+        "(docs/machine-vision.md)",
+        *(where, listed),
+    )
 
 
 _VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".m4v", ".webm")

@@ -18,10 +18,10 @@ from typing import Any
 from numpy.typing import NDArray
 
 from acquire.addresses import Address
-from acquire.camera import CameraListing
+from acquire.camera.contract import CameraListing, not_one
 from acquire.camera.live import Driver, LiveCamera, Picture
 from acquire.clock import DeviceClock
-from acquire.errors import ConfigError, DataError, DeviceError
+from acquire.errors import DataError
 from acquire.events import EventSink
 from acquire.frame import ClockKind
 from acquire.genicam.device import CameraIdentity, GenicamDevice, Received
@@ -106,20 +106,7 @@ def name_of(library: Aravis, target: str, where: str) -> str:
     exact = [one for one in found if target and target == one.id]
     if len(found) == 1 or exact:
         return (exact or found)[0].id
-    here = "; ".join(Message("genicam:{id}  {one}", one.id, one) for one in cameras) or Message("none")
-    if found:
-        raise ConfigError(
-            "{where}: {count} cameras are meant; give one of them. Cameras here: {here}",
-            where,
-            len(found),
-            here,
-        )
-    raise DeviceError(
-        "{where}: no such GigE or USB3 camera answers. Cameras here: {here}. Check cable, power and address "
-        "(docs/machine-vision.md)",
-        where,
-        here,
-    )
+    raise not_one(where, len(found), [Message("genicam:{id}  {one}", one.id, one) for one in cameras])
 
 
 def _is_ip(text: str) -> bool:
