@@ -131,6 +131,8 @@ class SimCamera(Closing):
 
     Attributes
     ----------
+    scene : Scene
+        What it sees, for the truth.
     dropped : int
         Frames lost so far because no buffer was free or the renderer was late.
     """
@@ -148,7 +150,7 @@ class SimCamera(Closing):
         self.specimen, self._settings, self._on_event = specimen, settings, on_event
         self._clock, self._stopped = clock, threading.Event()
         self._sleep = sleep or self._stopped.wait
-        self._scene = settings.scene(specimen)
+        self.scene = settings.scene(specimen)
         self._exposer = Exposer(settings.sensor, (specimen.height, specimen.width), settings.seed + 1)
         self._plan = self._planned()
         self._ring = Ring(settings.buffers)
@@ -160,7 +162,7 @@ class SimCamera(Closing):
         self.info = self._describe(address)
         specimen.clock.claimed = True
         # Compiles what is not compiled yet, before time counts; the noise to come stays as it is.
-        Exposer(settings.sensor, (specimen.height, specimen.width), 0).expose(self._scene.render(0.0))
+        Exposer(settings.sensor, (specimen.height, specimen.width), 0).expose(self.scene.render(0.0))
 
     def _describe(self, address: str) -> CameraInfo:
         settings, sensor, specimen = self._settings, self._settings.sensor, self.specimen
@@ -199,11 +201,6 @@ class SimCamera(Closing):
         if now <= 0:
             return (brightness,)
         return CameraSetting("exposure_us", now, min(50.0, now), most, log=True), brightness
-
-    @property
-    def scene(self) -> Scene:
-        """Its scene, for the truth."""
-        return self._scene
 
     def __enter__(self) -> Self:
         if self._thread is None and not self._stopped.is_set():
@@ -316,7 +313,7 @@ class SimCamera(Closing):
         return planned.fate in ("good", "damaged")
 
     def _shoot(self, planned: sim_settings.Planned) -> Frame:
-        image, damaged = self._exposer.expose(self._scene.render(planned.t)), planned.fate == "damaged"
+        image, damaged = self._exposer.expose(self.scene.render(planned.t)), planned.fate == "damaged"
         image = upper_half(image) if damaged else image
         t = self._start() + planned.t
         raw = t if self.specimen.nominal else t + self._settings.exposure_s / 2
