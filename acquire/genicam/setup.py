@@ -275,11 +275,9 @@ def _rate(device: GenicamDevice, settings: GenicamSettings) -> float | None:
     for feature in RESULTING_RATES:
         if device.has(feature):
             return float(device.text(feature)) or None
-    return float(device.ask("arv_camera_get_frame_rate")) or None if _has_rate(device) else None
-
-
-def _has_rate(device: GenicamDevice) -> bool:
-    return bool(device.ask("arv_camera_is_frame_rate_available"))
+    if not device.ask("arv_camera_is_frame_rate_available"):
+        return None
+    return float(device.ask("arv_camera_get_frame_rate")) or None
 
 
 def _bits(settings: GenicamSettings, pixel_format: MonoFormat, where: str) -> int:
@@ -334,11 +332,9 @@ def _warnings(device: GenicamDevice, settings: GenicamSettings, fps: float | Non
             if device.has(TEST_PACKET)
             else Message("it cannot try larger ones by itself")
         )
-        yield (
-            Message(
-                "packets of {size} bytes: {larger}; set the MTU of the network card to 9000, then packet_size=8000 "
-                "(docs/machine-vision.md)",
-                size,
-                larger,
-            )
+        yield Message(
+            "packets of {size} bytes: {larger}; set the MTU of the network card to 9000, then packet_size=8000 "
+            "(docs/machine-vision.md)",
+            size,
+            larger,
         )

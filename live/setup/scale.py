@@ -341,14 +341,12 @@ def _tilt(change: float, uneven: float, extent: float, stand_off_mm: float | Non
     degrees = math.degrees(math.acos(min(1 - uneven, 1.0)))
     if stand_off_mm is not None:
         degrees = math.degrees(math.asin(min(change / extent * stand_off_mm, 1.0)))
-    yield (
-        Message(
-            "the board is tilted by {degrees:.0f} degrees: the scale changes by {change:.1%} over it, by "
-            "{uneven:.1%} between directions; set the camera square to it",
-            degrees,
-            change,
-            uneven,
-        )
+    yield Message(
+        "the board is tilted by {degrees:.0f} degrees: the scale changes by {change:.1%} over it, by "
+        "{uneven:.1%} between directions; set the camera square to it",
+        degrees,
+        change,
+        uneven,
     )
 
 
