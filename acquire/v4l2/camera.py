@@ -33,8 +33,8 @@ from acquire.v4l2.controls import (
     still_automatic,
 )
 from acquire.v4l2.device import Identity, Mode, NotACamera, Stamp, V4L2Device
-from acquire.v4l2.faults import cameras_here, fault_in_words, find_again, identities, why_not_open
 from acquire.v4l2.formats import FORMATS, decode, picture_size, preferred, warning_of
+from acquire.v4l2.listing import cameras_here, fault_in_words, find_again, identities, why_not_open
 
 log = logging.getLogger(__name__)
 

@@ -15,9 +15,8 @@ from acquire.v4l2 import api
 from acquire.v4l2.camera import set_up
 from acquire.v4l2.controls import V4L2Settings, changeable, exposure_s, list_controls
 from acquire.v4l2.device import Identity, SizeRange, V4L2Device
-from acquire.v4l2.faults import find_again
 from acquire.v4l2.formats import preferred
-from acquire.v4l2.listing import _modes
+from acquire.v4l2.listing import _modes, find_again
 from tests.acquire.v4l2 import fake_kernel
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
 
