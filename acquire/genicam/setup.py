@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from acquire.bounds import NotAllowed, as_number, not_kept, not_possible, same_value
-from acquire.camera.timing import Bounded, exposure_and_gain, longest_pause_s
+from acquire.camera.timing import Bounded, drifting, exposure_and_gain, longest_pause_s
 from acquire.errors import ConfigError, DeviceError
 from acquire.frame import CameraInfo
 from acquire.genicam.device import NO_ADJUSTMENT, GenicamDevice
@@ -311,11 +311,8 @@ def _bounded(device: GenicamDevice, what: str, value: float | None) -> Bounded |
 
 
 def _warnings(device: GenicamDevice, settings: GenicamSettings, fps: float | None) -> Iterator[str]:
-    automatic = [name for name in AUTOMATIC if device.has(name) and device.text(name) != "Off"]
-    if automatic:
-        yield Message(
-            "the camera goes on changing by itself: {listed}; grey levels may drift", ", ".join(automatic)
-        )
+    if words := drifting([name for name in AUTOMATIC if device.has(name) and device.text(name) != "Off"]):
+        yield words
     if device.has("Gamma") and not same_value(device.text("Gamma"), "1"):
         yield Message(
             "Gamma is {text}: grey levels are not proportional to light; give Gamma=1", device.text("Gamma")

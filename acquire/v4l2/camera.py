@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from acquire.addresses import Address
 from acquire.bounds import not_kept, not_possible
 from acquire.camera.live import DeviceFault, Driver, LiveCamera, Picture
-from acquire.camera.timing import StampOf, longest_pause_s
+from acquire.camera.timing import StampOf, drifting, longest_pause_s
 from acquire.errors import ConfigError, DataError, DeviceError
 from acquire.events import EventSink
 from acquire.frame import CameraInfo
@@ -157,14 +157,10 @@ def _in_force(
 ) -> CameraInfo:
     mode = device.mode()
     pixel_format = FORMATS[mode.fourcc]
-    automatic = still_automatic(controls)
-    warnings = [warning_of(pixel_format, full_range=mode.full_range, plane=settings.plane)]
-    if automatic:
-        warnings.append(
-            Message(
-                "the camera goes on changing by itself: {listed}; grey levels may drift", ", ".join(automatic)
-            )
-        )
+    warnings = [
+        warning_of(pixel_format, full_range=mode.full_range, plane=settings.plane),
+        drifting(still_automatic(controls)),
+    ]
     if mode.field in api.FIELDS_WOVEN:
         warnings.append(
             Message(
