@@ -86,6 +86,12 @@ def yes_or_no(word: str) -> bool:
     return word.lower() in TRUE_WORDS
 
 
+def in_steps(low: int, high: int, step: int) -> str:
+    """The whole numbers that a device takes, in words."""
+    steps = Message(" in steps of {step}", step) if step > 1 else ""
+    return Message("{low} to {high}{steps}", low, high, steps)
+
+
 def not_possible(where: object, key: str, value: object, allowed: object) -> ConfigError:
     """The error of a setting whose value is none of what is ``allowed``; ``where`` is its address."""
     return ConfigError(

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from acquire.bounds import NotAllowed, as_number, not_kept, not_possible, same_value
+from acquire.bounds import NotAllowed, as_number, in_steps, not_kept, not_possible, same_value
 from acquire.camera.timing import Bounded, drifting, exposure_and_gain, longest_pause_s
 from acquire.errors import ConfigError, DeviceError
 from acquire.frame import CameraInfo
@@ -168,9 +168,7 @@ def _set_region(device: GenicamDevice, settings: GenicamSettings, where: str) ->
 def _set_whole(device: GenicamDevice, feature: str, key: str, value: int, where: str) -> None:
     low, high, step = device.integer_bounds(feature)
     if not low <= value <= high or (value - low) % max(step, 1):
-        steps = Message(" in steps of {step}", step) if step > 1 else ""
-        allowed = Message("{low} to {high}{steps}", low, high, steps)
-        raise not_possible(where, key, value, allowed)
+        raise not_possible(where, key, value, in_steps(low, high, step))
     device.set_integer(feature, value)
     if (got := device.integer(feature)) != value:
         raise not_kept(where, key, value, got)
