@@ -69,11 +69,11 @@ def means() -> str:
 
 
 def channels() -> str:
-    """The channels of alarms and strain output."""
+    """The channels of alarms and strain output that are no columns of strain.csv."""
     rows = (
         (f"`{one.name}`", one.unit, one.words)
         for one in FIGURES
-        if one.channel and one.words  # others are columns of strain.csv
+        if one.channel and one.words and one.name not in COLUMNS
     )
     return table(("channel", "unit", "meaning"), rows)
 
