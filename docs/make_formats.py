@@ -135,7 +135,9 @@ TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
     "session": session_layout, "flags": flags, "means": means, "status": statuses,
     "response": response, "cycles": cycles, "channels": channels,
 })  # fmt: skip
-PAGES = tuple(DOCS / f"{name}.md" for name in ("session-format", "strain-format", "control", "data/settings"))
+PAGES = tuple(
+    DOCS / f"{name}.md" for name in ("strain-format", "control", "data/settings", "data/session-layout")
+)
 _TABLE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)
 
 
