@@ -136,7 +136,7 @@ TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
     "response": response, "cycles": cycles, "channels": channels,
 })  # fmt: skip
 PAGES = tuple(
-    DOCS / f"{name}.md" for name in ("strain-format", "control", "data/settings", "data/session-layout")
+    DOCS / f"{name}.md" for name in ("strain-format", "control", "data/settings", "data/datasets")
 )
 _TABLE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)
 
