@@ -21,7 +21,7 @@ from urllib.parse import quote, unquote
 from acquire.bounds import NotAllowed, integer_of, number_of, one_of, yes_or_no
 from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
-from acquire.text import Message
+from acquire.text import Message, meant
 
 # A glob may hold a question mark too: settings are the last one followed by key=value pairs, whose values have none
 # unless they are a pattern or what a device says and takes.
@@ -228,11 +228,12 @@ class Options:
             Names the unknown key and lists the known ones.
         """
         if self._left:
-            known = ", ".join(self._known) or Message("none")
+            first, known = next(iter(self._left)), ", ".join(self._known) or Message("none")
             raise ConfigError(
-                "{text}: unknown setting {next}; known: {known}",
+                "{text}: unknown setting {next}{meant}; known: {known}",
                 self.address.text,
-                repr(next(iter(self._left))),
+                repr(first),
+                meant(first, self._known),
                 known,
             )
 
@@ -310,9 +311,6 @@ class Registry(Generic[Device]):
     def open(self, text: str, on_event: EventSink = ignore_event) -> Device:
         """Open what ``text`` names; see ``Camera`` and ``LoadCell`` for what is raised."""
         address = parse_address(text)
-        return self._find(address)(address, on_event)
-
-    def _find(self, address: Address) -> Opener[Device]:
         opener = self._openers.get(address.scheme)
         if opener is None:
             for entry in entry_points(group=self._group, name=address.scheme):
@@ -324,13 +322,14 @@ class Registry(Generic[Device]):
                 f"{scheme}:" if scheme else "/dev/..." for scheme in [*self.schemes(), *self._elsewhere]
             )
             raise ConfigError(
-                "{text}: no {what} has the scheme {scheme}:; known: {known}",
+                "{text}: no {what} has the scheme {scheme}:{meant}; known: {known}",
                 address.text,
                 self._what,
                 address.scheme,
+                meant(address.scheme, [*self.schemes(), *self._elsewhere]),
                 known,
             )
-        return _load(opener) if isinstance(opener, str) else opener
+        return (_load(opener) if isinstance(opener, str) else opener)(address, on_event)
 
 
 def _load(path: str) -> Any:

@@ -4,10 +4,9 @@
 ``SpecimenDeformation`` is that of a specimen at one instant. Displacements are px on the reference grid,
 x right and y down: ``deformed(x + u, y + v) = reference(x, y)``.
 
-The strain fields of the virtual specimens, each linear in the two mean strains.
-
-A field is ``axial * A(x, y) + transverse * T(x, y)``; A and T are closed forms with exact
-gradients, so that they are computed once for the places that matter and combined at each instant.
+The strain fields of the virtual specimens are linear in the two mean strains. A field is ``axial * A(x, y) + transverse
+* T(x, y)``; A and T are closed forms with exact gradients, so that they are computed once for the places that matter
+and combined at each instant.
 
 - uniform: homogeneous.
 - hole: Kirsch's plate with a round hole in uniaxial tension, plane stress and small strain
@@ -104,7 +103,8 @@ class StrainModes:
         elif self.kind == "woven":
             pair = _woven(along, across, self.cell, self.overstrain)
         else:
-            pair = _uniform(along, across)
+            zero, one = np.zeros_like(along), np.ones_like(along)
+            pair = (along, zero, one, zero, zero, zero), (zero, across, zero, zero, zero, one)
         neck = _necked(along, across, *self.neck) if self.neck[1] else None
         if self.kind == "halves":
             neck = _first_half(along, across)
@@ -117,11 +117,6 @@ class StrainModes:
 def _swapped(mode: Mode) -> Mode:
     along, across, aa, ac, ca, cc = mode
     return across, along, cc, ca, ac, aa
-
-
-def _uniform(along: Array, across: Array) -> tuple[Mode, Mode]:
-    zero, one = np.zeros_like(along), np.ones_like(along)
-    return (along, zero, one, zero, zero, zero), (zero, across, zero, zero, zero, one)
 
 
 def _necked(along: Array, across: Array, middle: float, width: float) -> tuple[Mode, Mode]:

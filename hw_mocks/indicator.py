@@ -4,9 +4,8 @@ A dialect defines a reading on the line and the answers to commands; ``hw_mocks.
 those of real devices. ``AsciiIndicator`` is the free text of microcontroller sketches: it sends unasked and takes
 no commands. Pure: bytes in, bytes out, no clock.
 
-What a simulated indicator puts on the line at each sample, with the faults of the day.
-
-Pure: the time is handed in. Chunks come out; between two chunks of one sample the line pauses.
+At each sample an indicator puts chunks on the line, with the faults of the day; between two chunks of one sample the
+line pauses. The time is handed in.
 """
 
 from __future__ import annotations

@@ -340,7 +340,10 @@ class IndicatorServer(Closing):
             while not self._stopped.is_set():
                 t = self._boot + round(ideal * 1e3) / 1e3
                 self._listen_until(t)
-                self._plug(t)
+                if self._output.unplugged(t):
+                    self._port.unplug()
+                else:
+                    self._port.plug()
                 self._send(t)
                 ideal += self._output.interval(t)
         except Exception:
@@ -352,12 +355,6 @@ class IndicatorServer(Closing):
                 self._stopped.wait(min(left, POLL_S))
             elif data := self._port.read(min(left, POLL_S)):
                 self._port.write(self._output.answers(data, self._clock()))
-
-    def _plug(self, t: float) -> None:
-        if self._output.unplugged(t):
-            self._port.unplug()
-        else:
-            self._port.plug()
 
     def _send(self, t: float) -> None:
         for i, chunk in enumerate(self._output.sample(t)):

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from acquire.addresses import Address, Options
 from acquire.errors import ConfigError
 from acquire.settings import take_settings
+from acquire.text import meant
 from hw_mocks.deformation import NECK_AT, Axis, Gradient, Kind, SpecimenDeformation, StrainModes
 from hw_mocks.machine import FlowCurve, Machine, PowerLaw, Programme, Pull, TestClock
 from hw_mocks.sim_settings import CyclicSettings, SpecimenSettings
@@ -289,9 +290,10 @@ def _kind(address: Address) -> Kind:
         if kind == wanted:
             return kind
     raise ConfigError(
-        "{text}: there is no simulated specimen {wanted}; known: {listed}",
+        "{text}: there is no simulated specimen {wanted}{meant}; known: {listed}",
         address.text,
         repr(wanted),
+        meant(wanted, KINDS),
         ", ".join(KINDS),
     )
 

@@ -230,7 +230,7 @@ def open_camera(address: str, on_event: EventSink = ignore_event) -> Camera:
     return CAMERAS.open(with_scheme(address), on_event)
 
 
-class CroppedCamera:
+class CroppedCamera(CameraBase):
     """See ``acquire.camera.Camera``.
 
     Parameters
@@ -245,21 +245,11 @@ class CroppedCamera:
     """
 
     def __init__(self, camera: Camera, crop: Crop) -> None:
+        super().__init__()
         self._camera, self._cut = camera, RecordMode(crop=crop)
         self._cut.check(camera.info.width, camera.info.height)
         controls = {**camera.info.controls, "crop": list(crop)}
-        self.info: CameraInfo = dataclasses.replace(
-            camera.info, width=crop[2], height=crop[3], controls=controls
-        )
-
-    def __enter__(self) -> Self:
-        self._camera.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._camera.__exit__(kind, error, trace)
+        self.info = dataclasses.replace(camera.info, width=crop[2], height=crop[3], controls=controls)
 
     def __iter__(self) -> Iterator[Frame]:
         for frame in self._camera:
@@ -269,6 +259,8 @@ class CroppedCamera:
         """End the iteration; from any thread."""
         self._camera.stop()
 
-    def close(self) -> None:
-        """Release the device."""
+    def _start(self) -> None:
+        self._camera.__enter__()
+
+    def _release(self) -> None:
         self._camera.close()

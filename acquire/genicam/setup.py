@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 from acquire.bounds import NotAllowed, as_number, same_value
-from acquire.camera.timing import Bounded, exposure_and_gain
+from acquire.camera.timing import Bounded, exposure_and_gain, longest_pause_s
 from acquire.errors import ConfigError, DeviceError
-from acquire.frame import CameraSetting
+from acquire.frame import CameraInfo
 from acquire.genicam.device import NO_ADJUSTMENT, GenicamDevice
 from acquire.genicam.formats import FORMATS, MonoFormat, preferred, readable
 from acquire.genicam.library import GenicamError
@@ -43,41 +44,24 @@ class GenicamSetup:
 
     Attributes
     ----------
+    info : CameraInfo
     format : MonoFormat
-    x, y, width, height : int, px
-    fps, exposure_s, gain : float or None
-    bits, white : int, int or None
-    controls : mapping of str to JSON value
-    settings : tuple of CameraSetting
-    formats : tuple of str
-    warnings : tuple of str
+    x, y : int, px
+    gain : float or None
     """
 
+    info: CameraInfo
     format: MonoFormat
     x: int
     y: int
-    width: int
-    height: int
-    fps: float | None
-    exposure_s: float | None
     gain: float | None
-    bits: int
-    white: int | None
-    controls: dict[str, Any]
-    settings: tuple[CameraSetting, ...]
-    formats: tuple[str, ...]
-    warnings: tuple[str, ...]
-
-    @property
-    def picture(self) -> tuple[str, int, int]:
-        """What must be the same after the camera was away."""
-        return self.format.name, self.width, self.height
 
     def kept(self, asked: GenicamSettings) -> GenicamSettings:
         """What to ask of the camera when it comes back: it may have lost its power and all its settings."""
+        info, exposure_s = self.info, self.info.exposure_s
         return replace(
-            asked, format=self.format.name, x=self.x, y=self.y, width=self.width, height=self.height,
-            exposure_us=None if self.exposure_s is None else self.exposure_s * 1e6, gain=self.gain,
+            asked, format=self.format.name, x=self.x, y=self.y, width=info.width, height=info.height,
+            exposure_us=None if exposure_s is None else exposure_s * 1e6, gain=self.gain,
         )  # fmt: skip
 
 
@@ -89,7 +73,7 @@ def set_up(device: GenicamDevice, settings: GenicamSettings, where: str) -> Geni
     device : GenicamDevice
     settings : GenicamSettings
     where : str
-        The address, for messages.
+        The address.
 
     Raises
     ------
@@ -295,25 +279,37 @@ def _in_force(
         for what in ("exposure_time", "gain")
     )
     fps = _rate(device, settings)
+    exposure_s = None if exposure_us is None else exposure_us * 1e-6
     bits = _bits(settings, pixel_format, where)
-    return GenicamSetup(
-        format=pixel_format,
-        x=device.integer("OffsetX") if device.has("OffsetX") else 0,
-        y=device.integer("OffsetY") if device.has("OffsetY") else 0,
+    info = CameraInfo(
+        address=where,
+        name=f"{device.identity}, {'GigE' if device.is_gige else 'USB3'} Vision",
         width=device.integer("Width"),
         height=device.integer("Height"),
-        fps=fps,
-        exposure_s=None if exposure_us is None else exposure_us * 1e-6,
-        gain=gain,
         bits=bits,
-        white=_white(device, settings, bits),
+        live=True,
+        clock="device",
+        fps=fps,
+        exposure_s=exposure_s,
+        pixel_format=pixel_format.name,
         controls=dict(_shown(device, settings)),
+        warnings=tuple(_warnings(device, settings, fps)),
         settings=exposure_and_gain(
             _bounded(device, "exposure_time", exposure_us), _bounded(device, "gain", gain), fps
         ),
         formats=tuple(readable(device.choices("PixelFormat"))),
-        warnings=tuple(_warnings(device, settings, fps)),
+        white_level=_white(device, settings, bits),
+        pause_s=_pause_s(settings, fps, exposure_s),
     )
+    x, y = (device.integer(name) if device.has(name) else 0 for name in ("OffsetX", "OffsetY"))
+    return GenicamSetup(info, pixel_format, x, y, gain)
+
+
+def _pause_s(settings: GenicamSettings, fps: float | None, exposure_s: float | None) -> float:
+    """Time without a picture that is no fault; a camera that waits for a trigger may rest for hours."""
+    if settings.stall_s is not None:
+        return settings.stall_s
+    return math.inf if settings.waits_for_trigger else longest_pause_s(fps, exposure_s)
 
 
 def _rate(device: GenicamDevice, settings: GenicamSettings) -> float | None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from acquire.addresses import Address, expanded
@@ -33,6 +34,9 @@ INTRA = {
 """Codecs, by their code in small letters, each of whose pictures stands alone; H.264, VP9 and all others do not."""
 FILM_WARNING = Message("compressed film: strain may be 10 % low; record MJPG, FFV1 or pictures")
 _AS_JPEG = ("mjpg", "jpeg", "mjpa", "avrn")
+_COLOURED = (
+    8.0  # of 255, between the planes of a picture in the mean; a codec shifts those of a grey one less
+)
 _HEAD = 1 << 20  # bytes, with the tables of the first picture
 _COUNTED = ((0, b"RIFF"), (4, b"ftyp"))  # containers with the number of frames; others have but a duration
 _MOST_COUNTED = 50_000_000  # bytes that are read through to count frames
@@ -42,7 +46,7 @@ _MOST_COUNTED = 50_000_000  # bytes that are read through to count frames
 class VideoSettings:
     """Settings of ``video:test.mp4``."""
 
-    gray: str = setting(choice(*GRAYS), "luma", "what is grey in a colour picture")
+    gray: str | None = setting(choice(*GRAYS), None, "what is grey in a colour picture")
     fps: float | None = setting(
         number(1e-6, 1e6), None, "of the camera, where the film is played slower", "1/s"
     )
@@ -97,8 +101,8 @@ class VideoFile(CameraBase):
             clock="nominal",
             fps=self._fps,
             pixel_format=code,
-            controls={"gray": settings.gray, "frames": frames, "inter_frame": inter_frame} | steps,
-            warnings=(FILM_WARNING,) * inter_frame + (WEBCAM_WARNING,),
+            controls={"gray": settings.gray or "luma", "frames": frames, "inter_frame": inter_frame} | steps,
+            warnings=(FILM_WARNING,) * inter_frame + (WEBCAM_WARNING,) + tuple(self._depth(cv2)),
         )
 
     def __iter__(self) -> Iterator[Frame]:
@@ -121,8 +125,28 @@ class VideoFile(CameraBase):
             yield Frame(frozen(self._grey(picture, index)), index, t, "nominal", 0, 8, stamp)
             index += 1
 
+    def _depth(self, cv2: Any) -> Iterator[str]:
+        """What OpenCV leaves of samples with more than 8 bits, by the code of FFmpeg for their format."""
+        code = int(self._capture.get(cv2.CAP_PROP_CODEC_PIXEL_FORMAT)) & 0xFFFFFFFF
+        ends = (
+            () if _fourcc(code)[:3] in ("RGB", "BGR") else (code & 0xFF, code >> 24)
+        )  # least, most significant first
+        for bits in (one for one in ends if 8 < one <= 16):
+            yield Message(
+                "film of {bits} bits, read as 8: noise and strain are coarser; give it as pictures", bits
+            )
+
     def _grey(self, picture: NDArray[Any], index: int) -> NDArray[Any]:
-        image = to_gray(picture, self._settings.gray, str(self._path))
+        image = to_gray(picture, self._settings.gray or "luma", str(self._path))
+        if index == 0 and self._settings.gray is None and picture.ndim == 3:
+            spread = float(np.ptp(picture[:, :, :3], axis=2).mean())
+            if spread > _COLOURED:
+                text = Message(
+                    "{path}: red, green and blue differ by {spread:.0f} of 255; grey is their luma; gray=g takes one",
+                    self._path,
+                    spread,
+                )
+                device_event(self._on_event, self._address, text)
         if image.shape != (self.info.height, self.info.width):
             raise DataError("{path}: frame {index} is of another size than the first", self._path, index)
         return image

@@ -4,7 +4,7 @@ Each reading is one query for a span of registers. Frames carry a CRC-16: a dama
 
 What cannot be detected: a wrong register map (type, word order, scale); compare the display.
 
-The register map of a Modbus transmitter: read from TOML, checked, nothing hard-coded.
+The register map is read from TOML and checked; nothing is hard-coded.
 """
 
 from __future__ import annotations

@@ -3,11 +3,10 @@
 Listening sends nothing. ``questions`` lists what asking would send, so that it can be shown first:
 an unknown machine may move.
 
-A pattern for ``protocol=lines``, made from lines that no other protocol understands.
-
-Lines are alike but for their numbers. The number behind a word such as *weight* or *force* is the value: sketches for
-the HX711 (``one reading: 12.4 | average: 12.3``), the plotter of the Arduino (``Force:12.3,Raw:8123``), JSON. Without
-such a word the first number that changes and is no clock may be it, which a person has to confirm.
+From lines that no other protocol understands, a pattern for ``protocol=lines`` is made. They are alike but for their
+numbers. The number behind a word such as *weight* or *force* is the value: sketches for the HX711 (``one reading: 12.4
+| average: 12.3``), the plotter of the Arduino (``Force:12.3,Raw:8123``), JSON. Without such a word the first number
+that changes and is no clock may be it, which a person has to confirm.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ others, a file's or a device's, may be anything and are made harmless for a term
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -222,6 +223,12 @@ _ADDRESS = re.compile(r"^([^\s?]+)\?[A-Za-z_]\w*=[^\s/]*(?=: |$)")
 def brief(text: object) -> str:
     """A sentence that begins with an address, without the settings of that address."""
     return changed(text, lambda words: _ADDRESS.sub(r"\1", words))
+
+
+def meant(given: str, known: Iterable[str]) -> str:
+    """Which of the ``known`` words is nearest to ``given``, in brackets to be added to a message; else empty."""
+    near = difflib.get_close_matches(given, list(known), 1)
+    return Message(" (did you mean {near}?)", near[0]) if near else ""
 
 
 def counted(n: int, noun: str) -> str:

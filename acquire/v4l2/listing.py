@@ -46,21 +46,17 @@ def list_cameras(kernel: Kernel | None = None) -> list[CameraListing]:
 def _look_at(node: str, kernel: Kernel) -> CameraListing | None:
     try:
         with contextlib.closing(V4L2Device(node, kernel)) as device:
-            return _listing(node, device)
+            best = preferred([offer.fourcc for offer in device.formats()])
+            return CameraListing(
+                address=node if best is None else f"{node}?format={best}",
+                name=str(device.identity),
+                stable_address=_stable(node),
+                details=tuple(_details(device)),
+            )
     except NotACamera:
         return None
     except OSError as error:
         return CameraListing(node, "", trouble=why_not_open(node, error, kernel))
-
-
-def _listing(node: str, device: V4L2Device) -> CameraListing:
-    best = preferred([offer.fourcc for offer in device.formats()])
-    return CameraListing(
-        address=node if best is None else f"{node}?format={best}",
-        name=str(device.identity),
-        stable_address=_stable(node),
-        details=tuple(_details(device)),
-    )
 
 
 def _details(device: V4L2Device) -> Iterator[str]:

@@ -30,7 +30,7 @@ from analysis.evaluate.gauges.extensometers import (
     RegionStrips,
     TransverseGauge,
 )
-from analysis.evaluate.gauges.gauge import Gauge, Parameter
+from analysis.evaluate.gauges.gauge import AUTO_GAUGES, Gauge, Parameter
 from analysis.evaluate.gauges.geometry import inside_polygon
 from analysis.evaluate.gauges.kinds import GAUGE_KINDS, AreaGauge, CircleGauge, StripGauge, ZoiGauge
 from analysis.evaluate.gauges.readings import GaugeSet, GaugeValue, distance, facing
@@ -53,6 +53,7 @@ from analysis.evaluate.tensile_figures import (
 
 __all__ = [
     "AT_LEAST",
+    "AUTO_GAUGES",
     "COME_APART",
     "CONFIDENCE",
     "GAUGE_KINDS",

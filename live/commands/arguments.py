@@ -3,13 +3,12 @@
 The module of a command is imported only when the command is called, so that ``phasedic --help`` starts fast. Each
 module has ``add_arguments(parser)`` and ``command(arguments) -> exit code``.
 
-Words of a command line as people type and drop them: quotes that stayed, and patterns that the shell expanded.
+Words are taken as people type and drop them: with quotes that stayed, and patterns that the shell expanded.
 """
 
 from __future__ import annotations
 
 import argparse
-import difflib
 import importlib
 import os
 import sys
@@ -20,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import EXIT_CODES, USAGE, ConfigError, PhasedicError
-from acquire.text import Message
+from acquire.text import Message, meant
 from live.words.language import said_here
 
 OF_PICTURES = ("replay", "check", "scale", "lens", "readout", "study", "average", "init", "run", "page")
@@ -254,11 +253,17 @@ def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
         parser.exit(USAGE)
     wanted = next((word for word in argv if not word.startswith("-")), "")
     if wanted and wanted not in COMMANDS:
-        near = difflib.get_close_matches(wanted, COMMANDS, 1)
-        meant = Message(" (did you mean {near}?)", near[0]) if near else ""
-        text = Message("there is no command {name}{meant}; phasedic --help lists all", repr(wanted), meant)
+        near = meant(wanted, COMMANDS)
+        text = Message("there is no command {name}{meant}; phasedic --help lists all", repr(wanted), near)
         parser.error(said_here(text))
-    arguments = parser.parse_args(argv)
+    arguments, unknown = parser.parse_known_args(argv)
+    if unknown:
+        own = subparsers(parser).choices[arguments.command]
+        options = (option for action in own._actions for option in action.option_strings)
+        first = next((word.partition("=")[0] for word in unknown if word.startswith("--")), "")
+        own.error(
+            said_here("unrecognized arguments: %s") % " ".join(unknown) + said_here(meant(first, options))
+        )
     command: Command = importlib.import_module(COMMANDS[arguments.command].module).command
     return command, arguments
 
@@ -280,16 +285,21 @@ def full_parser(complete: Iterable[str], *, all_options: bool = True) -> argpars
         formatter_class=formatter,
     )
     parser.add_argument("--version", action="version", version=_version())
-    subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     with_arguments = set(complete)
     for name, entry in COMMANDS.items():
-        own = subparsers.add_parser(
+        own = commands.add_parser(
             name, help=entry.help, epilog=example_of(name) + EXIT_CODES, formatter_class=formatter
         )
         own.register("type", None, not_empty)
         if name in with_arguments:
             importlib.import_module(entry.module).add_arguments(own)
     return parser
+
+
+def subparsers(parser: argparse.ArgumentParser) -> argparse._SubParsersAction[argparse.ArgumentParser]:
+    """The parsers of the commands."""
+    return next(action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
 
 
 def _version() -> str:

@@ -24,18 +24,7 @@ from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
 from acquire.text import Message, about, word
 from acquire.text.message import printable
-from live.commands.options import (
-    MEASURE,
-    PICTURES,
-    add_config_file,
-    add_help_all,
-    add_lens,
-    add_options,
-    add_verbose,
-    configured,
-    overrides,
-    require_new,
-)
+from live.commands import options
 from live.commands.process import interrupts
 from live.config.cameras import camera_configs
 from live.config.loading import Config
@@ -218,8 +207,8 @@ LISTEN_S = 3.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic check``."""
-    add_options(parser, "devices", "camera", "back", "beside", "crop", "dark", "flat", "load")
-    add_options(parser, "recording of the test", "record", "no-record", "seconds", "out")
+    options.add_options(parser, "devices", "camera", "back", "beside", "crop", "dark", "flat", "load")
+    options.add_options(parser, "recording of the test", "record", "no-record", "seconds", "out")
     parser.add_argument(
         "--target", type=float, metavar="UM_M", help="largest strain noise of one ZOI for the test, um/m"
     )
@@ -233,25 +222,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="repeat the check three times a second until Ctrl-C, with the peak of the sharpness",
     )
-    add_config_file(parser)
-    add_options(parser, "measurement", *(name for name in MEASURE if name != "strain"), "axis")
-    add_lens(parser)
-    add_options(parser, "view of --watch", "no-view")
-    add_verbose(parser)
-    add_help_all(parser)
+    options.add_config_file(parser)
+    options.add_options(
+        parser, "measurement", *(name for name in options.MEASURE if name != "strain"), "axis"
+    )
+    options.add_lens(parser)
+    options.add_options(parser, "view of --watch", "no-view")
+    options.add_verbose(parser)
+    options.add_help_all(parser)
 
 
 def command(arguments: argparse.Namespace) -> int:
     """Run the check; 0 for GO, 6 for NO-GO."""
     screen = TerminalScreen()
-    config = configured(arguments)
+    config = options.configured(arguments)
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (see phasedic devices)")
     target = None if arguments.target is None else arguments.target * 1e-6
-    cameras = camera_configs(config, overrides(arguments))
+    cameras = camera_configs(config, options.overrides(arguments))
     snapshots = {name: _snapshot_of(name, arguments.snapshot) for name in cameras}
     for path in filter(None, snapshots.values()):
-        require_new(path, *PICTURES)
+        options.require_new(path, *options.PICTURES)
     check_load_port(config.load.address)
     if arguments.watch:
         first, one = next(iter(cameras.items()))

@@ -22,20 +22,12 @@ def script(shell: str) -> str:
     """The script for one of ``SHELLS``, from the parsers of all commands."""
     import shtab
 
-    from live.commands.arguments import COMMANDS, full_parser
+    from live.commands.arguments import COMMANDS, full_parser, subparsers
 
     parser = full_parser(COMMANDS)
-    for own in _subparsers(parser).choices.values():
-        _complete_files(own, shtab.FILE)
+    for own in subparsers(parser).choices.values():
+        # Complete file names for every argument with a free value: shtab reads the attribute ``complete``.
+        for action in own._actions:
+            if action.nargs != 0 and action.choices is None:
+                action.complete = shtab.FILE  # type: ignore[attr-defined]
     return str(shtab.complete(parser, shell))
-
-
-def _subparsers(parser: argparse.ArgumentParser) -> argparse._SubParsersAction[argparse.ArgumentParser]:
-    return next(action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
-
-
-def _complete_files(parser: argparse.ArgumentParser, files: object) -> None:
-    """Complete file names for every argument with a free value: shtab reads the attribute ``complete``."""
-    for action in parser._actions:
-        if action.nargs != 0 and action.choices is None:
-            action.complete = files  # type: ignore[attr-defined]

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import pydoc
 import re
 import sys
 from pathlib import Path
 
 from acquire.errors import ConfigError, DataError
-from acquire.text import Message
+from acquire.text import Message, meant
 from live.ui.terminal.screen import print_line
 
 TOP = Path(__file__).parents[2]
@@ -35,9 +34,9 @@ def command(arguments: argparse.Namespace) -> int:
     page, _, anchor = arguments.name.partition("#")
     name = page.removeprefix("docs/").removesuffix(".md")
     if name not in pages:
-        near = difflib.get_close_matches(name, pages, 1)
-        meant = Message(" (did you mean {near}?)", near[0]) if near else ""
-        raise ConfigError("there is no page {name}{meant}; phasedic docs lists all", repr(name), meant)
+        raise ConfigError(
+            "there is no page {name}{meant}; phasedic docs lists all", repr(name), meant(name, pages)
+        )
     text = _section(pages[name].read_text(encoding="utf-8"), anchor)
     if not text:
         raise ConfigError("{name} has no section {anchor}; phasedic docs {name} shows all", name, anchor)

@@ -3,7 +3,7 @@
 An option is declared with its key in ``live.config.sections``: name, type, default and help stand once. Its value
 is stored under "section.key".
 
-Gauges that are added to a finished run, read from its stored maps (``--gauges`` of report, show and export).
+Report, show and export have ``--gauges`` in common: gauges added to a finished run, read from its stored maps.
 """
 
 from __future__ import annotations

@@ -13,16 +13,8 @@ import numpy as np
 
 from acquire.errors import ConfigError
 from acquire.text import Message
+from live.commands import options
 from live.commands.arguments import bad_value
-from live.commands.options import (
-    add_config_file,
-    add_help_all,
-    add_options,
-    add_picture_order,
-    add_verbose,
-    in_picture_order,
-    overrides,
-)
 from live.config.new_files import check_free, new_folder
 from live.config.values import AUTO, numbers_of
 from live.results.report.saving import save_figures
@@ -50,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--step", type=_numbers, metavar="PX,PX", help="distances of ZOIs (default: a quarter of the side)"
     )
-    add_picture_order(parser, _numbers, default=[1])
+    options.add_picture_order(parser, _numbers, default=[1])
     parser.add_argument(
         "--window",
         type=_windows,
@@ -67,10 +59,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", dest="folder", default="study", metavar="DIR", help=f"{words} (default study)"
     )
-    add_config_file(parser)
-    add_options(parser, "measurement", *MEASURE)
-    add_verbose(parser)
-    add_help_all(parser)
+    options.add_config_file(parser)
+    options.add_options(parser, "measurement", *MEASURE)
+    options.add_verbose(parser)
+    options.add_help_all(parser)
 
 
 def command(arguments: argparse.Namespace) -> int:
@@ -84,8 +76,8 @@ def command(arguments: argparse.Namespace) -> int:
     check_free(out)
     settings, found = _settings(arguments), []
     config_file = Path(arguments.config) if arguments.config else None
-    source = in_picture_order(arguments.source, arguments.picture_order)
-    request = ReplayRequest(source, config_file, overrides(arguments), reference=arguments.reference)
+    source = options.in_picture_order(arguments.source, arguments.picture_order)
+    request = ReplayRequest(source, config_file, options.overrides(arguments), reference=arguments.reference)
     with open_source(request) as (material, config):
         screen.print(material.words)
         if AUTO in (config.measure.roi, config.measure.gauges):

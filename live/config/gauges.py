@@ -16,7 +16,7 @@ import numpy as np
 
 from acquire.errors import ConfigError
 from acquire.text import Message
-from analysis.evaluate import GAUGE_KINDS, Gauge, LineGauge, Parameter, inside_polygon
+from analysis.evaluate import GAUGE_KINDS, Gauge, LineGauge, Parameter
 from live.config.values import CORNERS, POINT, RECTANGLE, Check, choice, integer, length, number
 
 if TYPE_CHECKING:
@@ -31,11 +31,7 @@ NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 DEFAULT_KIND = "line"
 """The kind of a gauge without ``kind``."""
 MAX_COLOUR = 999
-AUTO_GAUGES = ("extension", "width", "area")
-"""The gauges that ``live.setup.grid`` places on the specimen."""
 _OFF_DEG = 10.0  # by which a line and its ZOIs may differ: 4 % of the strain of a tensile test
-_OFF_REGION, _HOLES = 0.1, 0.5  # of the area of a gauge (of its length); holes may be meant
-_SAMPLES = 100  # along the box around a gauge
 _POSITIONS = {"point": POINT, "box": RECTANGLE, "corners": CORNERS}
 
 
@@ -123,38 +119,22 @@ def _check_ends(gauge: LineGauge, grid: ZoiGrid) -> None:
 
 
 def partly(gauge: Gauge, grid: ZoiGrid) -> str:
-    """What of a gauge lies off the region or over holes, in words; empty where that is little.
-
-    A ZOI is its square of pixels. Of a line, the distance of its ends counts; a point takes the nearest ZOI.
-    """
-    if isinstance(gauge, LineGauge):
-        length, asked = (abs(one) for one in _lengths(gauge, grid))
-        if length > (1 - _OFF_REGION) * asked:
-            return ""
-        return Message(
-            "gauge {name}: L0 is {length:.0f} px, {asked:.0f} were asked for: its ends lie off the ZOIs; move them",
-            gauge.name,
-            length,
-            asked,
-        )
-    measured = np.zeros((grid.roi.y + grid.roi.height, grid.roi.x + grid.roi.width), bool)
-    for i, j in np.argwhere(grid.active):
-        measured[grid.first_y[i] :, grid.first_x[j] :][: grid.size, : grid.size] = True
-    corners = np.array(gauge.outline(grid.size)[0])
-    x, y = np.meshgrid(*np.linspace(corners.min(axis=0), corners.max(axis=0), _SAMPLES).T)
-    column, row = (np.floor(places[inside_polygon(x, y, corners)]).astype(int) for places in (x, y))
-    there = (column >= 0) & (row >= 0) & (column < measured.shape[1]) & (row < measured.shape[0])
-    column, row, total = column[there], row[there], max(len(there), 1)
-    rows, columns = (np.asarray(measured.any(axis=axis)) for axis in (1, 0))
-    on_region = rows[row] & columns[column]
-    off, missing = (1 - np.count_nonzero(found) / total for found in (on_region, measured[row, column]))
-    over_holes = missing >= _HOLES and gauge.name not in AUTO_GAUGES
-    if gauge.kind == "zoi" or not (off >= _OFF_REGION or over_holes):
+    """What of a gauge lies off the region or over holes, in words; empty where that is little."""
+    share = gauge.share(grid)
+    if share == 1:
         return ""
+    if not isinstance(gauge, LineGauge):
+        return Message(
+            "gauge {name}: {share:.0%} of its area lies where nothing is measured; its value is of the rest: move it",
+            gauge.name,
+            1 - share,
+        )
+    length, asked = (abs(one) for one in _lengths(gauge, grid))
     return Message(
-        "gauge {name}: {share:.0%} of its area lies where nothing is measured; its value is of the rest: move it",
+        "gauge {name}: L0 is {length:.0f} px, {asked:.0f} were asked for: its ends lie off the ZOIs; move them",
         gauge.name,
-        missing,
+        length,
+        asked,
     )
 
 

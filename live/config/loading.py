@@ -8,7 +8,6 @@ JSON (``as_dict``); ``from_dict`` reads it back.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import reprlib
 import tomllib
@@ -20,24 +19,11 @@ from typing import Any, TypeVar
 from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
-from acquire.text import Message
+from acquire.text import Message, meant
+from analysis.evaluate import AUTO_GAUGES
+from live.config import sections
 from live.config.figures import CYCLE_CHANNELS, channel_names
-from live.config.gauges import AUTO_GAUGES, DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_checks
-from live.config.sections import (
-    AlarmConfig,
-    CameraConfig,
-    LensConfig,
-    LoadConfig,
-    MeasureConfig,
-    OperateConfig,
-    OutputConfig,
-    PlateConfig,
-    RecordConfig,
-    ScaleConfig,
-    SpecimenConfig,
-    StrainOutConfig,
-    ViewConfig,
-)
+from live.config.gauges import DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_checks
 from live.config.values import AUTO, Check, Option, in_px
 
 Section = TypeVar("Section")
@@ -54,26 +40,26 @@ _REMOVED_KEYS = {
 class Config:
     """All sections, the virtual gauges by name, and free metadata (specimen, operator, material, note ...)."""
 
-    camera: CameraConfig = field(default_factory=CameraConfig)
-    load: LoadConfig = field(default_factory=LoadConfig)
-    measure: MeasureConfig = field(default_factory=MeasureConfig)
-    scale: ScaleConfig = field(default_factory=ScaleConfig)
-    lens: LensConfig = field(default_factory=LensConfig)
-    record: RecordConfig = field(default_factory=RecordConfig)
-    operate: OperateConfig = field(default_factory=OperateConfig)
-    strain_out: StrainOutConfig = field(default_factory=StrainOutConfig)
-    view: ViewConfig = field(default_factory=ViewConfig)
-    specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
-    output: OutputConfig = field(default_factory=OutputConfig)
-    alarm: tuple[AlarmConfig, ...] = ()
+    camera: sections.CameraConfig = field(default_factory=sections.CameraConfig)
+    load: sections.LoadConfig = field(default_factory=sections.LoadConfig)
+    measure: sections.MeasureConfig = field(default_factory=sections.MeasureConfig)
+    scale: sections.ScaleConfig = field(default_factory=sections.ScaleConfig)
+    lens: sections.LensConfig = field(default_factory=sections.LensConfig)
+    record: sections.RecordConfig = field(default_factory=sections.RecordConfig)
+    operate: sections.OperateConfig = field(default_factory=sections.OperateConfig)
+    strain_out: sections.StrainOutConfig = field(default_factory=sections.StrainOutConfig)
+    view: sections.ViewConfig = field(default_factory=sections.ViewConfig)
+    specimen: sections.SpecimenConfig = field(default_factory=sections.SpecimenConfig)
+    output: sections.OutputConfig = field(default_factory=sections.OutputConfig)
+    alarm: tuple[sections.AlarmConfig, ...] = ()
     gauges: Mapping[str, GaugeTable] = field(default_factory=dict)
-    plate: Mapping[str, PlateConfig] = field(default_factory=dict)
+    plate: Mapping[str, sections.PlateConfig] = field(default_factory=dict)
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """Nested plain values for JSON: the keys of each section, the alarms by number."""
         plain = dataclasses.asdict(self)
-        for name, used in (("plate", bool(self.plate)), ("lens", self.lens != LensConfig())):
+        for name, used in (("plate", bool(self.plate)), ("lens", self.lens != sections.LensConfig())):
             if not used:  # a section that versions before do not have
                 del plain[name]
         return plain | {"alarm": {str(n): alarm for n, alarm in enumerate(plain["alarm"], 1)}}
@@ -187,13 +173,29 @@ def _overlaid(tree: Mapping[str, Any], overrides: Mapping[str, Any], where: str)
             section[key] = value
     for name, _, key in (dotted.partition(".") for dotted in other_shapes(overrides)):
         merged[name].pop(key, None)
+    _check_given(overrides, merged, where)
     return _build(merged, where)
+
+
+def _check_given(overrides: Mapping[str, Any], merged: Mapping[str, Any], where: str) -> None:
+    """What is impossible on the command line is not to be looked for in the file ``where``."""
+    told, px_per_mm = Message("command line"), None
+    for name in ("scale", *(name for name in _SECTIONS if name != "scale")):
+        content = {key.partition(".")[2]: one for key, one in overrides.items() if key.startswith(f"{name}.")}
+        if content:
+            _section(_SECTIONS[name], name, content, told, px_per_mm)
+        px_per_mm = px_per_mm or _px_per_mm(merged, where)
 
 
 def _read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     tree = _plain_toml(path, text)
     if isinstance(tree.get("lens"), str):
         tree["lens"] = lens_in(Path(tree["lens"]))
+    specimen = tree.get("specimen")
+    given = {f"specimen.{key}" for key in specimen} if isinstance(specimen, Mapping) else set()
+    if len(ways := [shape & given for shape in _SHAPES if shape & given]) > 1:
+        one, other, *_ = (" and ".join(sorted(way, reverse=True)) for way in ways)
+        raise ConfigError("{path}: {one} and {other} are two sections; leave out one", path, one, other)
     return tree
 
 
@@ -241,7 +243,7 @@ def _px_per_mm(tree: Mapping[str, Any], where: str) -> float | None:
     content = tree.get("scale")
     if not isinstance(content, Mapping):
         return None
-    return _section(ScaleConfig, "scale", content, where).px_per_mm
+    return _section(sections.ScaleConfig, "scale", content, where).px_per_mm
 
 
 def _section(
@@ -297,9 +299,9 @@ def _named_table(dotted: str, table: Any, where: str) -> Mapping[str, Any]:
     return table
 
 
-def _plate(name: str, table: Any, where: str, px_per_mm: float | None) -> PlateConfig:
+def _plate(name: str, table: Any, where: str, px_per_mm: float | None) -> sections.PlateConfig:
     dotted = f"plate.{name}"
-    plate = _section(PlateConfig, dotted, _named_table(dotted, table, where), where, px_per_mm)
+    plate = _section(sections.PlateConfig, dotted, _named_table(dotted, table, where), where, px_per_mm)
     if plate.box is None:
         raise ConfigError("{where}: {dotted}: give box = [x, y, width, height] in px", where, dotted)
     return plate
@@ -311,13 +313,13 @@ def _gauge(name: str, table: Any, where: str, px_per_mm: float | None) -> GaugeT
     return {"kind": DEFAULT_KIND, **values}
 
 
-def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:
+def _alarms(content: Any, where: str) -> tuple[sections.AlarmConfig, ...]:
     if isinstance(content, Mapping):  # by number, as stored in files
         content = list(content.values())
     if not isinstance(content, list | tuple) or not all(isinstance(table, Mapping) for table in content):
         raise ConfigError("{where}: alarm must be tables, [[alarm]] with keys below it", where)
     alarms = tuple(
-        _section(AlarmConfig, Message("alarm {number}", number), table, where)
+        _section(sections.AlarmConfig, Message("alarm {number}", number), table, where)
         for number, table in enumerate(content, 1)
     )
     for number, alarm in enumerate(alarms, 1):
@@ -369,6 +371,4 @@ def _short_repr(value: Any) -> str:
 
 
 def _suggestion(word: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(word, known, 1)
-    meant = Message(" (did you mean {near}?)", near[0]) if near else ""
-    return Message("{meant}; known: {listed}", meant, ", ".join(known))
+    return Message("{meant}; known: {listed}", meant(word, known), ", ".join(known))

@@ -281,7 +281,7 @@ class SpecimenConfig:
     thickness_mm: float | None = key(number(1e-4, 1e5), None, "thickness of the section, mm")
     diameter_mm: float | None = key(number(1e-3, 1e5), None, "diameter of a round section, mm")
     area_mm2: float | None = key(number(1e-6, 1e9), None,
-        "area of the section, mm^2; takes precedence over width, thickness and diameter")
+        "area of the section, mm^2, in place of width and thickness or a diameter")
     gauge_length_mm: float | None = key(number(1e-3, 1e6), None,
         "gauge length, mm; reported with the extensions")
     force_error_percent: float | None = key(number(0, 100), None,

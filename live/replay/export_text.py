@@ -1,12 +1,8 @@
 """How the text of an export is read: its lines, its numbers, its headings.
 
-The text of an exported file: its encoding, its lines in blocks, and their cells.
-
-The form of the numbers and times in an exported file: decimal mark, groups of thousands, hours and minutes.
-
-What the heading of an exported column means: force, time, name of a picture or number of a row, and its unit.
-
-Names are those of common testing machines, in the languages of their programs; units stand in brackets, after a
+Lines come in blocks, after their encoding is known, and are cut into cells. Numbers and times have a form: decimal
+mark, groups of thousands, hours and minutes. A heading means force, time, name of a picture or number of a row. Names
+are those of common testing machines, in the languages of their programs; units stand in brackets, after a
 slash, comma, blank or underscore, or below the heading.
 """
 

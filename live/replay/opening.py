@@ -21,7 +21,8 @@ from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from acquire.session import Session
 from acquire.text import Message
-from live.config.gauges import AUTO_GAUGES, gauges_for
+from analysis.evaluate import AUTO_GAUGES
+from live.config.gauges import gauges_for
 from live.config.loading import Config, from_dict, laid_over, load_config, settings_in
 from live.config.values import AUTO
 from live.pipeline.consumer import Screen

@@ -1,10 +1,7 @@
 """The response of each place from the maps of a finished ``strain.h5``, which has the group for it.
 
-Its instants are read one by one: for where places leave their lines, then for the lines up to there.
-
-The response of the places in words, for summary, report, maps and exports.
-
-What the response of the places is over: a channel of a finished run, and the instants that count.
+It is over a channel of the run, at the instants that count. These are read one by one: for where places leave their
+lines, then for the lines up to there. Summary, report, maps and exports have it in words from here.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""Front and back of one specimen: two runs put together, their folders and clocks, and channels while they run.
+"""Front and back of one specimen put together: mean and bending of each strain, and the figures of the mean.
 
-The folder of a test with several cameras, which holds one of each, and the clocks of two runs.
-
-Front and back of the specimen put together: mean and bending of each strain, and the figures of the mean.
-
-The two sides come from two finished runs of one test, or from a test that still runs.
+The two sides come from two finished runs of one test, or from a test that still runs (``JointChannels``). The folder of
+a test with several cameras holds one of each; the clocks of two runs are put on one.
 """
 
 from __future__ import annotations

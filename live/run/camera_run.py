@@ -55,6 +55,7 @@ class CameraRun(Subscriber):
     ----------
     outputs : Outputs
     source : CameraSource
+    measurer : Measurer
     folder : Path
         Of the files; at the end where it is then, if it has been renamed.
     """
@@ -102,7 +103,7 @@ class CameraRun(Subscriber):
             lambda: self._recording.backlog if self._recording else 0.0,
             work=KernelWork(prepared.plan.grid.size, prepared.plan.grid.step, plan.burst),
         )
-        self._measurer = Measurer(prepared, run_state, self._incoming, latency, stream, stop, name)
+        self.measurer = Measurer(prepared, run_state, self._incoming, latency, stream, stop, name)
 
     def open_recording(self) -> None:
         """Open the recording, and pass the events so far, and those to come, to all who take them.
@@ -267,18 +268,6 @@ class CameraRun(Subscriber):
         self._run_state.event_log.emit(EventKind.START, "phasedic", Message("the test begins{waits}", waits))
         self._keeper.begin()
 
-    def start(self) -> None:
-        """Begin to take frames."""
-        self.source.start()
-
-    def start_measuring(self) -> None:
-        """Begin to measure; what came before waits."""
-        self._measurer.start()
-
-    def wait(self) -> None:
-        """Measure until the camera has ended; raises PhasedicError where the reference cannot be used."""
-        self._measurer.join()
-
     def stop_frames(self) -> None:
         """End the camera; no figure gets old by that. The samples of a load cell that is away are counted."""
         self._run_state.health.ended = True
@@ -289,7 +278,7 @@ class CameraRun(Subscriber):
         """Wait for the end of source and measurement, and count what was not measured."""
         self._incoming.close()
         self.source.join()
-        self._measurer.end()
+        self.measurer.end()
         self._incoming.count_skipped()
 
     def close(self) -> None:
@@ -312,7 +301,7 @@ class CameraRun(Subscriber):
         error = self.source.error
         if error is not None:
             return exit_code_of(error)
-        if failure := self._keeper.load_failure or self._measurer.failure:
+        if failure := self._keeper.load_failure or self.measurer.failure:
             return failure
         if self._stop.reason == INTERRUPTED:
             return EXIT_INTERRUPTED

@@ -1,6 +1,6 @@
 """The lens of a configuration, as ``phasedic lens`` calibrated it, checked against the pictures that it corrects.
 
-Calibration of a lens: from pictures of a board by OpenCV, or from shifted pictures of the specimen.
+It is calibrated from pictures of a board by OpenCV, or from shifted pictures of the specimen.
 
 Z. Zhang, IEEE Trans. PAMI 22 (2000) 1330-1334, for the board. OpenCV gives standard deviations alone; the covariance
 of the parameters follows here from its derivatives, with the poses of the board eliminated.

@@ -112,9 +112,9 @@ def from_width(
     )
 
 
-def false_strain(stand_off_mm: float, out_of_plane_mm: float = OUT_OF_PLANE_MM) -> float:
-    """False strain of a motion toward the camera: the image grows as the distance falls."""
-    return out_of_plane_mm / stand_off_mm
+def false_strain(stand_off_mm: float) -> float:
+    """False strain of a motion by ``OUT_OF_PLANE_MM`` toward the camera: the image grows as the distance falls."""
+    return OUT_OF_PLANE_MM / stand_off_mm
 
 
 # -- the width of the specimen ------------------------------------------------------------------

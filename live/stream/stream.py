@@ -4,9 +4,8 @@ Nothing is queued here and no lock is held while records are passed on, so the r
 and the thread that takes frames from a camera waits for nobody. Who takes a record returns at once; one that has work
 to do has a queue of its own, with its policy and its counts.
 
-What goes through a test: frames, bursts, load samples, events and measurements, each a record of the stream.
-
-Keeps the state of a camera's run: loads, history, counts and health, from the records of the stream.
+Frames, bursts, load samples, events and measurements go through a test, each a record of the stream. ``StateKeeper``
+keeps the state of a camera's run from them: loads, history, counts and health.
 """
 
 from __future__ import annotations

@@ -177,13 +177,35 @@ def test_which_codecs_hold_motion_back(tmp_path: Path, name: str, code: str, int
     with open_camera(f"video:{film(tmp_path / name, code)}") as camera:
         assert camera.info.controls["inter_frame"] is inter_frame
         assert (FILM_WARNING in camera.info.warnings) is inter_frame
+        assert not any("read as 8" in text for text in camera.info.warnings)
         assert (QUANTISATION in camera.info.controls) is (code == "MJPG")
+
+
+def test_a_colour_film_without_a_choice_is_named_once(tmp_path: Path) -> None:
+    told: list[Event] = []
+    path = film(tmp_path / "a.mkv", "FFV1")
+    for gray in ("", "?gray=g"):
+        with open_camera(f"video:{path}{gray}", told.append) as camera:
+            assert len(list(camera)) == 6
+    assert ["red, green and blue differ by 1" in event.text for event in told] == [True]
+
+
+def test_a_film_of_more_than_8_bits_is_named(tmp_path: Path) -> None:
+    path, size = tmp_path / "a.mkv", (64, 48)
+    depth = (cv2.VIDEOWRITER_PROP_DEPTH, cv2.CV_16U, cv2.VIDEOWRITER_PROP_IS_COLOR, 0)
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"FFV1"), 10, size, depth)
+    if not writer.isOpened():
+        pytest.skip("no films of 16 bits here")
+    writer.write(np.full(size[::-1], 30000, np.uint16))
+    writer.release()
+    with open_camera(f"video:{path}") as camera:
+        assert any("film of 16 bits, read as 8" in text for text in camera.info.warnings)
 
 
 @pytest.mark.parametrize(("code", "name"), [("FFV1", "a.mkv"), ("VP80", "a.webm")])
 def test_frames_are_counted_where_the_container_does_not(tmp_path: Path, code: str, name: str) -> None:
     told: list[Event] = []
-    with open_camera(f"video:{film(tmp_path / name, code, 7)}", told.append) as camera:
+    with open_camera(f"video:{film(tmp_path / name, code, 7)}?gray=luma", told.append) as camera:
         assert camera.info.controls["frames"] == 7
         assert len(list(camera)) == 7
     assert told == []
@@ -193,7 +215,7 @@ def test_a_film_is_begun_later_and_timed_anew(tmp_path: Path) -> None:
     path, told = film(tmp_path / "a.mkv", "FFV1", 7), list[Event]()
     with open_camera(f"video:{path}") as camera:
         whole = list(camera)
-    with open_camera(f"video:{path}?first=3&fps=1000", told.append) as camera:
+    with open_camera(f"video:{path}?first=3&fps=1000&gray=luma", told.append) as camera:
         assert (camera.info.fps, camera.info.controls["frames"]) == (1000, 5)
         frames = list(camera)
     assert [f.t for f in frames] == [k / 1000 for k in range(5)] and told == []
@@ -206,7 +228,7 @@ def test_a_film_that_is_cut_off_is_told(tmp_path: Path) -> None:
     path = film(tmp_path / "a.mkv", "FFV1", 12)
     path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
     told: list[Event] = []
-    with open_camera(f"video:{path}", told.append) as camera:
+    with open_camera(f"video:{path}?gray=luma", told.append) as camera:
         there = len(list(camera))
         assert camera.info.controls["frames"] == there < 12
     assert told[0].data == {"missing": 12 - there}

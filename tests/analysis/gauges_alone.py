@@ -23,7 +23,7 @@ def alone(gauge: Gauge, field: StrainField) -> Value:
     """Value, sigma and share of the area."""
     ends, how = gauge.zois(field.grid), gauge.reading
     value = _strips(ends, field, how.along) if how.statistic == "ends" else _area(gauge, ends[0], field)
-    return *value, min(_share(end, field) for end in ends)
+    return *value, gauge.share(field.grid) * min(_share(end, field) for end in ends)
 
 
 def _enough(chosen: Mask, field: StrainField) -> bool:

@@ -13,9 +13,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
 from typing import Any, ClassVar, Literal
 
-from analysis.evaluate.gauges.geometry import Line, Mask, Point
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.evaluate.gauges.geometry import Line, Mask, Point, inside_polygon
 from analysis.evaluate.gauges.readings import GaugeReading, GaugeSet, GaugeValue
 from analysis.field import StrainField, ZoiGrid
+
+AUTO_GAUGES = ("extension", "width", "area")
+"""The gauges of a whole specimen: holes in it are meant."""
+OFF_REGION, _HOLES = 0.1, 0.5  # of the area of a gauge (of its length); holes may be meant
+_SAMPLES = 100  # along the box around a gauge
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,3 +132,27 @@ class Gauge(ABC):
     def zois(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         """The active ZOIs that it takes, (R, C) bool: one mask, or one for each of its two ends."""
         return tuple(mask & grid.active for mask in self.select(grid))
+
+    def share(self, grid: ZoiGrid) -> float:
+        """The share of its area that ZOIs, each its square of pixels, measure; 1 where little is off the region."""
+        corners = np.array(self.outline(grid.size)[0])
+        x, y = np.meshgrid(*np.linspace(corners.min(axis=0), corners.max(axis=0), _SAMPLES).T)
+        inside = inside_polygon(x, y, corners)
+        j, i = _over(grid.first_x, x[inside], grid.size), _over(grid.first_y, y[inside], grid.size)
+        rows, columns = (_sums(np.asarray(grid.active.any(axis=axis))) for axis in (1, 0))
+        both = _sums(_sums(grid.active.T).T)
+        measured = both[i[1], j[1]] - both[i[0], j[1]] - both[i[1], j[0]] + both[i[0], j[0]] > 0
+        on_region = (rows[i[1]] > rows[i[0]]) & (columns[j[1]] > columns[j[0]])
+        off, missing = (1 - np.count_nonzero(found) / max(found.size, 1) for found in (on_region, measured))
+        over_holes = missing >= _HOLES and self.name not in AUTO_GAUGES
+        return 1 - missing if off >= OFF_REGION or over_holes else 1.0
+
+
+def _over(first: NDArray[np.intp], places: NDArray[np.float64], size: int) -> NDArray[np.intp]:
+    """Of the ZOIs with these ``first`` px along one axis, the first and one past the last over each place, (2, N)."""
+    return np.searchsorted(first, (places - size, places), "right")
+
+
+def _sums(values: NDArray[Any]) -> NDArray[np.intp]:
+    """Of all values before each along the first axis, and of all."""
+    return np.concatenate([np.zeros((1, *values.shape[1:]), np.intp), values.cumsum(axis=0, dtype=np.intp)])

@@ -50,7 +50,8 @@ class GaugeValue:
     reason : str
         Why there is none; empty where there is one.
     share : float
-        Of its area that the value stands for, at either end (``analysis.field.area_share``).
+        Of its area that the value stands for: of that which is measured, of the ZOIs that have a value at either end
+        (``analysis.field.area_share``).
     """
 
     value: float
@@ -111,6 +112,8 @@ class Readable(Protocol):
 
     def zois(self, grid: ZoiGrid) -> tuple[Mask, ...]: ...
 
+    def share(self, grid: ZoiGrid) -> float: ...
+
 
 class GaugeSet:
     """Reads gauges from field after field, all in one pass.
@@ -154,6 +157,7 @@ class GaugeSet:
     def _begin(self, field: StrainField) -> None:
         """Find the ZOIs of each on the grid of ``field``."""
         self._zois = [gauge.zois(field.grid) for gauge in self._gauges]
+        self._measured = [gauge.share(field.grid) for gauge in self._gauges]
         at = [np.flatnonzero(np.logical_or.reduce(ends)) for ends in self._zois]
         self._at, self._gauge = np.concatenate(at), np.repeat(np.arange(len(at)), [len(one) for one in at])
         self._status: NDArray[np.uint8] | None = None
@@ -170,7 +174,7 @@ class GaugeSet:
         for g in changed.tolist():
             ends = self._zois[g]
             self._taken[g] = self._gauges[g].reading.taken(ends, field, self._taken[g])
-            self._shares[g] = min(area_share(field, end) for end in ends)
+            self._shares[g] = self._measured[g] * min(area_share(field, end) for end in ends)
         self._status, taken = status, self._taken
         self._sums = _rows([row for one in taken for row in one.sums])
         self._noise = _rows([one.noise for one in taken])

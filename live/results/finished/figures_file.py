@@ -243,6 +243,7 @@ def finished(
     figures. A response of the places that is wanted is evaluated.
     """
     test = FinishedTest.of_run(run_state, config.specimen, config.gauges, reference_N, start_t)
+    test = replace(test, measure=config.measure.strain)
     further: Sequence[NamedFigure] = ()
     if config.output.response:
         lines, further = response_of(folder, test.figures, config.output.response)

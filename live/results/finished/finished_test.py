@@ -64,6 +64,8 @@ class FinishedTest:
         Where the force is held.
     response : tuple of str
         What was found of the response of the places, in words; empty where none was wanted.
+    measure : str
+        Of the strain.
     """
 
     curve: Curve
@@ -79,6 +81,7 @@ class FinishedTest:
     cycles: Cycles = field(default_factory=Cycles.none)
     creep: Creep | None = None
     response: tuple[str, ...] = ()
+    measure: str = "engineering"
 
     @classmethod
     def of_run(

@@ -1,6 +1,6 @@
 """Maps painted over pictures by OpenCV: each ZOI at its place at that instant, with title, colour bar or legend.
 
-The maps of a field in colours during a test: strains, principal strains, displacements, sigma, status.
+During a test and after it the same maps are painted: strains, principal strains, displacements, sigma, status.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""The plots of a report.
-
-The sections of cyclic tests, figures of cycles against the logarithm of their number, and of a creep.
-"""
+"""The plots of a report: those of every test, of cycles against the logarithm of their number, and of a creep."""
 
 from __future__ import annotations
 
@@ -186,9 +183,9 @@ def valid_share(run: RunFolder) -> Plot:
 def parts(run: RunFolder) -> str:
     """When the strains of the region and of gauges stand for a part of their area; empty where they never do."""
     names = [name for name in run.strain.values if name == "area_share" or name.startswith("share_gauge_")]
-    shares = np.min(
-        [np.asarray(run.strain.values[name], np.float64) for name in names] or [np.ones(1)], axis=0
-    )
+    columns = [np.asarray(run.strain.values[name], np.float64) for name in names] or [np.ones(1)]
+    # A gauge that lies partly off the region has a share below 1 throughout: a remark of its own says so.
+    shares = np.min([column / np.nanmax(column, initial=1e-9) for column in columns], axis=0)
     rows = np.flatnonzero(shares < 1)
     if not rows.size:
         return ""

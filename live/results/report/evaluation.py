@@ -1,6 +1,6 @@
 """The evaluation of a finished run: its curve with the tensile figures, the lag of the load, the instants to show.
 
-The still phase of a finished test and the noise floor measured in it, for report, comparison and batch.
+Report, comparison and batch have the still phase at its start from here, with the noise floor measured in it.
 """
 
 from __future__ import annotations

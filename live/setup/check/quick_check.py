@@ -1,6 +1,6 @@
 """The check, repeated several times a second while lens, light and exposure are adjusted.
 
-How much less sharp the picture is than the sharpest one so far, while lens and distance are adjusted.
+Meanwhile it says how much less sharp the picture is than the sharpest one so far.
 """
 
 from __future__ import annotations

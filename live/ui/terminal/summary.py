@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquire.text import Amount, Message, counts
+from acquire.text import Amount, Message, counts, joined
 from acquire.text.message import counted
 from live.pipeline.consumer import ConsumerReport, Screen
 from live.pipeline.event_log import sentence
@@ -79,7 +79,7 @@ def _ranked(run_state: RunState, test: FinishedTest) -> list[Ranked]:
     history = run_state.history
     if not history.has_values:
         return [(0, why_nothing(run_state))]
-    at_end, found = _at_end(history, test.axis.axis), findings(test)
+    at_end, found = _at_end(history, test), findings(test)
     groups = (
         (0, [valid_line(history), *at_end[:1]]),
         (2, at_end[1:]),
@@ -100,12 +100,14 @@ def _ranked(run_state: RunState, test: FinishedTest) -> list[Ranked]:
     return [(rank, line) for line, rank in ranks.items()]
 
 
-def _at_end(history: History, axis: str) -> list[str]:
+def _at_end(history: History, test: FinishedTest) -> list[str]:
     """The strain of the last burst; where it has none, also of the last that has one."""
+    axis, plain = test.axis.axis, test.measure == "engineering"
     n, known = len(history.time_steps), np.flatnonzero(np.isfinite(history.along(axis)[0]))
     texts = [strain_text(*history.time_steps[int(k)].axial(axis)) for k in known[-1:]]
     if n - 1 in known[-1:]:
-        return [Message("strain along {axis} at the end: {text}", axis, texts[0])]
+        text = Message("strain along {axis} at the end: {text}", axis, texts[0])
+        return [text if plain else joined(" ", (text, Message("(measure of strain: {name})", test.measure)))]
     last = history.time_steps[-1]
     why = last.apart or Message(
         "{n_valid} of {n_zoi} valid ({why})", *counts(last.n_valid, last.n_zoi), last.refused

@@ -1,6 +1,6 @@
 """The map over the picture of a running test: its range, its histogram, and the value at a place.
 
-Small pictures for the page: grey levels, saturated pixels, and the noise of ZOIs in colours.
+The page's other small pictures are made here too: grey levels, saturated pixels, and the noise of ZOIs in colours.
 """
 
 from __future__ import annotations

@@ -454,3 +454,20 @@ def test_a_scheduler_that_is_not_there(
     code, said = refused(capsys, *words)
     assert code == 2 and why in said
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "near"),
+    [
+        (("run", "--camra", "sim:"), "--camera"),
+        (("replay", "shots", "--zio=32"), "--zoi"),
+        (("run", "--camera", "sim:unifrom"), "uniform"),
+        (("run", "--camera", "sim:?noize=1"), "noise"),
+        (("run", "--camera", "opncv:0"), "opencv"),
+    ],
+)
+def test_a_slip_of_the_keys_is_met_with_what_is_near(
+    capsys: pytest.CaptureFixture[str], words: tuple[str, ...], near: str
+) -> None:
+    code, said = refused(capsys, *words)
+    assert code == 2 and f"(did you mean {near}?)" in said

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -355,6 +356,26 @@ def test_a_section_given_in_another_way_replaces_that_of_the_file(
         saved.save(None)
         assert load_config(rig, {}).specimen.area_m2 == pytest.approx(area)
         rig.write_text(before)
+
+
+def test_an_impossible_option_is_of_the_command_line(tmp_path: Path) -> None:
+    rig = written(tmp_path, '[scale]\nmm_per_px = 0.05\n[measure]\nzoi = "2mm"\n[load]\naddress = "sim:"')
+    assert load_config(rig, {"measure.step": "1mm"}).measure.step == 20
+    for key, value in (("measure.zoi", 0), ("scale.mm_per_px", 0.0), ("load.lag_s", math.nan)):
+        for read in (lambda given: load_config(rig, given), lambda given: from_dict({}, given, "session.h5")):
+            with pytest.raises(ConfigError, match=f"command line: {key} = .* is not possible"):
+                read({key: value})
+
+
+def test_two_sections_in_one_file_are_refused(tmp_path: Path) -> None:
+    rig = written(tmp_path, "[specimen]\nwidth_mm = 20\nthickness_mm = 2\ndiameter_mm = 10")
+    named = "specimen.width_mm and specimen.thickness_mm and specimen.diameter_mm are two sections"
+    with pytest.raises(ConfigError, match=named):
+        load_config(rig, {})
+    stored = {"specimen": {"width_mm": 20.0, "thickness_mm": 2.0, "diameter_mm": 10.0}}
+    assert (
+        from_dict(stored, {}, "").specimen.section_text == "20 mm x 2 mm"
+    )  # of a session that has been recorded
 
 
 @pytest.mark.parametrize(

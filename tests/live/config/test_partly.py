@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis import Roi, ZoiGrid
+from analysis import Roi, StrainField, ZoiGrid
+from analysis.evaluate import GaugeSet
 from live.config.gauges import make_gauge, partly
 
 REGION = Roi(100, 100, 400, 300)
@@ -67,3 +68,20 @@ def test_a_hole_is_told_from_half_of_the_area_on() -> None:
     over = {"kind": "area", "box": [180, 180, 240, 140]}
     assert left_out(words(over, mask=mask)) == pytest.approx(60, abs=4)
     assert words(over, "area", mask) == ""  # as the automatic one: it is of the whole specimen
+
+
+@pytest.mark.parametrize(
+    ("table", "share"),
+    [
+        ({"kind": "area", "box": [0, 100, 200, 300]}, 0.5),
+        ({"kind": "transverse", "box": [-100, 200, 400, 50]}, 0.5),
+        ({"start": [300, 110], "end": [300, 440], "radius_px": 80}, 0.72),
+        ({"kind": "area", "box": [100, 100, 400, 300]}, 1),
+        ({"kind": "zoi", "at": [100, 110]}, 1),
+    ],
+)
+def test_the_share_of_a_value_is_of_the_area_asked_for(table: dict[str, Any], share: float) -> None:
+    grid = ZoiGrid.cover(REGION, 32, 8)
+    field = StrainField.from_values(grid, {}, 1e-3)
+    value = GaugeSet([make_gauge("mine", table, "y")]).read(field)["mine"]
+    assert value.share == pytest.approx(share, abs=0.03)

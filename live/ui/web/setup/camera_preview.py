@@ -174,19 +174,16 @@ class CameraPreview:
             raise DataError("no camera is chosen: choose one under Camera")
         with camera_of(config.address, self._on_event, crop=config.crop) as camera:
             try:
-                self._camera_opened(camera)
+                with self._lock:
+                    self._camera, self.info = camera, camera.info
+                    self._recent.clear()
+                    self._first, self._whole, self._collected = [], False, None
+                self._viewer.opened(camera.info)
                 asked.put(None)
                 with camera:
                     self._drain(camera)
             finally:
                 self._camera = None
-
-    def _camera_opened(self, camera: Camera) -> None:
-        with self._lock:
-            self._camera, self.info = camera, camera.info
-            self._recent.clear()
-            self._first, self._whole, self._collected = [], False, None
-        self._viewer.opened(camera.info)
 
     @property
     def _over(self) -> bool:

@@ -1,6 +1,6 @@
 """Set-up before a test: camera, load cell, region, gauges and check of one rig, joined for the page.
 
-The set-up of all cameras of a test, which are checked, saved and started together.
+Several cameras of a test are checked, saved and started together.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The check of the still specimen during set-up: a thread judges the newest frames; the whole check on request.
 
-The check of the still specimen as the page shows it: plain values and colours.
+What the page gets of it are plain values and colours.
 """
 
 from __future__ import annotations
@@ -225,21 +225,18 @@ class SpecimenCheck(Screen):
         if collected is not None:
             self._check(collected, info)
         else:
-            self._quick_check(frames, info)
+            # Update the figures that change while lens and light are adjusted.
+            now = (self._region.edition, self._draft.config, info)
+            if self._checked_for != now:
+                self._checked_for = now
+                self._checker = QuickChecker(self._region.config(self._folder))
+            self._keep_figures(self._checker.check(frame_stack(frames, info)).figures)
 
     def _compile(self, info: CameraInfo) -> None:
         """Compile in separate processes: the test that follows must load the kernel from its cache."""
         phase = self._draft.config.measure.estimator == "phase"
         compile_ahead(picture_kinds(info), phase=phase, screen=self, stopping=self._closing)
         self.values["busy"] = ""
-
-    def _quick_check(self, frames: list[Frame], info: CameraInfo) -> None:
-        """Update the figures that change while lens and light are adjusted."""
-        now = (self._region.edition, self._draft.config, info)
-        if self._checked_for != now:
-            self._checked_for = now
-            self._checker = QuickChecker(self._region.config(self._folder))
-        self._keep_figures(self._checker.check(frame_stack(frames, info)).figures)
 
     def _keep_figures(self, figures: CheckFigures) -> None:
         sharpness = figures.sharpness

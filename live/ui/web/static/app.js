@@ -47,6 +47,9 @@ const handlers = {
   },
 };
 
+// A picture that is not there yet leaves its place empty; the browser would draw a broken one.
+document.addEventListener("error", ({ target }) => { if (target.tagName === "IMG") target.removeAttribute("src"); }, true);
+
 let source;
 function connect() {
   source = new EventSource("/events");

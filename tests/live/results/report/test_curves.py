@@ -76,6 +76,7 @@ def test_strains_for_a_part_of_their_area_are_told() -> None:
     words = told(area_share=[1.0, 0.9, 1.0, 1.0], share_gauge_a=[1.0, 1.0, 0.62, 1.0])
     assert words.startswith("A block of ZOIs had no value at 2 of 4 instants, from 1.5 to 2.5 s:")
     assert words.endswith("at least 62 %.")
+    assert told(share_gauge_off=[0.4, 0.4, 0.4, 0.4]) == ""
 
 
 def test_units_of_strain_and_load() -> None:

@@ -46,6 +46,15 @@ def run_of(strains: Sequence[float], specimen: SpecimenConfig = SECTION, *, load
     return run_state
 
 
+def test_another_measure_of_strain_is_named() -> None:
+    run_state = run_of(PULLED)
+    test = finished(run_state)
+    plain, green = (
+        brief_lines(run_state, replace(test, measure=name))[1] for name in ("engineering", "green")
+    )
+    assert green == f"{plain} (measure of strain: green)"
+
+
 def test_what_a_test_gave_in_a_dozen_lines(tmp_path: Path) -> None:
     run_state, screen = run_of(PULLED), RecordingScreen()
     (tmp_path / "strain.h5").write_bytes(bytes(2_000_000))
