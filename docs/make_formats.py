@@ -135,9 +135,7 @@ TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
     "session": session_layout, "flags": flags, "means": means, "status": statuses,
     "response": response, "cycles": cycles, "channels": channels,
 })  # fmt: skip
-PAGES = tuple(
-    DOCS / f"{name}.md" for name in ("strain-format", "control", "data/settings", "data/datasets")
-)
+PAGES = tuple(DOCS / f"{name}.md" for name in ("strain-format", "control", "data/settings", "data/datasets"))
 _TABLE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)
 
 
