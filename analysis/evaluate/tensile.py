@@ -185,19 +185,14 @@ def _of_film(figures: TensileFigures, limit: float | None) -> TensileFigures:
 def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:
     loading, strength = Loading.of(curve), tensile_strength(curve)
     if loading.n < MIN_POINTS or loading.stress[loading.top] <= 0:
-        few = Message(
-            "{n} measurements in all, {MIN_POINTS} are needed: more pictures", len(curve.t), MIN_POINTS
+        words = Message(
+            "only {n} measurements have strain and a tensile force, {MIN_POINTS} are needed: are sign (--load-sign) "
+            "and time (--lag) of the force right?",
+            loading.n,
+            MIN_POINTS,
         )
-        words = (
-            few
-            if len(curve.t) < MIN_POINTS
-            else Message(
-                "only {n} measurements have strain and a tensile force, {MIN_POINTS} are needed: are sign (--load-sign) "
-                "and time (--lag) of the force right?",
-                loading.n,
-                MIN_POINTS,
-            )
-        )
+        if (n := len(curve.t)) < MIN_POINTS:
+            words = Message("{n} measurements in all, {MIN_POINTS} are needed: more pictures", n, MIN_POINTS)
         return replace(_nothing(words, options), Rm=strength)
     if not strength.known:
         return _nothing(strength.why, options)

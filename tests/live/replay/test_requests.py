@@ -113,7 +113,7 @@ def test_nothing_measured_is_told_with_its_reason(
     """Pictures that have nothing in common with the reference, then over-exposed ones."""
     first = (shots / "a0.png").read_bytes()
     other = 255 * Speckle(SHAPE, radius=2.0, seed=99).render(Affine(), SHAPE)
-    nexts = {"other": "); the ", "white": "reduce exposure or light"}
+    nexts = {"other": "); moved out of the picture", "white": "reduce exposure or light"}
     for name, picture in (("other", other), ("white", np.full(SHAPE, 255.0))):
         folder = tmp_path / name
         folder.mkdir()
