@@ -32,6 +32,10 @@ _SCHEME = re.compile(r"^([A-Za-z][\w+.-]+):")
 Value = TypeVar("Value")
 _SAFE = "/:,@+-_.*~"  # in the value of a setting
 
+RECORDING = "session.h5"
+
+Device = TypeVar("Device")
+
 
 @dataclass(frozen=True, slots=True)
 class Address:
@@ -133,9 +137,6 @@ def as_typed(text: str) -> str:
     return bare if bare != text.strip() else text
 
 
-RECORDING = "session.h5"
-
-
 def session_file(path: Path) -> Path:
     """The session file: that in ``path`` where it is the folder of a run, else ``path``."""
     return path / RECORDING if (path / RECORDING).is_file() else path
@@ -232,7 +233,6 @@ class Options:
             )
 
 
-Device = TypeVar("Device")
 Opener = Callable[[Address, EventSink], Device]
 
 

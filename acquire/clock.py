@@ -21,6 +21,16 @@ import numpy as np
 Clock = Callable[[], float]
 """Says the time, s: ``time.monotonic``, or in a test a clock that is moved by hand."""
 
+LATE_S = 5.0  # a device that stays late for so long has set its clock back
+TURNS_S = (2**32 * 1e-6, 2**32 * 1e-3)  # after which counters of 32 bits begin again: micros(), millis()
+PIECE_S, WINDOW_S = 0.5, 60.0  # the least delayed arrival of each piece of the window is kept
+KNOWN, KEPT = 8, 16  # pieces: from which the rate is known, and which are kept however old they are
+TICK_S = 2e-3  # of the coarsest clock that is usual, and of USB
+NEAR_PART = 0.3  # more than one beat of a latency timer of 16 ms with a clock that is 0.1 % wrong: 16 s
+DRIFT_S = 15.0  # from which on the drift is told
+
+Point = tuple[float, float]  # device's time, offset of the host's from it, s
+
 
 @dataclass(frozen=True, slots=True)
 class ClockPair:
@@ -56,17 +66,6 @@ class ClockPair:
         """
         utc = datetime.fromisoformat(text)
         return cls(monotonic, utc if utc.tzinfo else utc.replace(tzinfo=UTC))
-
-
-LATE_S = 5.0  # a device that stays late for so long has set its clock back
-TURNS_S = (2**32 * 1e-6, 2**32 * 1e-3)  # after which counters of 32 bits begin again: micros(), millis()
-PIECE_S, WINDOW_S = 0.5, 60.0  # the least delayed arrival of each piece of the window is kept
-KNOWN, KEPT = 8, 16  # pieces: from which the rate is known, and which are kept however old they are
-TICK_S = 2e-3  # of the coarsest clock that is usual, and of USB
-NEAR_PART = 0.3  # more than one beat of a latency timer of 16 ms with a clock that is 0.1 % wrong: 16 s
-DRIFT_S = 15.0  # from which on the drift is told
-
-Point = tuple[float, float]  # device's time, offset of the host's from it, s
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,9 @@ Check = Callable[[str], Any]
 """Makes a value of the word of an address; raises ``NotAllowed``."""
 OTHERS = "others"
 
+FLAG: Check = yes_or_no
+TEXT: Check = str
+
 
 @dataclass(frozen=True, slots=True)
 class Setting:
@@ -76,10 +79,6 @@ def whole(low: float = -math.inf, high: float = math.inf) -> Check:
 def choice(*allowed: str) -> Check:
     """One of a few words."""
     return lambda word: one_of(word, allowed)
-
-
-FLAG: Check = yes_or_no
-TEXT: Check = str
 
 
 def setting(check: Check, default: Any, words: str, unit: str = "") -> Any:

@@ -40,6 +40,8 @@ CONTINUED = 0.75
 NECK_AT = 0.2  # of the distance along the load, from the centre
 SEAM_PX = 4.0  # half the width of the seam between two halves
 
+Gradient = tuple[Array, Array, Array, Array]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Modes:
@@ -194,9 +196,6 @@ def _from_complex(d: Complex, d_z: Complex, d_zc: Complex) -> Mode:
     """u + i v and its derivatives by z and by its conjugate, as six real fields."""
     d_along, d_across = d_z + d_zc, 1j * (d_z - d_zc)
     return d.real, d.imag, d_along.real, d_across.real, d_along.imag, d_across.imag
-
-
-Gradient = tuple[Array, Array, Array, Array]
 
 
 class Deformation(Protocol):

@@ -24,6 +24,11 @@ Status = Literal["ok", "overload", "underload", "error"]
 NEWTONS = {"N": 1.0, "kN": 1e3, "lbF": 4.4482216153, "kgF": 9.80665, "kg": 9.80665, "g": 9.80665e-3}
 MAX_COMMAND = 256
 
+Style = Literal["millis", "plain", "label", "openscale"]
+SATURATED = {"overload": 8388607, "underload": -8388608}  # of a 24-bit converter
+COUNTS_PER_N = 800
+TEMPERATURE = 21.5
+
 
 @dataclass(frozen=True, slots=True)
 class IndicatorReading:
@@ -125,12 +130,6 @@ class Indicator(ABC):
 def decimals(step: float) -> int:
     """Digits after the point that a step needs."""
     return max(0, math.ceil(-math.log10(step) - 1e-9))
-
-
-Style = Literal["millis", "plain", "label", "openscale"]
-SATURATED = {"overload": 8388607, "underload": -8388608}  # of a 24-bit converter
-COUNTS_PER_N = 800
-TEMPERATURE = 21.5
 
 
 class AsciiIndicator(Indicator):

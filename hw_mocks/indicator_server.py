@@ -32,6 +32,11 @@ MAX_REGISTERS = 32
 ValueType = Literal["i32", "u32", "f32"]
 FORMS: Mapping[ValueType, str] = {"i32": ">i", "u32": ">I", "f32": ">f"}
 
+log = logging.getLogger(__name__)
+POLL_S = 0.05
+SPLIT_S = 0.03
+BACKLOG_TIMEOUT_S = 0.2  # for a backlog that does not fit into the line's buffer at once
+
 
 @dataclass(frozen=True, slots=True)
 class RegisterMap:
@@ -278,12 +283,6 @@ class PtyPort:
         self.unplug()
         if self._folder.exists():
             self._folder.rmdir()
-
-
-log = logging.getLogger(__name__)
-POLL_S = 0.05
-SPLIT_S = 0.03
-BACKLOG_TIMEOUT_S = 0.2  # for a backlog that does not fit into the line's buffer at once
 
 
 class IndicatorServer(Closing):

@@ -46,6 +46,8 @@ SERIAL_FAULTS: Mapping[str, float] = {
 
 BITS = (8, 10, 12, 16)
 
+Fate = Literal["good", "damaged", "lost", "stalled", "disconnected", "gone"]
+
 
 @dataclass(frozen=True, slots=True)
 class Fault:
@@ -127,9 +129,6 @@ def _parse(text: str, allowed: Mapping[str, float], where: str) -> Fault:
             "{where}: fault {text}; write name@seconds or name@seconds*amount", where, repr(text)
         )
     return fault
-
-
-Fate = Literal["good", "damaged", "lost", "stalled", "disconnected", "gone"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,37 @@ from acquire.text import Message, joined
 
 log = logging.getLogger(__name__)
 
+HAS_V4L2 = sys.platform == "linux"
+CAMERAS: Registry[Camera] = Registry(
+    "camera",
+    "phasedic.cameras",
+    {
+        "": "acquire.v4l2.camera:open_v4l2" if HAS_V4L2 else "acquire.camera.contract:without_v4l2",
+        "genicam": "acquire.genicam.camera:open_genicam",
+        "pylon": "acquire.pylon:open_pylon",
+        "opencv": "acquire.opencv.webcam:open_opencv",
+        "video": "acquire.opencv.video:open_video",
+        "files": "acquire.opencv.images:open_files",
+        "session": "acquire.session.devices:open_session_camera",
+    },
+    lists_group="phasedic.camera_lists",
+    elsewhere=["sim"],
+    lists=({"": "acquire.v4l2.listing:list_cameras"} if HAS_V4L2 else {})
+    | {"genicam": "acquire.genicam.camera:list_cameras", "pylon": "acquire.pylon:list_cameras"},
+    settings_group="phasedic.camera_settings",
+    settings={
+        "": "acquire.v4l2.controls:V4L2Settings",
+        "genicam": "acquire.genicam.settings:GenicamSettings",
+        "pylon": "acquire.pylon:PylonSettings",
+        "opencv": "acquire.opencv.webcam:OpenCVSettings",
+        "video": "acquire.opencv.video:VideoSettings",
+        "files": "acquire.opencv.images:FileSettings",
+        "session": "acquire.session.devices:SessionSettings",
+    },
+)
+
+_VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".m4v", ".webm")
+
 
 @runtime_checkable
 class Camera(Protocol):
@@ -106,36 +137,6 @@ def without_v4l2(address: Address, on_event: EventSink) -> Camera:
     )
 
 
-HAS_V4L2 = sys.platform == "linux"
-CAMERAS: Registry[Camera] = Registry(
-    "camera",
-    "phasedic.cameras",
-    {
-        "": "acquire.v4l2.camera:open_v4l2" if HAS_V4L2 else "acquire.camera.contract:without_v4l2",
-        "genicam": "acquire.genicam.camera:open_genicam",
-        "pylon": "acquire.pylon:open_pylon",
-        "opencv": "acquire.opencv.webcam:open_opencv",
-        "video": "acquire.opencv.video:open_video",
-        "files": "acquire.opencv.images:open_files",
-        "session": "acquire.session.devices:open_session_camera",
-    },
-    lists_group="phasedic.camera_lists",
-    elsewhere=["sim"],
-    lists=({"": "acquire.v4l2.listing:list_cameras"} if HAS_V4L2 else {})
-    | {"genicam": "acquire.genicam.camera:list_cameras", "pylon": "acquire.pylon:list_cameras"},
-    settings_group="phasedic.camera_settings",
-    settings={
-        "": "acquire.v4l2.controls:V4L2Settings",
-        "genicam": "acquire.genicam.settings:GenicamSettings",
-        "pylon": "acquire.pylon:PylonSettings",
-        "opencv": "acquire.opencv.webcam:OpenCVSettings",
-        "video": "acquire.opencv.video:VideoSettings",
-        "files": "acquire.opencv.images:FileSettings",
-        "session": "acquire.session.devices:SessionSettings",
-    },
-)
-
-
 @dataclass(frozen=True, slots=True)
 class CameraListing:
     """A camera that is there.
@@ -197,9 +198,6 @@ def not_one(where: str, meant: int, here: Sequence[str]) -> PhasedicError:
         "(docs/machine-vision.md)",
         *(where, listed),
     )
-
-
-_VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".m4v", ".webm")
 
 
 def with_scheme(text: str) -> str:

@@ -37,6 +37,8 @@ log = logging.getLogger(__name__)
 QUARTZ = 3e-4  # what the rate of a camera's clock may be wrong by
 GIGE_NUMBERS, ALL_NUMBERS = 65535, 2**64  # GigE counts from 1 to 65535 and begins again
 
+_ABOUT = ("id", "vendor", "model", "serial_nbr", "address", "protocol")
+
 
 @dataclass(frozen=True, slots=True)
 class FoundCamera:
@@ -68,9 +70,6 @@ class FoundCamera:
             self.protocol,
             self.place,
         )
-
-
-_ABOUT = ("id", "vendor", "model", "serial_nbr", "address", "protocol")
 
 
 def find_cameras(library: Aravis) -> list[FoundCamera]:

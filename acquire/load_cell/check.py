@@ -25,6 +25,10 @@ from acquire.text.quantity import MINUS
 MIN_VALUES = 3  # fewer give no noise
 ROBUST_VALUES = 12  # values from which a few odd ones do not count
 
+LINES_SHOWN = 5
+SLOW_HZ = 5.0
+STUCK = 20  # samples without any change
+
 
 @dataclass(frozen=True, slots=True)
 class LoadStillness:
@@ -94,11 +98,6 @@ def _rise(t: NDArray[np.float64], f: NDArray[np.float64]) -> float:
     away = t - t.mean()
     square = float(away @ away)
     return float(away @ f) / square * float(np.ptp(t)) if square > 0 else 0.0
-
-
-LINES_SHOWN = 5
-SLOW_HZ = 5.0
-STUCK = 20  # samples without any change
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,19 @@ from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.opening import Closing
 from acquire.text import Message, word
 
+LOAD_CELLS: Registry[LoadCell] = Registry(
+    Message("load cell"),
+    "phasedic.load_cells",
+    {
+        "": "acquire.serial_line.cell:open_serial",
+        "none": "acquire.load_cell.contract:open_none",
+        "session": "acquire.session.devices:open_session_load",
+    },
+    fallback="acquire.serial_line.cell:open_serial",
+    settings_group="phasedic.load_cell_settings",
+    settings={"": "acquire.serial_line.settings:SerialOptions"},
+)
+
 
 @runtime_checkable
 class LoadCell(Protocol):
@@ -55,20 +68,6 @@ class LoadCell(Protocol):
     def stop(self) -> None: ...
 
     def close(self) -> None: ...
-
-
-LOAD_CELLS: Registry[LoadCell] = Registry(
-    Message("load cell"),
-    "phasedic.load_cells",
-    {
-        "": "acquire.serial_line.cell:open_serial",
-        "none": "acquire.load_cell.contract:open_none",
-        "session": "acquire.session.devices:open_session_load",
-    },
-    fallback="acquire.serial_line.cell:open_serial",
-    settings_group="phasedic.load_cell_settings",
-    settings={"": "acquire.serial_line.settings:SerialOptions"},
-)
 
 
 def open_load_cell(address: str, on_event: EventSink = ignore_event) -> LoadCell:

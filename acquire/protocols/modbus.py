@@ -36,6 +36,11 @@ FLAGS = {
 }
 MAX_REGISTERS = 32  # registers of one query that every known transmitter answers
 
+LIMIT = 256  # longest frame of Modbus RTU
+EXCEPTION_BYTES, ECHO_BYTES = 5, 8
+WRITE_ONE = 6
+VALUELESS = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD | LoadFlag.ERROR
+
 
 @dataclass(frozen=True, slots=True)
 class FlagBit:
@@ -184,12 +189,6 @@ def _one_of(value: Any, allowed: tuple[str, ...], where: str) -> str:
             "{where} = {value} is not possible; allowed: {listed}", where, repr(value), ", ".join(allowed)
         )
     return str(value)
-
-
-LIMIT = 256  # longest frame of Modbus RTU
-EXCEPTION_BYTES, ECHO_BYTES = 5, 8
-WRITE_ONE = 6
-VALUELESS = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD | LoadFlag.ERROR
 
 
 def crc16(data: bytes) -> bytes:

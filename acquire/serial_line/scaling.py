@@ -21,6 +21,10 @@ UNDONE = 16  # tares that can be undone
 
 Seen = tuple[float, float, str]  # time, gross force, why it cannot be used
 
+BEYOND = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD
+
+Report = Callable[[str, str], None]  # level, sentence
+
 
 class TareZero:
     """The offset that is taken off every force, and the samples that decide whether it may move.
@@ -109,11 +113,6 @@ class TareZero:
         self._before.append(self.offset)
         step, self.offset = offset - self.offset, offset
         return step
-
-
-BEYOND = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD
-
-Report = Callable[[str, str], None]  # level, sentence
 
 
 class Scaling:

@@ -34,6 +34,9 @@ UNFINISHED = Message(
     "'phasedic recover' makes a clean copy"
 )
 
+ADVICE = Message("; the file is damaged: 'phasedic recover' saves what can be read")
+NOTHING = Message("; the file is damaged, and nothing of it can be saved")
+
 
 class SessionPart(Closing):
     """One file of a session.
@@ -255,10 +258,6 @@ class _reading:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
         if isinstance(error, hdf5.DAMAGE):
             raise damaged(self._path, self._what, error, self._advice) from error
-
-
-ADVICE = Message("; the file is damaged: 'phasedic recover' saves what can be read")
-NOTHING = Message("; the file is damaged, and nothing of it can be saved")
 
 
 def damaged(path: Path, what: str, error: BaseException, advice: str = ADVICE) -> DataError:

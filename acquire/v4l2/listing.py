@@ -24,6 +24,22 @@ from acquire.v4l2.formats import FORMATS, preferred
 BY_ID = Path("/dev/v4l/by-id")
 OPENCV_NUMBERS = range(4)
 
+_FAULTS = {
+    errno.ENODEV: Message("the camera was unplugged or its driver is gone"),
+    errno.ENXIO: Message("the camera was unplugged or its driver is gone"),
+    errno.EIO: Message("the driver reports a fatal error of the stream"),
+    errno.EPROTO: Message("the driver reports a fatal error of the stream (USB protocol)"),
+    errno.ENOSPC: Message("not enough USB bandwidth"),
+    errno.ETIMEDOUT: Message("the camera has stalled"),
+}
+
+_REMARKS = {
+    "grey": "",
+    "luma": Message("luma of colour, 220 levels; use a grey format if there is one"),
+    "bayer": Message("raw mosaic of colours; plane=g takes the green pixels"),
+    "jpeg": Message("compressed, only on request: its artefacts do not average out"),
+}
+
 
 def identities(kernel: Kernel, nodes: Iterable[str]) -> dict[str, Identity]:
     """Who each of these nodes is; those that are no cameras or do not open are left out."""
@@ -63,16 +79,6 @@ def find_again(
         if found not in others and replace(found, bus=identity.bus) == identity
     ]
     return alike[0] if len(alike) == 1 else None
-
-
-_FAULTS = {
-    errno.ENODEV: Message("the camera was unplugged or its driver is gone"),
-    errno.ENXIO: Message("the camera was unplugged or its driver is gone"),
-    errno.EIO: Message("the driver reports a fatal error of the stream"),
-    errno.EPROTO: Message("the driver reports a fatal error of the stream (USB protocol)"),
-    errno.ENOSPC: Message("not enough USB bandwidth"),
-    errno.ETIMEDOUT: Message("the camera has stalled"),
-}
 
 
 def fault_in_words(error: OSError) -> str:
@@ -195,14 +201,6 @@ def _modes(device: V4L2Device, fourcc: str) -> tuple[str, ...]:
             + (Message(" at {listed} 1/s", ", ".join(f"{rate:g}" for rate in rates)) if rates else "")
         )
     return tuple(modes)
-
-
-_REMARKS = {
-    "grey": "",
-    "luma": Message("luma of colour, 220 levels; use a grey format if there is one"),
-    "bayer": Message("raw mosaic of colours; plane=g takes the green pixels"),
-    "jpeg": Message("compressed, only on request: its artefacts do not average out"),
-}
 
 
 def _remark(fourcc: str) -> str:

@@ -52,6 +52,10 @@ BAR_LENGTH = 30
 CLOSE_S = 5.0
 MAX_NOTES = 4  # the newest
 
+ShowCheck = Callable[[RollingFrames, QuickCheck, list[CheckLine]], None]
+
+LISTEN_S = 3.0
+
 
 def watch(config: Config, target: float | None, screen: Screen, stopping: Stopping) -> CheckFigures:
     """Repeat the check until ``stopping`` is set or the camera ends; returns the figures of the last frames.
@@ -146,9 +150,6 @@ class RenewedLines:
             self._stream.write("\n")
 
 
-ShowCheck = Callable[[RollingFrames, QuickCheck, list[CheckLine]], None]
-
-
 @contextmanager
 def _viewed(config: Config, notes: list[str]) -> Iterator[ShowCheck]:
     """A function that shows a check in the view: the picture, and the lines as its status card.
@@ -200,9 +201,6 @@ def card(quick: QuickCheck, lines: list[CheckLine]) -> str:
 
 def _cell(text: str) -> str:
     return printable(text).replace("|", "/")
-
-
-LISTEN_S = 3.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

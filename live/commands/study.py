@@ -28,6 +28,11 @@ if TYPE_CHECKING:
 MEASURE = ("roi", "mask", "burst", "reference-burst", "estimator", "strain", "bending", "noise", "axis")
 WINDOWS = ("gaussian", "uniform", "tukey", "bi-triangular")
 
+_HEAD = Message(
+    "  zoi step order window        l10 px  VSG px  noise µm/m  over predicted  strain µm/m     ±"
+    "  gradient µm/m/px  valid"
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic study``."""
@@ -122,11 +127,6 @@ def _settings(arguments: argparse.Namespace) -> list[StudySetting]:
 
 
 # -- output -------------------------------------------------------------------------------------
-
-_HEAD = Message(
-    "  zoi step order window        l10 px  VSG px  noise µm/m  over predicted  strain µm/m     ±"
-    "  gradient µm/m/px  valid"
-)
 
 
 def _line(one: StudyResult) -> str:

@@ -36,6 +36,13 @@ _REMOVED_KEYS = {
 }
 """Keys of earlier versions, with advice: left out of a stored configuration, refused in a new one."""
 
+_SHAPES = (
+    frozenset({"specimen.width_mm", "specimen.thickness_mm"}),
+    frozenset({"specimen.diameter_mm"}),
+    frozenset({"specimen.area_mm2"}),
+)
+"""Keys that say the section in one way."""
+
 
 @dataclass(frozen=True, slots=True)
 class Config:
@@ -65,13 +72,6 @@ class Config:
                 del plain[name]
         return plain | {"alarm": {str(n): alarm for n, alarm in enumerate(plain["alarm"], 1)}}
 
-
-_SHAPES = (
-    frozenset({"specimen.width_mm", "specimen.thickness_mm"}),
-    frozenset({"specimen.diameter_mm"}),
-    frozenset({"specimen.area_mm2"}),
-)
-"""Keys that say the section in one way."""
 
 _SECTIONS: dict[str, type] = {
     f.name: f.default_factory  # type: ignore[misc]

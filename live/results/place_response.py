@@ -32,6 +32,12 @@ from live.results.run_folder import STRAIN, RunFolder, open_run
 from live.results.stored_fields import window_of
 from live.results.stored_response import FATE, StoredResponse, fill_group, read_noise
 
+Floats = NDArray[np.float64]
+
+UP_TO = 0.9
+"""Of where a place leaves its line, its line ends: the last instants before that is seen may be off already."""
+_OF_STRAIN = ("strain", "lens", "blur", "film")  # causes in the budget of E that do not come with the stress
+
 
 def response_title(strain: Strain, name: str) -> str:
     """Name, channel, instants, ZOI and VSG of a map of the whole test; empty for others."""
@@ -126,9 +132,6 @@ def _side(strain: Strain, found: StoredResponse) -> str:
     return Message("ZOI {size} px, VSG {vsg:.0f} px", strain.grid.size, found.vsg_px)
 
 
-Floats = NDArray[np.float64]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
     """What the strains of the places are held against.
@@ -197,11 +200,6 @@ def check_channel(config: Config, *, forces: bool) -> None:
     if name not in ("", *CHANNELS, *config.gauges):
         known = ", ".join((*CHANNELS, *config.gauges))
         raise ConfigError("--response {name}: there is no such gauge; give one of {known}", name, known)
-
-
-UP_TO = 0.9
-"""Of where a place leaves its line, its line ends: the last instants before that is seen may be off already."""
-_OF_STRAIN = ("strain", "lens", "blur", "film")  # causes in the budget of E that do not come with the stress
 
 
 def response_of(

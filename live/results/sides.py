@@ -44,6 +44,11 @@ from live.results.run_folder import SESSION, STRAIN, RunFolder
 LATE_S = 1.0
 """A side that is behind the other by more than this, and by more than a usual gap, gives no strains."""
 
+CLOCKS_AGREE_S = 2.0  # the clock of the day may have been set in between
+
+LONGEST_GAP = 5.0  # times the usual distance of the instants of the back
+_RECENT = 12  # time steps of each side that the newest instant of both is found in
+
 
 class JointChannels:
     """The channels of front and back together (``live.config.figures.JOINT_CHANNELS``); for any thread."""
@@ -107,9 +112,6 @@ def _channels(name: str, one: JointStrain) -> dict[str, float]:
     return {f"mean_{name}": one.mean, f"bending_{name}": one.bending, f"sigma_mean_{name}": one.sigma}
 
 
-CLOCKS_AGREE_S = 2.0  # the clock of the day may have been set in between
-
-
 def cameras_in(folder: Path) -> tuple[str, ...]:
     """The names of the cameras, where ``folder`` is that of a test with several; else none."""
     return () if (folder / STRAIN).exists() else _with(folder, STRAIN)
@@ -154,10 +156,6 @@ def shift_s(front: RunFolder, back: RunFolder) -> float:
             abs(by_machine - by_day),
         )
     return by_machine
-
-
-LONGEST_GAP = 5.0  # times the usual distance of the instants of the back
-_RECENT = 12  # time steps of each side that the newest instant of both is found in
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,15 +26,14 @@ ATTRIBUTES = {
     "vsg_px": hdf5.Declared("f8", (), 0),
 }  # fmt: skip
 
+_NOISE = (CURRENT, CORRELATION)
+
 
 def map_names(channel: str) -> tuple[str, ...]:
     """All maps over ``channel``."""
     slope, leaves = slope_name(channel), leaves_name(channel)
     first = (slope, f"sigma_{slope}", "chi2", "instants", "poisson", "sigma_poisson")
     return (*first, *((leaves,) if leaves else ()), FATE)
-
-
-_NOISE = (CURRENT, CORRELATION)
 
 
 def _items(names: Iterable[str], shape: tuple[int, int]) -> dict[str, hdf5.Declared]:

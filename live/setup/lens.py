@@ -32,6 +32,13 @@ if TYPE_CHECKING:
 SHOWN_SHIFT_PX = 10.0
 """Motion for which check and calibration give the strain that a lens makes."""
 
+Floats = NDArray[np.float64]
+MIN_BOARDS = 5
+MAX_FOCAL_ERROR = 0.5
+"""Standard uncertainty of the focal length over it; beyond, the boards do not show the lens."""
+
+_MORE = Message("tilt the board by 10 to 30 degrees in all directions, at all places of the picture")
+
 
 def lens_for(config: Config, width: int, height: int, grid: ZoiGrid) -> LensModel | None:
     """The lens for the ZOIs of ``grid`` on pictures of ``width`` x ``height`` px; None where none is given.
@@ -92,12 +99,6 @@ def lens_words(lens: LensModel, grid: ZoiGrid) -> str:
         "{sigma:.2g} µm/m",
         *(SHOWN_SHIFT_PX, strain * 1e6, sigma * 1e6),
     )
-
-
-Floats = NDArray[np.float64]
-MIN_BOARDS = 5
-MAX_FOCAL_ERROR = 0.5
-"""Standard uncertainty of the focal length over it; beyond, the boards do not show the lens."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -228,9 +229,6 @@ def lens_of_corners(found: Sequence[Corners], size: tuple[int, int], k3: bool = 
     if not (np.isfinite(parameters).all() and math.sqrt(covariance[0, 0]) < MAX_FOCAL_ERROR * parameters[0]):
         raise DataError("the pictures do not show the lens: its focal length stays unknown; {hint}", _MORE)
     return LensFit(LensModel(parameters, covariance), float(rms) / math.sqrt(2), 1.0)
-
-
-_MORE = Message("tilt the board by 10 to 30 degrees in all directions, at all places of the picture")
 
 
 def _inverse_normal(views: Sequence[Floats], free: int) -> Floats:

@@ -34,6 +34,10 @@ Role = Literal["plain", "reference"]
 ALL = ""
 """In place of the name of a camera: the record is for every camera, as a load sample is."""
 
+SILENT_S, SILENT_PERIODS = 1.0, 10
+"""A load cell that has sent nothing for both is away."""
+_RATE_SHARE = 0.1  # of the newest interval in the rate of the frames
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Matched:
@@ -143,11 +147,6 @@ class Stream:
     def _takers_of(self, kind: type, camera: str) -> list[Subscriber]:
         takers = self._takers.get(kind, ())
         return [one for wanted, one in takers if ALL in (wanted, camera) or wanted == camera]
-
-
-SILENT_S, SILENT_PERIODS = 1.0, 10
-"""A load cell that has sent nothing for both is away."""
-_RATE_SHARE = 0.1  # of the newest interval in the rate of the frames
 
 
 class StateKeeper(Subscriber):

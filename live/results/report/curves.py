@@ -25,6 +25,12 @@ _NAMES = ("exx", "eyy", "exy")
 TIME = Message("time, s")
 _ROUNDING = 1e-9  # of a figure: changes below are none
 
+_ROWS = 12  # of the table
+_HEADS = (
+    Message("cycle"), Message("peak, valley of the force"), Message("range of the strain"), Message("secant modulus"),
+    Message("loop area"), Message("phase"),
+)  # fmt: skip
+
 
 def load_unit(curve: EvaluatedCurve) -> Unit:
     """The unit of the load axis: MPa of stresses, N or kN of forces."""
@@ -218,13 +224,6 @@ def plots(figures: tuple[Plot, ...]) -> Html:
         for figure in figures
     ]
     return element("div", joined_html(found), class_="plots")
-
-
-_ROWS = 12  # of the table
-_HEADS = (
-    Message("cycle"), Message("peak, valley of the force"), Message("range of the strain"), Message("secant modulus"),
-    Message("loop area"), Message("phase"),
-)  # fmt: skip
 
 
 def long_sections(test: FinishedTest) -> Html:

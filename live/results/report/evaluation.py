@@ -33,6 +33,9 @@ MAX_INSTANTS = 64
 _MEANS = ("exx", "eyy", "exy")
 _DISPLACEMENTS = ("u", "v")
 
+Array = NDArray[np.float64]
+_BROKEN = 0.02  # of the highest force: below it there is no specimen any more
+
 
 @dataclass(frozen=True, slots=True)
 class StillPhase:
@@ -70,10 +73,6 @@ def _maps(
     for row in rows:
         values, sigma = (np.asarray(strain.maps(map_, row), np.float64) for map_ in (name, f"sigma_{name}"))
         yield values, sigma
-
-
-Array = NDArray[np.float64]
-_BROKEN = 0.02  # of the highest force: below it there is no specimen any more
 
 
 @dataclass(frozen=True, slots=True, eq=False)

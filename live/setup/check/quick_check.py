@@ -34,6 +34,14 @@ NOT_KNOWN = Blur(math.nan, math.nan)
 SHARPER = 3.0
 """Sigmas by which a picture is sharper than the reference and takes its place."""
 
+QUICK_FRAMES = 8
+"""Frames of one quick check."""
+RENEW_EVERY = 8
+"""Quick checks after which noise and motion are measured again, and a specimen not yet found is searched."""
+SEARCH_EVERY = 16
+"""Quick checks after which a found specimen is searched again."""
+SAME_REGION = 0.02  # share of a region by which a new one may differ without replacing it
+
 
 class SharpestPicture:
     """The sharpest picture of one region so far, as a reference for those that follow."""
@@ -72,15 +80,6 @@ class SharpestPicture:
             self._peak = sharpness
             self._kernel, _ = prepare(burst, self._kernel.grid, sample.settings, sample.noise)
         return found
-
-
-QUICK_FRAMES = 8
-"""Frames of one quick check."""
-RENEW_EVERY = 8
-"""Quick checks after which noise and motion are measured again, and a specimen not yet found is searched."""
-SEARCH_EVERY = 16
-"""Quick checks after which a found specimen is searched again."""
-SAME_REGION = 0.02  # share of a region by which a new one may differ without replacing it
 
 
 class RollingFrames:

@@ -32,6 +32,12 @@ RED = (40, 40, 255)  # blue, green, red
 
 Bytes = NDArray[np.uint8]
 
+RANGES = ("automatic", "symmetric", "fixed")
+BARS = 24
+"""Of the histogram, over the range of the colours."""
+_RAMP = 11  # colours of the bar, between which the page shades
+OUTSIDE = Message("no ZOI is here")
+
 
 def grey_levels(image: NDArray[Any], bits: int, max_side_px: int = MAX_SIDE_PX) -> tuple[Bytes, float]:
     """(h, w) uint8, and the scale: its px for one of ``image``."""
@@ -97,13 +103,6 @@ def traffic_light(values: NDArray[Any], good: float, bad: float) -> Bytes:
         share < 0.5, green + 2 * share * (yellow - green), yellow + (2 * share - 1) * (red - yellow)
     )
     return np.concatenate([rgb, np.full((*values.shape, 1), 110.0)], axis=-1).astype(np.uint8)
-
-
-RANGES = ("automatic", "symmetric", "fixed")
-BARS = 24
-"""Of the histogram, over the range of the colours."""
-_RAMP = 11  # colours of the bar, between which the page shades
-OUTSIDE = Message("no ZOI is here")
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,6 +39,11 @@ from live.ui.web.setup.specimen_region import SpecimenRegion
 GOOD, BAD = 50e-6, 1000e-6
 """Strain noise of a ZOI that is shown green, and that is shown red."""
 
+log = logging.getLogger(__name__)
+
+EVALUATE_S = 0.4
+_NO_VERDICT: dict[str, Any] = {"table": None, "go": None, "lines": []}
+
 
 def frame_stack(frames: Sequence[Frame], info: CameraInfo) -> FrameStack:
     """Consecutive frames as the input of the check."""
@@ -108,12 +113,6 @@ def figure_values(figures: CheckFigures) -> dict[str, Any]:
         "sigma": float(np.median(sigma)) if sigma.size else None,
         "zois": figures.zois.grid.n_active,
     }
-
-
-log = logging.getLogger(__name__)
-
-EVALUATE_S = 0.4
-_NO_VERDICT: dict[str, Any] = {"table": None, "go": None, "lines": []}
 
 
 def recent_stack(frames: list[Frame]) -> NDArray[np.float32]:
