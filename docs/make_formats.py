@@ -69,11 +69,11 @@ def means() -> str:
 
 
 def channels() -> str:
-    """The channels of alarms and strain output."""
+    """The channels of alarms and strain output that are no columns of strain.csv."""
     rows = (
         (f"`{one.name}`", one.unit, one.words)
         for one in FIGURES
-        if one.channel and one.words  # others are columns of strain.csv
+        if one.channel and one.words and one.name not in COLUMNS
     )
     return table(("channel", "unit", "meaning"), rows)
 
@@ -135,7 +135,7 @@ TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
     "session": session_layout, "flags": flags, "means": means, "status": statuses,
     "response": response, "cycles": cycles, "channels": channels,
 })  # fmt: skip
-PAGES = tuple(DOCS / f"{name}.md" for name in ("session-format", "strain-format", "control", "data/settings"))
+PAGES = tuple(DOCS / f"{name}.md" for name in ("strain-format", "control", "data/settings", "data/datasets"))
 _TABLE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)
 
 

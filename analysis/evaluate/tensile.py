@@ -184,6 +184,8 @@ def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:
             loading.n,
             MIN_POINTS,
         )
+        if (n := len(curve.t)) < MIN_POINTS:
+            words = Message("{n} measurements in all, {MIN_POINTS} are needed: more pictures", n, MIN_POINTS)
         return replace(_nothing(words, options), Rm=strength)
     if not strength.known:
         return _nothing(strength.why, options)

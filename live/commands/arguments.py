@@ -15,6 +15,7 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from live.words.language import said_here
 
 OF_PICTURES = ("replay", "check", "scale", "lens", "readout", "study", "average", "init", "run", "page")
 """Commands with one source of pictures: many files stand for it."""
+_STORE = argparse._StoreAction  # of one value, where the last one counts
 OF_SOURCES = ("--camera", "--back", "--beside")
 
 # Shown at the end of the help of each command; a test parses them all.
@@ -255,8 +257,10 @@ def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
         text = Message("there is no command {name}{meant}; phasedic --help lists all", repr(wanted), near)
         parser.error(said_here(text))
     arguments, unknown = parser.parse_known_args(argv)
+    own = subparsers(parser).choices[arguments.command]
+    if twice := _given_twice(own, argv):
+        own.error(said_here(Message("{option} is given twice: give it once", twice)))
     if unknown:
-        own = subparsers(parser).choices[arguments.command]
         options = (option for action in own._actions for option in action.option_strings)
         first = next((word.partition("=")[0] for word in unknown if word.startswith("--")), "")
         own.error(
@@ -293,6 +297,18 @@ def full_parser(complete: Iterable[str], *, all_options: bool = True) -> argpars
         if name in with_arguments:
             importlib.import_module(entry.module).add_arguments(own)
     return parser
+
+
+def _given_twice(parser: argparse.ArgumentParser, argv: Sequence[str]) -> str:
+    """An option of one value that is given with two, of which argparse drops the first; empty without one."""
+    single = {name for one in parser._actions if type(one) is _STORE for name in one.option_strings}
+    values: dict[str, str] = {}
+    for word, after in pairwise([*argv, ""]):
+        name, is_joined, value = word.partition("=")
+        given = value if is_joined else after
+        if name in single and values.setdefault(name, given) != given:
+            return name
+    return ""
 
 
 def subparsers(parser: argparse.ArgumentParser) -> argparse._SubParsersAction[argparse.ArgumentParser]:

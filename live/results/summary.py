@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from acquire.load_cell import LoadLog
-from acquire.text import Amount, Message, counts, joined
+from acquire.text import Amount, Message, counts, joined, word
 from acquire.text.message import brief, share_text
-from analysis.field import Blur
+from analysis.field import Blur, Status
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
 from live.pipeline.run_state import RunState
@@ -80,7 +80,9 @@ def why_nothing(run_state: RunState) -> str:
     time_steps, troubles = run_state.history.time_steps, run_state.event_log.events("warning", "error")
     if time_steps:
         why = time_steps[-1].refused or Message("no ZOI is active")
-        return Message("nothing was measured: no ZOI has a value ({why})", why)
+        named = sorted((why.index(one.name), word(one.text)) for one in Status if one.name in why)
+        words = Message("nothing was measured: no ZOI has a value ({why})", why)
+        return joined("; ", (words, named[0][1])) if named else words  # the most frequent stands first
     if troubles:
         return Message("nothing was measured: {why}", brief(troubles[-1].text))
     return Message(

@@ -38,6 +38,7 @@ from live.run.prepared_run import PreparedRun
 
 log = logging.getLogger(__name__)
 _SMALL = 512  # bytes counted for a sample or an event
+TELL_S = 5.0  # between two words on what is still to be written
 _MAX_WAIT_S = 0.5
 _CLOCK_EVERY_S = 60.0
 _DISK_WARN_S = 180.0
@@ -222,7 +223,18 @@ class Recorder:
     def close(self, frame_counts: dict[str, Any]) -> None:
         """Write what is queued, then the frame counts, and close the file."""
         self._buffer.close()
-        self._thread.join()
+        self._thread.join(TELL_S)
+        while self._thread.is_alive():
+            waiting = self.waiting_bytes
+            self._thread.join(TELL_S)
+            rate = (waiting - self.waiting_bytes) / TELL_S
+            log.info(
+                Message(
+                    "{left:.0f} MB still wait for the disk, written at {rate:.2g} MB/s; wait for the end",
+                    self.waiting_bytes / 1e6,
+                    rate / 1e6,
+                )
+            )
         if self.failed is None:
             with self._guarded():
                 self._writer.write_ledger(frame_counts | self._frame_counts.as_dict())

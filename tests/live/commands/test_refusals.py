@@ -471,3 +471,12 @@ def test_a_slip_of_the_keys_is_met_with_what_is_near(
 ) -> None:
     code, said = refused(capsys, *words)
     assert code == 2 and f"(did you mean {near}?)" in said
+
+
+def test_an_option_with_two_values_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    code, said = refused(capsys, "run", "--load", "sim:", "--camera=sim:", "--load", "/dev/ttyUSB0")
+    assert code == 2 and "--load is given twice" in said
+    code, said = refused(
+        capsys, "run", "--camera", "sim:unifrom", "--camera=sim:unifrom", "--meta", "a=1", "--meta", "b=2"
+    )
+    assert code == 2 and "given twice" not in said

@@ -116,8 +116,7 @@ def test_a_comparison_has_what_the_single_report_has(tmp_path: Path, config: dic
         assert list(found) == [name], "no modulus, and no strain that made it"
         shown, *_, unit = in_ascii(found[name]).removeprefix("at least ").partition(" (")[0].split()
         assert float(row[column]) * (1e3 if unit == "N" else 1) == pytest.approx(float(shown), rel=0.01)
-    assert 'title="only 3 measurements have strain and a tensile force, 8 are needed' in html
-    assert 'right?">not known<' in html
+    assert 'title="3 measurements in all, 8 are needed: more pictures">not known<' in html
 
 
 def test_without_a_modulus_the_summary_has_the_strength_and_the_reason() -> None:

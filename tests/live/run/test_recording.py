@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,21 @@ def test_everything_is_written_and_the_ledger_last() -> None:
     assert not frame_counts.loss
     assert writer.closed
     assert not event_log.events("warning", "error")
+
+
+def test_what_still_waits_for_a_slow_disk_is_told(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    class SlowWriter(FakeWriter):
+        def write_frame(self, item: Any) -> int:
+            time.sleep(0.05)
+            return super().write_frame(item)
+
+    monkeypatch.setattr("live.run.recorder.TELL_S", 0.01)
+    caplog.set_level("INFO", "live.run.recorder")
+    recorded(writer := SlowWriter(), 8)
+    assert writer.closed and len(writer.frames) == 8
+    assert "MB still wait for the disk" in caplog.text
 
 
 def test_a_full_buffer_leaves_a_counted_gap() -> None:

@@ -83,6 +83,11 @@ def test_verbose_has_all(tmp_path: Path) -> None:
         (
             (0.0, 1e-5, 2e-5),
             True,
+            "3 measurements in all, 8 are needed: more pictures",
+        ),
+        (
+            (0.0, 1e-5, 2e-5, *[math.nan] * 7),
+            True,
             "only 3 measurements have strain and a tensile force, 8 are needed",
         ),
     ],
