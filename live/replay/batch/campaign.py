@@ -1,13 +1,8 @@
-"""A campaign: workers replay the missing tests, and one table has the results of all.
-
-The table is ``summary.csv``, and ``summary.parquet`` with pyarrow; each is written completely or not at all.
-"""
+"""A campaign: workers replay the missing tests, and one table has the results of all (``live.replay.batch.row``)."""
 
 from __future__ import annotations
 
-import csv
 import dataclasses
-import io
 import threading
 import time
 from collections.abc import Mapping, Sequence
@@ -20,10 +15,10 @@ from acquire.errors import EXIT_INTERRUPTED, LOSS, ConfigError, DataError, Phase
 from acquire.text import Message
 from acquire.text.message import counted
 from live.config.loading import load_config
-from live.config.new_files import made_folder, replaced_file
+from live.config.new_files import made_folder
 from live.pipeline.consumer import Screen
 from live.replay.batch.cluster import Cluster, check_scheduler
-from live.replay.batch.row import COLUMNS, BatchRow, Value, failed
+from live.replay.batch.row import BatchRow, failed, write_summary
 from live.replay.batch.scheduler import BatchProgress, ChunkPlan, Scheduler, cut, perform_all, sweep_chunks
 from live.replay.batch.task import Task, row_done, sweep, sweep_done
 from live.replay.batch.test_list import BatchJob, key_of, longest_first
@@ -32,51 +27,6 @@ from live.replay.pictures import reference_file
 from live.setup.compiling import compile_ahead
 
 _POLL_S = 0.1
-
-
-def write_summary(rows: Sequence[BatchRow], out: Path) -> list[Path]:
-    """Write the table, in place of that of an earlier call; Parquet only where pyarrow is installed.
-
-    Raises
-    ------
-    DataError
-        A file cannot be written; the earlier one stays.
-    """
-    made = {"summary.csv": as_csv(rows)}
-    if (table := as_parquet(rows)) is not None:
-        made["summary.parquet"] = table
-    for name, content in made.items():
-        with replaced_file(out / name) as part:
-            part.write_bytes(content)
-    return [out / name for name in made]
-
-
-def as_csv(rows: Sequence[BatchRow]) -> bytes:
-    """A heading, and a line for each test; unknown values are empty."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows([_cell(row.values[name]) for name in COLUMNS] for row in rows)
-    return text.getvalue().encode("utf-8", "backslashreplace")
-
-
-def as_parquet(rows: Sequence[BatchRow]) -> bytes | None:
-    """The table as Parquet with types; None without pyarrow."""
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError:
-        return None
-    kinds = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64()}
-    schema = pyarrow.schema([(name, kinds[kind]) for name, kind in COLUMNS.items()])
-    sink = io.BytesIO()
-    parquet.write_table(pyarrow.Table.from_pylist([dict(row.values) for row in rows], schema), sink)
-    return sink.getvalue()
-
-
-def _cell(value: Value) -> Any:
-    """The value as a cell that no spreadsheet reads as a formula."""
-    return value.lstrip("=+-@\t ") if isinstance(value, str) else "" if value is None else value
 
 
 @dataclass(frozen=True, slots=True)

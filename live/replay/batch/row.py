@@ -1,9 +1,14 @@
-"""The row of a test in the table: settings, figures with their intervals, noise, losses."""
+"""The table of a campaign: a row has the settings of a test, figures with their intervals, noise, losses.
+
+It is ``summary.csv``, and ``summary.parquet`` with pyarrow; each is written completely or not at all.
+"""
 
 from __future__ import annotations
 
+import csv
+import io
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +19,7 @@ from acquire.text import Message
 from acquire.text.message import from_json, printable
 from analysis.evaluate import TensileFigures
 from live.config.loading import Config
+from live.config.new_files import replaced_file
 from live.pipeline.history import History
 from live.replay.replay import Replayed
 from live.results import Strain, still_phase_of
@@ -162,3 +168,48 @@ def _fitting(value: Any, kind: type) -> Value:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         return None
     return int(value) if kind is int else float(value)
+
+
+def write_summary(rows: Sequence[BatchRow], out: Path) -> list[Path]:
+    """Write the table, in place of that of an earlier call; Parquet only where pyarrow is installed.
+
+    Raises
+    ------
+    DataError
+        A file cannot be written; the earlier one stays.
+    """
+    made = {"summary.csv": as_csv(rows)}
+    if (table := as_parquet(rows)) is not None:
+        made["summary.parquet"] = table
+    for name, content in made.items():
+        with replaced_file(out / name) as part:
+            part.write_bytes(content)
+    return [out / name for name in made]
+
+
+def as_csv(rows: Sequence[BatchRow]) -> bytes:
+    """A heading, and a line for each test; unknown values are empty."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows([_cell(row.values[name]) for name in COLUMNS] for row in rows)
+    return text.getvalue().encode("utf-8", "backslashreplace")
+
+
+def as_parquet(rows: Sequence[BatchRow]) -> bytes | None:
+    """The table as Parquet with types; None without pyarrow."""
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError:
+        return None
+    kinds = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64()}
+    schema = pyarrow.schema([(name, kinds[kind]) for name, kind in COLUMNS.items()])
+    sink = io.BytesIO()
+    parquet.write_table(pyarrow.Table.from_pylist([dict(row.values) for row in rows], schema), sink)
+    return sink.getvalue()
+
+
+def _cell(value: Value) -> Any:
+    """The value as a cell that no spreadsheet reads as a formula."""
+    return value.lstrip("=+-@\t ") if isinstance(value, str) else "" if value is None else value

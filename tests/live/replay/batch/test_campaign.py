@@ -16,16 +16,8 @@ import pytest
 
 from acquire.errors import ConfigError, DataError
 from live.replay.batch import campaign as module
-from live.replay.batch.campaign import (
-    CampaignRequest,
-    _cell,
-    _planned,
-    _task,
-    as_csv,
-    run_campaign,
-    write_summary,
-)
-from live.replay.batch.row import COLUMNS, BatchRow
+from live.replay.batch.campaign import CampaignRequest, _planned, _task, run_campaign
+from live.replay.batch.row import COLUMNS, BatchRow, _cell, as_csv, write_summary
 from live.replay.batch.scheduler import ChunkPlan, perform_all
 from live.replay.batch.task import ROW_FILE, Task
 from live.replay.batch.test_list import BatchJob, _of_source, _pictures, find_tests, key_of
@@ -59,7 +51,7 @@ class Made:
         processes = SimpleNamespace(close=lambda: self.done.append("closed"))
         monkeypatch.setattr(module, "_processes", lambda wanted: processes)
         monkeypatch.setattr(module, "_work", self._work)
-        monkeypatch.setattr(module, "as_parquet", lambda rows: None)
+        monkeypatch.setattr("live.replay.batch.row.as_parquet", lambda rows: None)
         self.codes = {"b": 0, "c": 0}
 
     def _work(self, wanted: Any, tasks: Any, rows: Any, *_: Any) -> None:
