@@ -27,6 +27,7 @@ from acquire.text.message import printable
 from live.commands.options import (
     MEASURE,
     PICTURES,
+    POSITIVE,
     add_config_file,
     add_help_all,
     add_lens,
@@ -221,7 +222,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, "devices", "camera", "back", "beside", "crop", "dark", "flat", "load")
     add_options(parser, "recording of the test", "record", "no-record", "seconds", "out")
     parser.add_argument(
-        "--target", type=float, metavar="UM_M", help="largest strain noise of one ZOI for the test, um/m"
+        "--target", type=POSITIVE, metavar="UM_M", help="largest strain noise of one ZOI for the test, um/m"
     )
     parser.add_argument(
         "--snapshot",
