@@ -31,6 +31,7 @@ from live.results.maps.colours import (
 )
 from live.results.maps.scale import ColourScale
 from live.results.reader import Strain
+from tests.live.ended import code_of
 
 
 def test_the_table_runs_from_blue_over_near_white_to_red_without_jumps() -> None:
