@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar, overload
 from urllib.parse import quote, unquote
 
-from acquire.bounds import NotAllowed, integer_of, number_of, one_of, yes_or_no
+from acquire.bounds import NotAllowed, integer_of, not_possible, number_of, one_of, yes_or_no
 from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
 from acquire.text import Message, meant
@@ -31,6 +31,10 @@ _SCHEME = re.compile(r"^([A-Za-z][\w+.-]+):")
 
 Value = TypeVar("Value")
 _SAFE = "/:,@+-_.*~"  # in the value of a setting
+
+RECORDING = "session.h5"
+
+Device = TypeVar("Device")
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,9 +137,6 @@ def as_typed(text: str) -> str:
     return bare if bare != text.strip() else text
 
 
-RECORDING = "session.h5"
-
-
 def session_file(path: Path) -> Path:
     """The session file: that in ``path`` where it is the folder of a run, else ``path``."""
     return path / RECORDING if (path / RECORDING).is_file() else path
@@ -206,13 +207,7 @@ class Options:
         try:
             return check(word)
         except NotAllowed as allowed:
-            raise ConfigError(
-                "{text}: {key}={value} is not possible; allowed: {allowed}",
-                self.address.text,
-                key,
-                word,
-                str(allowed),
-            ) from None
+            raise not_possible(self.address.text, key, word, allowed) from None
 
     def rest(self) -> dict[str, str]:
         """All settings not taken yet, for a scheme with keys of its own choosing."""
@@ -238,7 +233,6 @@ class Options:
             )
 
 
-Device = TypeVar("Device")
 Opener = Callable[[Address, EventSink], Device]
 
 
@@ -311,9 +305,6 @@ class Registry(Generic[Device]):
     def open(self, text: str, on_event: EventSink = ignore_event) -> Device:
         """Open what ``text`` names; see ``Camera`` and ``LoadCell`` for what is raised."""
         address = parse_address(text)
-        return self._find(address)(address, on_event)
-
-    def _find(self, address: Address) -> Opener[Device]:
         opener = self._openers.get(address.scheme)
         if opener is None:
             for entry in entry_points(group=self._group, name=address.scheme):
@@ -332,7 +323,7 @@ class Registry(Generic[Device]):
                 meant(address.scheme, [*self.schemes(), *self._elsewhere]),
                 known,
             )
-        return _load(opener) if isinstance(opener, str) else opener
+        return (_load(opener) if isinstance(opener, str) else opener)(address, on_event)
 
 
 def _load(path: str) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from acquire.errors import Spoken
+from acquire.errors import ConfigError, Spoken
 from acquire.text import Message
 
 TRUE_WORDS, FALSE_WORDS = ("1", "yes", "true", "on"), ("0", "no", "false", "off")
@@ -84,6 +84,26 @@ def yes_or_no(word: str) -> bool:
     if word.lower() not in TRUE_WORDS + FALSE_WORDS:
         raise NotAllowed("yes or no")
     return word.lower() in TRUE_WORDS
+
+
+def in_steps(low: int, high: int, step: int) -> str:
+    """The whole numbers that a device takes, in words."""
+    steps = Message(" in steps of {step}", step) if step > 1 else ""
+    return Message("{low} to {high}{steps}", low, high, steps)
+
+
+def not_possible(where: object, key: str, value: object, allowed: object) -> ConfigError:
+    """The error of a setting whose value is none of what is ``allowed``; ``where`` is its address."""
+    return ConfigError(
+        "{where}: {key}={value} is not possible; allowed: {allowed}", where, key, value, allowed
+    )
+
+
+def not_kept(where: object, key: str, value: object, got: object) -> ConfigError:
+    """The error of a setting of which the camera makes something else."""
+    return ConfigError(
+        "{where}: {key}={value}: the camera makes it {got}; ask for that", where, key, value, got
+    )
 
 
 def same_value(got: str, asked: str) -> bool:

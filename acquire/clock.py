@@ -21,6 +21,16 @@ import numpy as np
 Clock = Callable[[], float]
 """Says the time, s: ``time.monotonic``, or in a test a clock that is moved by hand."""
 
+LATE_S = 5.0  # a device that stays late for so long has set its clock back
+TURNS_S = (2**32 * 1e-6, 2**32 * 1e-3)  # after which counters of 32 bits begin again: micros(), millis()
+PIECE_S, WINDOW_S = 0.5, 60.0  # the least delayed arrival of each piece of the window is kept
+KNOWN, KEPT = 8, 16  # pieces: from which the rate is known, and which are kept however old they are
+TICK_S = 2e-3  # of the coarsest clock that is usual, and of USB
+NEAR_PART = 0.3  # more than one beat of a latency timer of 16 ms with a clock that is 0.1 % wrong: 16 s
+DRIFT_S = 15.0  # from which on the drift is told
+
+Point = tuple[float, float]  # device's time, offset of the host's from it, s
+
 
 @dataclass(frozen=True, slots=True)
 class ClockPair:
@@ -58,17 +68,6 @@ class ClockPair:
         return cls(monotonic, utc if utc.tzinfo else utc.replace(tzinfo=UTC))
 
 
-LATE_S = 5.0  # a device that stays late for so long has set its clock back
-TURNS_S = (2**32 * 1e-6, 2**32 * 1e-3)  # after which counters of 32 bits begin again: micros(), millis()
-PIECE_S, WINDOW_S = 0.5, 60.0  # the least delayed arrival of each piece of the window is kept
-KNOWN, KEPT = 8, 16  # pieces: from which the rate is known, and which are kept however old they are
-TICK_S = 2e-3  # of the coarsest clock that is usual, and of USB
-NEAR_PART = 0.3  # more than one beat of a latency timer of 16 ms with a clock that is 0.1 % wrong: 16 s
-DRIFT_S = 15.0  # from which on the drift is told
-
-Point = tuple[float, float]  # device's time, offset of the host's from it, s
-
-
 @dataclass(frozen=True, slots=True)
 class DeviceTime:
     """When the device stamped a message.
@@ -99,13 +98,12 @@ class DeviceClock:
     time lies between the true one and that of the arrival wherever the rate is within its bound.
 
     Stamps that go back, or leap ahead, are old messages or a clock that jumped (a restart): only when they keep their
-    new pace for ``settle_s`` is the clock tied anew. A counter of 32 bits that begins again is followed.
+    new pace for ``SETTLE_S`` is the clock tied anew. A counter of 32 bits that begins again is followed.
 
     Parameters
     ----------
     rate_limit : float
         What the rate of the device's clock may be wrong by, before it is known: 2 % of a ceramic resonator.
-    jump_s, settle_s : float, s
 
     Attributes
     ----------
@@ -113,8 +111,10 @@ class DeviceClock:
         Times that the device's clock was tied anew.
     """
 
-    def __init__(self, rate_limit: float = 0.02, jump_s: float = 0.5, settle_s: float = 0.5) -> None:
-        self._rate_limit, self._jump_s, self._settle_s = rate_limit, jump_s, settle_s
+    JUMP_S, SETTLE_S = 0.5, 0.5
+
+    def __init__(self, rate_limit: float = 0.02) -> None:
+        self._rate_limit = rate_limit
         self._offset = self._last = math.nan
         self._other_offset = self._other_since = self._late_since = math.nan
         self._points: deque[Point] = deque()
@@ -172,14 +172,14 @@ class DeviceClock:
         """The device's time without the turns of its counter."""
         if device < self._last:
             for turn in TURNS_S:
-                if abs(arrived - device - turn - self._offset) < self._jump_s:
+                if abs(arrived - device - turn - self._offset) < self.JUMP_S:
                     self._turned += turn
                     return device + turn
         return device
 
     def _fits(self, offset: float, device: float, arrived: float) -> bool:
         elapsed = device - self._last
-        slack = self._jump_s + self._rate_limit * elapsed
+        slack = self.JUMP_S + self._rate_limit * elapsed
         if elapsed < 0 or offset < self._offset - slack:
             return False
         # A clock restarted a moment ago has soon passed its last stamp, but not found its old offset.
@@ -195,9 +195,9 @@ class DeviceClock:
 
     def _keeps_pace(self, offset: float, arrived: float) -> bool:
         """Whether the clock has kept a new pace for long enough."""
-        if math.isnan(self._other_offset) or abs(offset - self._other_offset) > self._jump_s / 5:
+        if math.isnan(self._other_offset) or abs(offset - self._other_offset) > self.JUMP_S / 5:
             self._other_offset, self._other_since = offset, arrived
-        return arrived - self._other_since >= self._settle_s
+        return arrived - self._other_since >= self.SETTLE_S
 
     # -- its rate
 

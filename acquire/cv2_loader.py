@@ -19,6 +19,8 @@ _LIMITS = {
     "OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT": "1",  # s; by default a stalled camera blocks for ten
 }
 
+LOG_SILENT, LOG_WARNING = 0, 3
+
 
 @cache
 def load_cv2() -> Any:
@@ -45,9 +47,6 @@ def drawn_letters(text: str) -> str:
     if hasattr(load_cv2(), "FontFace"):
         return text
     return unicodedata.normalize("NFKD", text.translate(IN_ASCII)).encode("ascii", "ignore").decode()
-
-
-LOG_SILENT, LOG_WARNING = 0, 3
 
 
 def log_settings(cv2: Any) -> Any:

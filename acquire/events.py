@@ -16,6 +16,12 @@ from acquire.text.message import word
 
 Level = Literal["info", "warning", "error"]
 
+SOURCES = (
+    "alarm", "burst", "force", "gauges", "measurement", "operator", "pattern", "phasedic", "picture", "plates",
+    "recorder", "reference", "region", "sharpness", "strain", "view",
+)  # fmt: skip
+"""Parts of the program that events come from; other sources are addresses and names."""
+
 
 class EventKind(StrEnum):
     """The kinds of events; the values are what stands in files."""
@@ -36,13 +42,6 @@ class EventKind(StrEnum):
     RECORDER = "recorder"  # disk space, write errors, counted gaps
     MEASUREMENT = "measurement"  # a trouble or remark of the measuring path
     VIEW = "view"  # a trouble of the view or another output
-
-
-SOURCES = (
-    "alarm", "burst", "force", "gauges", "measurement", "operator", "pattern", "phasedic", "picture", "plates",
-    "recorder", "reference", "region", "sharpness", "strain", "view",
-)  # fmt: skip
-"""Parts of the program that events come from; other sources are addresses and names."""
 
 
 @dataclass(frozen=True, slots=True)

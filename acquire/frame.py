@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 
 ClockKind = Literal["device", "host", "nominal"]
 
+QUANTISATION = "quantisation"
+"""Among ``CameraInfo.controls``: steps of the 8 x 8 coefficients of compressed pictures by rows, GL."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
@@ -133,10 +136,6 @@ class CameraSetting:
     high: float
     step: float = 0.0
     log: bool = False
-
-
-QUANTISATION = "quantisation"
-"""Among ``CameraInfo.controls``: steps of the 8 x 8 coefficients of compressed pictures by rows, GL."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from acquire.addresses import Address
-from acquire.bounds import same_value
-from acquire.camera import CameraListing
+from acquire.bounds import not_kept, not_possible, same_value
+from acquire.camera.contract import CameraListing, not_one
 from acquire.camera.live import DeviceFault, LiveCamera, Picture
 from acquire.camera.timing import Bounded, exposure_and_gain, longest_pause_s
-from acquire.errors import ConfigError, DataError, DeviceError
+from acquire.errors import DataError, DeviceError
 from acquire.events import EventSink
 from acquire.frame import CameraInfo
 from acquire.genicam.formats import FORMATS, decode, preferred, readable
-from acquire.settings import keys_of, number, others, read_settings, setting, whole
+from acquire.settings import no_feature, number, others, read_settings, setting, whole
 from acquire.text import Message
 
 # Set before all others, where the camera has them: nothing changes by itself, grey levels are proportional to light,
@@ -138,40 +138,18 @@ class PylonDriver:
         for key in [*(asked.keys() - FEATURES.keys()), *(key for key in FEATURES if key in asked)]:
             self._set(key, asked[key])
         if (got := self._camera.PixelFormat.ToString()) not in FORMATS:
-            raise ConfigError(
-                "{address}: format={got} is no grey levels; the camera offers {offered}",
-                self._address,
-                got,
-                offered,
-            )
+            raise not_possible(self._address, "format", got, ", ".join(readable(offered)) or Message("none"))
 
     def _set(self, key: str, value: str) -> None:
         node = self._node(*FEATURES.get(key, (key,)))
         if node is None:
-            raise ConfigError(
-                "{address}: this camera has no {key}; known settings: {listed}",
-                self._address,
-                key,
-                keys_of(PylonSettings),
-            )
+            raise no_feature(self._address, key, PylonSettings)
         try:
             node.FromString(value)
         except self._genicam.GenericException as error:
-            raise ConfigError(
-                "{address}: {key}={value} is not possible; {allowed}",
-                self._address,
-                key,
-                value,
-                _allowed(node),
-            ) from error
+            raise not_possible(self._address, key, value, _allowed(node)) from error
         if not same_value(got := node.ToString(), value):
-            raise ConfigError(
-                "{address}: {key}={value}: the camera makes it {got}; ask for that",
-                self._address,
-                key,
-                value,
-                got,
-            )
+            raise not_kept(self._address, key, value, got)
 
     def _describe(self) -> CameraInfo:
         camera, device = self._camera, self._camera.GetDeviceInfo()
@@ -254,26 +232,14 @@ def _only(address: Address) -> str:
     here = list_cameras()
     found = [one.address for one in here if address.target in ("", one.address.removeprefix("pylon:"))]
     if len(found) != 1:
-        listed = "; ".join(f"{one.address}  {one.name}" for one in here) or Message("none")
-        raise (ConfigError if found else DeviceError)(
-            Message(
-                "{text}: {count} cameras are meant; give a serial number. Cameras here: {listed}",
-                address.text,
-                len(found),
-                listed,
-            )
-        )
+        raise not_one(address.text, len(found), [f"{one.address}  {one.name}" for one in here])
     return found[0].removeprefix("pylon:")
 
 
 def _allowed(node: Any) -> str:
     if hasattr(node, "Symbolics"):
-        return Message("allowed: {listed}", ", ".join(node.Symbolics))
-    return (
-        Message("allowed: {Min:g} to {Max:g}", node.Min, node.Max)
-        if hasattr(node, "Min")
-        else Message("the camera refuses it")
-    )
+        return ", ".join(node.Symbolics)
+    return f"{node.Min:g} to {node.Max:g}" if hasattr(node, "Min") else Message("what the camera takes")
 
 
 def _bounded(node: Any) -> Bounded | None:

@@ -13,11 +13,15 @@ from typing import Any, TypeVar
 
 from acquire.addresses import Address, Options
 from acquire.bounds import NotAllowed, integer_of, number_of, one_of, yes_or_no
+from acquire.errors import ConfigError
 
 Settings = TypeVar("Settings")
 Check = Callable[[str], Any]
 """Makes a value of the word of an address; raises ``NotAllowed``."""
 OTHERS = "others"
+
+FLAG: Check = yes_or_no
+TEXT: Check = str
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,10 +81,6 @@ def choice(*allowed: str) -> Check:
     return lambda word: one_of(word, allowed)
 
 
-FLAG: Check = yes_or_no
-TEXT: Check = str
-
-
 def setting(check: Check, default: Any, words: str, unit: str = "") -> Any:
     """A field that is the setting of its own name."""
     return field(default=default, metadata={"setting": (check, words, unit)})
@@ -105,6 +105,13 @@ def settings_of(kind: type) -> Iterator[Setting]:
 def keys_of(kind: type) -> str:
     """The keys that a class declares, for messages."""
     return ", ".join(one.key for one in settings_of(kind) if one.key)
+
+
+def no_feature(where: str, name: str, kind: type) -> ConfigError:
+    """The error of a feature that a camera does not have, beside the settings that ``kind`` declares."""
+    return ConfigError(
+        "{where}: this camera has no feature {name}; known settings: {known}", where, name, keys_of(kind)
+    )
 
 
 def read_settings(kind: type[Settings], address: Address) -> Settings:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
@@ -70,11 +69,11 @@ def means() -> str:
 
 
 def channels() -> str:
-    """The channels of alarms and strain output."""
+    """The channels of alarms and strain output that are no columns of strain.csv."""
     rows = (
         (f"`{one.name}`", one.unit, one.words)
         for one in FIGURES
-        if one.channel and one.words  # others are columns of strain.csv
+        if one.channel and one.words and one.name not in COLUMNS
     )
     return table(("channel", "unit", "meaning"), rows)
 
@@ -99,14 +98,18 @@ def flags() -> str:
     return f"Bits of `load/flags`: {bits}.\n\nKinds of events: {', '.join(EventKind)}."
 
 
-SIM = [
-    "programme", "seconds", "hold", "E_GPa", "nu", "yield_MPa", "section_mm2", "bits", "noise", "fps", "faults",
-]  # fmt: skip
-"""Settings of ``sim:`` that are in the page; ``phasedic devices --settings`` has all."""
+def settings(kinds: Mapping[str, type]) -> str:
+    """The settings of the addresses of each kind of device."""
+    return "\n\n".join(
+        f"### {_named(name)}\n\n{_settings(kind)}" for name, kind in kinds.items() if any(settings_of(kind))
+    )
 
 
-def settings_table(scheme: str, kind: type) -> str:
-    """The settings of an address of a kind of device."""
+def _named(kind: str) -> str:
+    return f"`{kind}`" if "=" in kind else f"`{kind}:`" if kind else "`/dev/...`"
+
+
+def _settings(kind: type) -> str:
     rows = (
         (
             f"`{one.key}`" if one.key else "others",
@@ -114,7 +117,6 @@ def settings_table(scheme: str, kind: type) -> str:
             "; ".join(filter(None, (one.words, one.allowed * ("one of" in one.allowed), one.stands))),
         )
         for one in settings_of(kind)
-        if scheme != "sim" or one.key in SIM
     )
     return table(("setting", "unit", "meaning"), rows)
 
@@ -129,15 +131,11 @@ def _described(path: str, one: Declared) -> Row:
 
 
 TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
-    **{name or "v4l2": partial(settings_table, name, kind) for name, kind in camera_settings().items()},
-    "load": partial(settings_table, "load", load_settings()[""]),
+    "cameras": lambda: settings(camera_settings()), "load_cells": lambda: settings(load_settings()),
     "session": session_layout, "flags": flags, "means": means, "status": statuses,
     "response": response, "cycles": cycles, "channels": channels,
 })  # fmt: skip
-PAGES = tuple(
-    DOCS / f"{name}.md"
-    for name in ("session-format", "strain-format", "control", "cameras", "machine-vision", "load-cells")
-)
+PAGES = tuple(DOCS / f"{name}.md" for name in ("strain-format", "control", "data/settings", "data/datasets"))
 _TABLE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)
 
 

@@ -4,10 +4,9 @@
 ``SpecimenDeformation`` is that of a specimen at one instant. Displacements are px on the reference grid,
 x right and y down: ``deformed(x + u, y + v) = reference(x, y)``.
 
-The strain fields of the virtual specimens, each linear in the two mean strains.
-
-A field is ``axial * A(x, y) + transverse * T(x, y)``; A and T are closed forms with exact
-gradients, so that they are computed once for the places that matter and combined at each instant.
+The strain fields of the virtual specimens are linear in the two mean strains. A field is ``axial * A(x, y) + transverse
+* T(x, y)``; A and T are closed forms with exact gradients, so that they are computed once for the places that matter
+and combined at each instant.
 
 - uniform: homogeneous.
 - hole: Kirsch's plate with a round hole in uniaxial tension, plane stress and small strain
@@ -40,6 +39,8 @@ Mode = tuple[Array, Array, Array, Array, Array, Array]  # u, v, du_dx, du_dy, dv
 CONTINUED = 0.75
 NECK_AT = 0.2  # of the distance along the load, from the centre
 SEAM_PX = 4.0  # half the width of the seam between two halves
+
+Gradient = tuple[Array, Array, Array, Array]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +105,8 @@ class StrainModes:
         elif self.kind == "woven":
             pair = _woven(along, across, self.cell, self.overstrain)
         else:
-            pair = _uniform(along, across)
+            zero, one = np.zeros_like(along), np.ones_like(along)
+            pair = (along, zero, one, zero, zero, zero), (zero, across, zero, zero, zero, one)
         neck = _necked(along, across, *self.neck) if self.neck[1] else None
         if self.kind == "halves":
             neck = _first_half(along, across)
@@ -117,11 +119,6 @@ class StrainModes:
 def _swapped(mode: Mode) -> Mode:
     along, across, aa, ac, ca, cc = mode
     return across, along, cc, ca, ac, aa
-
-
-def _uniform(along: Array, across: Array) -> tuple[Mode, Mode]:
-    zero, one = np.zeros_like(along), np.ones_like(along)
-    return (along, zero, one, zero, zero, zero), (zero, across, zero, zero, zero, one)
 
 
 def _necked(along: Array, across: Array, middle: float, width: float) -> tuple[Mode, Mode]:
@@ -199,9 +196,6 @@ def _from_complex(d: Complex, d_z: Complex, d_zc: Complex) -> Mode:
     """u + i v and its derivatives by z and by its conjugate, as six real fields."""
     d_along, d_across = d_z + d_zc, 1j * (d_z - d_zc)
     return d.real, d.imag, d_along.real, d_across.real, d_along.imag, d_across.imag
-
-
-Gradient = tuple[Array, Array, Array, Array]
 
 
 class Deformation(Protocol):

@@ -4,9 +4,8 @@ A dialect defines a reading on the line and the answers to commands; ``hw_mocks.
 those of real devices. ``AsciiIndicator`` is the free text of microcontroller sketches: it sends unasked and takes
 no commands. Pure: bytes in, bytes out, no clock.
 
-What a simulated indicator puts on the line at each sample, with the faults of the day.
-
-Pure: the time is handed in. Chunks come out; between two chunks of one sample the line pauses.
+At each sample an indicator puts chunks on the line, with the faults of the day; between two chunks of one sample the
+line pauses. The time is handed in.
 """
 
 from __future__ import annotations
@@ -24,6 +23,11 @@ from hw_mocks.sim_settings import Fault, FaultPlan
 Status = Literal["ok", "overload", "underload", "error"]
 NEWTONS = {"N": 1.0, "kN": 1e3, "lbF": 4.4482216153, "kgF": 9.80665, "kg": 9.80665, "g": 9.80665e-3}
 MAX_COMMAND = 256
+
+Style = Literal["millis", "plain", "label", "openscale"]
+SATURATED = {"overload": 8388607, "underload": -8388608}  # of a 24-bit converter
+COUNTS_PER_N = 800
+TEMPERATURE = 21.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,12 +130,6 @@ class Indicator(ABC):
 def decimals(step: float) -> int:
     """Digits after the point that a step needs."""
     return max(0, math.ceil(-math.log10(step) - 1e-9))
-
-
-Style = Literal["millis", "plain", "label", "openscale"]
-SATURATED = {"overload": 8388607, "underload": -8388608}  # of a 24-bit converter
-COUNTS_PER_N = 800
-TEMPERATURE = 21.5
 
 
 class AsciiIndicator(Indicator):

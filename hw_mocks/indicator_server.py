@@ -32,6 +32,11 @@ MAX_REGISTERS = 32
 ValueType = Literal["i32", "u32", "f32"]
 FORMS: Mapping[ValueType, str] = {"i32": ">i", "u32": ">I", "f32": ">f"}
 
+log = logging.getLogger(__name__)
+POLL_S = 0.05
+SPLIT_S = 0.03
+BACKLOG_TIMEOUT_S = 0.2  # for a backlog that does not fit into the line's buffer at once
+
 
 @dataclass(frozen=True, slots=True)
 class RegisterMap:
@@ -280,12 +285,6 @@ class PtyPort:
             self._folder.rmdir()
 
 
-log = logging.getLogger(__name__)
-POLL_S = 0.05
-SPLIT_S = 0.03
-BACKLOG_TIMEOUT_S = 0.2  # for a backlog that does not fit into the line's buffer at once
-
-
 class IndicatorServer(Closing):
     """Runs an indicator until ``close``.
 
@@ -340,7 +339,10 @@ class IndicatorServer(Closing):
             while not self._stopped.is_set():
                 t = self._boot + round(ideal * 1e3) / 1e3
                 self._listen_until(t)
-                self._plug(t)
+                if self._output.unplugged(t):
+                    self._port.unplug()
+                else:
+                    self._port.plug()
                 self._send(t)
                 ideal += self._output.interval(t)
         except Exception:
@@ -352,12 +354,6 @@ class IndicatorServer(Closing):
                 self._stopped.wait(min(left, POLL_S))
             elif data := self._port.read(min(left, POLL_S)):
                 self._port.write(self._output.answers(data, self._clock()))
-
-    def _plug(self, t: float) -> None:
-        if self._output.unplugged(t):
-            self._port.unplug()
-        else:
-            self._port.plug()
 
     def _send(self, t: float) -> None:
         for i, chunk in enumerate(self._output.sample(t)):

@@ -35,6 +35,11 @@ ELASTIC_SHARE = 0.6
 """Of the crosshead's way that reaches an elastic specimen."""
 MAX_SPEED = 0.1  # 1/s
 
+PLASTIC_NU = 0.5  # plastic flow keeps the volume
+NEWTON_STEPS = 20
+BISECTIONS = 60
+YIELD_PLASTIC = 0.002  # plastic strain where the power law begins
+
 
 class Machine:
     """Strain over time, from the speeds that were commanded.
@@ -240,12 +245,6 @@ class TestClock:
     def elapsed(self, now: float) -> float:
         """Seconds since the start; 0 before it began."""
         return 0.0 if self._start is None else now - self._start
-
-
-PLASTIC_NU = 0.5  # plastic flow keeps the volume
-NEWTON_STEPS = 20
-BISECTIONS = 60
-YIELD_PLASTIC = 0.002  # plastic strain where the power law begins
 
 
 @dataclass(frozen=True, slots=True)

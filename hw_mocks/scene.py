@@ -42,6 +42,8 @@ SPOT_PX = 6
 SHIFT_PX, STRAIN = (0.11, -0.07), (-3e-5, 1e-4)
 """Motion of the middle (x, y), and strain (exx, eyy), from one picture to the next."""
 
+READ_SHARE = 0.04  # of the noise variance at mid-grey, where only the total is given
+
 
 class Scene:
     """A specimen with its pattern; the strain field at the speckles is computed once.
@@ -92,9 +94,6 @@ def _travel(specimen: VirtualSpecimen, optics: Optics) -> float:
     x, y = np.array([0.0, 0.0, 1.0, 1.0]) * specimen.width, np.array([0.0, 1.0, 0.0, 1.0]) * specimen.height
     ways = (optics.seen(specimen, t).displacement(x, y) for t in (0.0, specimen.duration_s))
     return max(float(np.max(np.hypot(u, v))) for u, v in ways)
-
-
-READ_SHARE = 0.04  # of the noise variance at mid-grey, where only the total is given
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,16 +28,9 @@ from acquire.frame import CameraInfo, CameraSetting, ClockKind, Frame
 from acquire.opening import Closing
 from acquire.settings import number, take_settings
 from acquire.text import Message
+from hw_mocks import sim_settings
 from hw_mocks.optics import Optics, take_optics
 from hw_mocks.scene import Exposer, Scene, Sensor, rendered_fps, take_sensor, upper_half
-from hw_mocks.sim_settings import (
-    CAMERA_FAULTS,
-    FaultPlan,
-    PictureSettings,
-    Planned,
-    parse_faults,
-    plan_frames,
-)
 from hw_mocks.specimen import VirtualSpecimen, take_specimen
 
 log = logging.getLogger(__name__)
@@ -79,7 +72,7 @@ class SimCameraSettings:
     seed: int = 0
     buffers: int = 4
     offset_s: float = 0.0
-    faults: FaultPlan = field(default_factory=FaultPlan)
+    faults: sim_settings.FaultPlan = field(default_factory=sim_settings.FaultPlan)
     optics: Optics = field(default_factory=Optics)
     unhurried: bool = False
 
@@ -138,6 +131,8 @@ class SimCamera(Closing):
 
     Attributes
     ----------
+    scene : Scene
+        What it sees, for the truth.
     dropped : int
         Frames lost so far because no buffer was free or the renderer was late.
     """
@@ -155,7 +150,7 @@ class SimCamera(Closing):
         self.specimen, self._settings, self._on_event = specimen, settings, on_event
         self._clock, self._stopped = clock, threading.Event()
         self._sleep = sleep or self._stopped.wait
-        self._scene = settings.scene(specimen)
+        self.scene = settings.scene(specimen)
         self._exposer = Exposer(settings.sensor, (specimen.height, specimen.width), settings.seed + 1)
         self._plan = self._planned()
         self._ring = Ring(settings.buffers)
@@ -167,7 +162,7 @@ class SimCamera(Closing):
         self.info = self._describe(address)
         specimen.clock.claimed = True
         # Compiles what is not compiled yet, before time counts; the noise to come stays as it is.
-        Exposer(settings.sensor, (specimen.height, specimen.width), 0).expose(self._scene.render(0.0))
+        Exposer(settings.sensor, (specimen.height, specimen.width), 0).expose(self.scene.render(0.0))
 
     def _describe(self, address: str) -> CameraInfo:
         settings, sensor, specimen = self._settings, self._settings.sensor, self.specimen
@@ -206,11 +201,6 @@ class SimCamera(Closing):
         if now <= 0:
             return (brightness,)
         return CameraSetting("exposure_us", now, min(50.0, now), most, log=True), brightness
-
-    @property
-    def scene(self) -> Scene:
-        """Its scene, for the truth."""
-        return self._scene
 
     def __enter__(self) -> Self:
         if self._thread is None and not self._stopped.is_set():
@@ -280,9 +270,9 @@ class SimCamera(Closing):
         finally:
             self._ring.close()
 
-    def _planned(self) -> Iterator[Planned]:
+    def _planned(self) -> Iterator[sim_settings.Planned]:
         """The frames until the test ends, which its operator may decide; no time of an unhurried camera has passed."""
-        for planned in plan_frames(math.inf, self._settings.fps, self._settings.faults):
+        for planned in sim_settings.plan_frames(math.inf, self._settings.fps, self._settings.faults):
             if self._settings.unhurried:
                 due = self._start() + planned.t + self._delay_s + self._settings.exposure_s / 2
                 self._delay_s += max(0.0, self._clock() - due)
@@ -291,7 +281,7 @@ class SimCamera(Closing):
                 return
             yield replace(planned, t=t)
 
-    def _serve(self, planned: Planned) -> None:
+    def _serve(self, planned: sim_settings.Planned) -> None:
         """One frame period; the picture is made before its time and stored when it is due.
 
         A lag shorter than the ring costs nothing, as with a camera that fills its buffers by itself.
@@ -304,7 +294,7 @@ class SimCamera(Closing):
         if self._delivers(planned) and (frame is None or not self._ring.put(frame)):
             self.dropped += 1
 
-    def _delivers(self, planned: Planned) -> bool:
+    def _delivers(self, planned: sim_settings.Planned) -> bool:
         """Whether this frame comes; reports trouble that begins or ends here."""
         trouble = planned.fate if planned.fate in ("stalled", "disconnected") else ""
         source = self.info.address
@@ -322,8 +312,8 @@ class SimCamera(Closing):
         self._trouble = trouble
         return planned.fate in ("good", "damaged")
 
-    def _shoot(self, planned: Planned) -> Frame:
-        image, damaged = self._exposer.expose(self._scene.render(planned.t)), planned.fate == "damaged"
+    def _shoot(self, planned: sim_settings.Planned) -> Frame:
+        image, damaged = self._exposer.expose(self.scene.render(planned.t)), planned.fate == "damaged"
         image = upper_half(image) if damaged else image
         t = self._start() + planned.t
         raw = t if self.specimen.nominal else t + self._settings.exposure_s / 2
@@ -361,7 +351,7 @@ def _automatic(options: Options) -> bool:
 
 
 def _take_camera(options: Options) -> SimCameraSettings:
-    given = take_settings(PictureSettings, options)
+    given = take_settings(sim_settings.PictureSettings, options)
     fps = given.fps or AUTO_FPS[0]
     exposure_us = options.again("exposure_us", min(2000.0, 5e5 / fps), number(0, 1e6 / fps))
     return SimCameraSettings(
@@ -373,6 +363,6 @@ def _take_camera(options: Options) -> SimCameraSettings:
         seed=given.seed,
         buffers=given.buffers,
         offset_s=given.offset,
-        faults=parse_faults(given.faults, CAMERA_FAULTS, options.address.text),
+        faults=sim_settings.parse_faults(given.faults, sim_settings.CAMERA_FAULTS, options.address.text),
         optics=take_optics(options),
     )

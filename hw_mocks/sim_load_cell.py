@@ -240,19 +240,15 @@ def open_sim_load(address: Address, on_event: EventSink, specimen: VirtualSpecim
     options = Options(address)
     _refuse_another_specimen(address, specimen)
     take_specimen(options)
-    settings = _take_load(options)
-    options.done()
-    parse_faults(settings.faults, SERIAL_FAULTS, address.text)  # refused in lock step too, where none happens
-    kind = NominalLoadCell if specimen.nominal else SimLoadCell
-    return kind(specimen, settings, address.text, on_event)
-
-
-def _take_load(options: Options) -> SimLoadSettings:
     settings = take_settings(SimLoadSettings, options)
     passed_on = {key: value for key in PASSED_ON if (value := options.text(key)) is not None}
     if settings.protocol != "ascii" and "rate" in dict(options.address.settings):
         passed_on["rate"] = f"{settings.rate:g}"  # the reader asks or commands at this rate
-    return dataclasses.replace(settings, passed_on=passed_on)
+    settings = dataclasses.replace(settings, passed_on=passed_on)
+    options.done()
+    parse_faults(settings.faults, SERIAL_FAULTS, address.text)  # refused in lock step too, where none happens
+    kind = NominalLoadCell if specimen.nominal else SimLoadCell
+    return kind(specimen, settings, address.text, on_event)
 
 
 def _refuse_another_specimen(address: Address, specimen: VirtualSpecimen) -> None:

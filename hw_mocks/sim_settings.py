@@ -46,6 +46,8 @@ SERIAL_FAULTS: Mapping[str, float] = {
 
 BITS = (8, 10, 12, 16)
 
+Fate = Literal["good", "damaged", "lost", "stalled", "disconnected", "gone"]
+
 
 @dataclass(frozen=True, slots=True)
 class Fault:
@@ -129,9 +131,6 @@ def _parse(text: str, allowed: Mapping[str, float], where: str) -> Fault:
     return fault
 
 
-Fate = Literal["good", "damaged", "lost", "stalled", "disconnected", "gone"]
-
-
 @dataclass(frozen=True, slots=True)
 class Planned:
     """One frame period.
@@ -194,8 +193,14 @@ class SpecimenSettings:
     nu: float = setting(number(0, 0.5), 0.33, "Poisson's ratio")
     yield_MPa: float | None = setting(number(1e-3), None, "yield stress; where not given 140, of halves 120", "MPa")
     yield2_MPa: float | None = setting(number(1e-3), None, "of the lower half of halves; where not given 160", "MPa")
-    n: float | None = setting(number(0.01, 0.9), None, "hardening exponent of a sheet metal; of cyclic: cycles, 10")
-    r: float | None = setting(number(0.05, 10), None, "anisotropy of a sheet metal; of cyclic: force ratio, 0.1")
+    n: float | None = setting(
+        number(0.01, 0.9), None,
+        "hardening exponent of a sheet metal; with programme=cyclic: cycles, from 1, default 10",
+    )
+    r: float | None = setting(
+        number(0.05, 10), None,
+        "anisotropy of a sheet metal; with programme=cyclic: lowest over highest force, default 0.1",
+    )
     programme: str = setting(choice("pull", "cyclic"), "pull", "of the load")
     seconds: float = setting(number(0.1), 20.0, "of the test", "s")
     hold: float | None = setting(number(0), None, "at first; where not given 0.1 of seconds, at most 2", "s")

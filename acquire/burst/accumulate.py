@@ -33,6 +33,10 @@ TILE_PIXELS = 4096  # looked at in each tile at least, so that noise gives less 
 MAX_TILES = 4
 ROW_STEP = 4
 
+log = logging.getLogger(__name__)
+
+MAX_FRAMES = 65536  # a sum of so many 16-bit samples still fits into 32 bits
+
 
 def motion_between_frames(first: NDArray[Any], last: NDArray[Any], noise: float) -> float:
     """Largest motion of any part of the picture between two frames, px.
@@ -75,11 +79,6 @@ def _solve(xx: float, xy: float, yy: float, xd: float, yd: float, n: float, *, n
     u, v = (yy * xd - xy * yd) / determinant, (xx * yd - xy * xd) / determinant
     # Without what noise alone would show; the variance of a difference is twice that of a frame.
     return math.sqrt(max(0.0, u * u + v * v - 2 * noise**2 * (xx + yy) / determinant))
-
-
-log = logging.getLogger(__name__)
-
-MAX_FRAMES = 65536  # a sum of so many 16-bit samples still fits into 32 bits
 
 
 @cache

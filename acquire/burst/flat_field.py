@@ -20,6 +20,8 @@ from acquire.frame import Burst, frozen
 
 MIN_SHARE = 0.05  # of the median of the flat: below it a pixel sees next to nothing
 
+Image = NDArray[np.float32]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlatField:
@@ -86,9 +88,6 @@ class FlatField:
 
 def _size(image: NDArray[Any]) -> str:
     return f"{image.shape[1]}x{image.shape[0]}"
-
-
-Image = NDArray[np.float32]
 
 
 def save_mean(mean: Image, path: Path) -> None:

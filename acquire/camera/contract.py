@@ -12,14 +12,14 @@ import dataclasses
 import logging
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
 from acquire.addresses import RECORDING, Address, Registry, expanded, parse_address
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DeviceError, PhasedicError
 from acquire.events import EventSink, ignore_event
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.opening import Closing
@@ -27,6 +27,37 @@ from acquire.record_mode import Crop, RecordMode
 from acquire.text import Message, joined
 
 log = logging.getLogger(__name__)
+
+HAS_V4L2 = sys.platform == "linux"
+CAMERAS: Registry[Camera] = Registry(
+    "camera",
+    "phasedic.cameras",
+    {
+        "": "acquire.v4l2.camera:open_v4l2" if HAS_V4L2 else "acquire.camera.contract:without_v4l2",
+        "genicam": "acquire.genicam.camera:open_genicam",
+        "pylon": "acquire.pylon:open_pylon",
+        "opencv": "acquire.opencv.webcam:open_opencv",
+        "video": "acquire.opencv.video:open_video",
+        "files": "acquire.opencv.images:open_files",
+        "session": "acquire.session.devices:open_session_camera",
+    },
+    lists_group="phasedic.camera_lists",
+    elsewhere=["sim"],
+    lists=({"": "acquire.v4l2.listing:list_cameras"} if HAS_V4L2 else {})
+    | {"genicam": "acquire.genicam.camera:list_cameras", "pylon": "acquire.pylon:list_cameras"},
+    settings_group="phasedic.camera_settings",
+    settings={
+        "": "acquire.v4l2.controls:V4L2Settings",
+        "genicam": "acquire.genicam.settings:GenicamSettings",
+        "pylon": "acquire.pylon:PylonSettings",
+        "opencv": "acquire.opencv.webcam:OpenCVSettings",
+        "video": "acquire.opencv.video:VideoSettings",
+        "files": "acquire.opencv.images:FileSettings",
+        "session": "acquire.session.devices:SessionSettings",
+    },
+)
+
+_VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".m4v", ".webm")
 
 
 @runtime_checkable
@@ -106,36 +137,6 @@ def without_v4l2(address: Address, on_event: EventSink) -> Camera:
     )
 
 
-HAS_V4L2 = sys.platform == "linux"
-CAMERAS: Registry[Camera] = Registry(
-    "camera",
-    "phasedic.cameras",
-    {
-        "": "acquire.v4l2.camera:open_v4l2" if HAS_V4L2 else "acquire.camera.contract:without_v4l2",
-        "genicam": "acquire.genicam.camera:open_genicam",
-        "pylon": "acquire.pylon:open_pylon",
-        "opencv": "acquire.opencv.webcam:open_opencv",
-        "video": "acquire.opencv.video:open_video",
-        "files": "acquire.opencv.images:open_files",
-        "session": "acquire.session.devices:open_session_camera",
-    },
-    lists_group="phasedic.camera_lists",
-    elsewhere=["sim"],
-    lists=({"": "acquire.v4l2.listing:list_cameras"} if HAS_V4L2 else {})
-    | {"genicam": "acquire.genicam.camera:list_cameras", "pylon": "acquire.pylon:list_cameras"},
-    settings_group="phasedic.camera_settings",
-    settings={
-        "": "acquire.v4l2.controls:V4L2Settings",
-        "genicam": "acquire.genicam.settings:GenicamSettings",
-        "pylon": "acquire.pylon:PylonSettings",
-        "opencv": "acquire.opencv.webcam:OpenCVSettings",
-        "video": "acquire.opencv.video:VideoSettings",
-        "files": "acquire.opencv.images:FileSettings",
-        "session": "acquire.session.devices:SessionSettings",
-    },
-)
-
-
 @dataclass(frozen=True, slots=True)
 class CameraListing:
     """A camera that is there.
@@ -185,7 +186,18 @@ def list_cameras() -> list[CameraListing]:
     return found
 
 
-_VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".m4v", ".webm")
+def not_one(where: str, meant: int, here: Sequence[str]) -> PhasedicError:
+    """The error of an address that means several of the cameras ``here``, or none of them."""
+    listed = "; ".join(here) or Message("none")
+    if meant:
+        return ConfigError(
+            "{where}: {count} cameras are meant; give one of them. Cameras here: {here}", where, meant, listed
+        )
+    return DeviceError(
+        "{where}: no such camera answers. Cameras here: {here}. Check cable, power and address "
+        "(docs/machine-vision.md)",
+        *(where, listed),
+    )
 
 
 def with_scheme(text: str) -> str:
@@ -230,7 +242,7 @@ def open_camera(address: str, on_event: EventSink = ignore_event) -> Camera:
     return CAMERAS.open(with_scheme(address), on_event)
 
 
-class CroppedCamera:
+class CroppedCamera(CameraBase):
     """See ``acquire.camera.Camera``.
 
     Parameters
@@ -245,21 +257,11 @@ class CroppedCamera:
     """
 
     def __init__(self, camera: Camera, crop: Crop) -> None:
+        super().__init__()
         self._camera, self._cut = camera, RecordMode(crop=crop)
         self._cut.check(camera.info.width, camera.info.height)
         controls = {**camera.info.controls, "crop": list(crop)}
-        self.info: CameraInfo = dataclasses.replace(
-            camera.info, width=crop[2], height=crop[3], controls=controls
-        )
-
-    def __enter__(self) -> Self:
-        self._camera.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._camera.__exit__(kind, error, trace)
+        self.info = dataclasses.replace(camera.info, width=crop[2], height=crop[3], controls=controls)
 
     def __iter__(self) -> Iterator[Frame]:
         for frame in self._camera:
@@ -269,6 +271,8 @@ class CroppedCamera:
         """End the iteration; from any thread."""
         self._camera.stop()
 
-    def close(self) -> None:
-        """Release the device."""
+    def _start(self) -> None:
+        self._camera.__enter__()
+
+    def _release(self) -> None:
         self._camera.close()

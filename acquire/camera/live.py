@@ -357,26 +357,22 @@ class RepeatWatch:
     """Finds a driver that hands out the same picture again and again.
 
     A sensor has noise: three pictures that agree in every bit are one picture.
-
-    Parameters
-    ----------
-    limit : int
-        Equal pictures in a row from which on they count as repeated.
     """
 
-    def __init__(self, limit: int = 3) -> None:
-        self._limit = limit
+    LIMIT = 3
+
+    def __init__(self) -> None:
         self._last: NDArray[Any] | None = None
         self.run = 0
 
     def repeated(self, image: NDArray[Any]) -> bool:
-        """Whether this picture is the last of ``limit`` or more equal ones."""
+        """Whether this picture is the last of ``LIMIT`` or more equal ones."""
         same = self._last is not None and np.array_equal(self._last, image)
         self.run = self.run + 1 if same else 1
         self._last = image
-        return self.run >= self._limit
+        return self.run >= self.LIMIT
 
     @property
     def just_found(self) -> bool:
         """Whether the last picture was the first to count as repeated (for one message a run)."""
-        return self.run == self._limit
+        return self.run == self.LIMIT

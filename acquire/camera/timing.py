@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import statistics
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 from acquire.frame import CameraInfo, CameraSetting
@@ -56,6 +56,15 @@ def missing_at_end(info: CameraInfo, silent_s: float) -> int:
     if pause is None:
         pause = longest_pause_s(info.fps, info.exposure_s)
     return missing_between(0.0, silent_s, info.fps) if info.live and silent_s > pause else 0
+
+
+def drifting(controls: Sequence[str]) -> str:
+    """The warning on controls that a camera changes by itself; empty without any."""
+    if not controls:
+        return ""
+    return Message(
+        "the camera goes on changing by itself: {listed}; grey levels may drift", ", ".join(controls)
+    )
 
 
 def exposure_and_gain(

@@ -46,6 +46,31 @@ WEBCAM_WARNING = Message(
     "remove; a raw grey format measures better"
 )
 
+_DECODERS = re.compile(r"grfmt_\w+\.cpp|loadsave\.cpp|bitstrm\.cpp|^libpng |JPEG")
+_DAMAGE = re.compile(r"TIFF_Error|can't read data|Decode: |Corrupt JPEG|Premature end|libpng error")
+_TOO_LARGE = re.compile(r"MAX_IMAGE_|Insufficient memory")
+_BEFORE = re.compile(r"^.*(TIFF_Error|TIFF_Warning|can't read data:) ?")
+_lock = threading.Lock()
+Source = bytes | str
+
+_EXPORT = Message("cannot be read; save it as 16-bit TIFF pictures with the program of the camera")
+FOREIGN = {
+    **dict.fromkeys((".mraw", ".cih", ".cihx"), Message("a film of a Photron camera {EXPORT}", _EXPORT)),
+    ".cine": Message("a film of a Phantom camera {EXPORT}", _EXPORT),
+    ".seq": Message("a film of StreamPix {EXPORT}", _EXPORT),
+    **dict.fromkeys(
+        (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2"),
+        Message(
+            "a raw picture cannot be read; develop it as 16-bit TIFF, without sharpening and without noise "
+            "reduction"
+        ),
+    ),
+    ".heic": Message("this picture cannot be read; save it as PNG or TIFF"),
+}
+"""Endings of files that are not read, and what to do with them."""
+log = logging.getLogger(__name__)
+LOSSY = (".jpg", ".jpeg")
+
 
 def check_regular(path: Path) -> int:
     """The size of a regular file, bytes.
@@ -91,14 +116,6 @@ def read_bytes(path: Path, most: int = MAX_BYTES) -> bytes:
 
 def _why(error: Exception) -> str:
     return getattr(error, "strerror", None) or str(error)
-
-
-_DECODERS = re.compile(r"grfmt_\w+\.cpp|loadsave\.cpp|bitstrm\.cpp|^libpng |JPEG")
-_DAMAGE = re.compile(r"TIFF_Error|can't read data|Decode: |Corrupt JPEG|Premature end|libpng error")
-_TOO_LARGE = re.compile(r"MAX_IMAGE_|Insufficient memory")
-_BEFORE = re.compile(r"^.*(TIFF_Error|TIFF_Warning|can't read data:) ?")
-_lock = threading.Lock()
-Source = bytes | str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,25 +213,6 @@ def _take_reports(capture: IO[bytes]) -> list[str]:
     if others:
         os.write(2, ("\n".join(others) + "\n").encode("utf-8", "replace"))
     return [line for line in lines if _DECODERS.search(line)]
-
-
-_EXPORT = Message("cannot be read; save it as 16-bit TIFF pictures with the program of the camera")
-FOREIGN = {
-    **dict.fromkeys((".mraw", ".cih", ".cihx"), Message("a film of a Photron camera {EXPORT}", _EXPORT)),
-    ".cine": Message("a film of a Phantom camera {EXPORT}", _EXPORT),
-    ".seq": Message("a film of StreamPix {EXPORT}", _EXPORT),
-    **dict.fromkeys(
-        (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2"),
-        Message(
-            "a raw picture cannot be read; develop it as 16-bit TIFF, without sharpening and without noise "
-            "reduction"
-        ),
-    ),
-    ".heic": Message("this picture cannot be read; save it as PNG or TIFF"),
-}
-"""Endings of files that are not read, and what to do with them."""
-log = logging.getLogger(__name__)
-LOSSY = (".jpg", ".jpeg")
 
 
 def read_picture(path: Path) -> NDArray[Any]:

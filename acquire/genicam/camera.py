@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import logging
-import math
 import threading
 import time
 from collections.abc import Iterator
@@ -19,13 +18,12 @@ from typing import Any
 from numpy.typing import NDArray
 
 from acquire.addresses import Address
-from acquire.camera import CameraListing
+from acquire.camera.contract import CameraListing, not_one
 from acquire.camera.live import Driver, LiveCamera, Picture
-from acquire.camera.timing import longest_pause_s
 from acquire.clock import DeviceClock
-from acquire.errors import ConfigError, DataError, DeviceError
+from acquire.errors import DataError
 from acquire.events import EventSink
-from acquire.frame import CameraInfo, ClockKind
+from acquire.frame import ClockKind
 from acquire.genicam.device import CameraIdentity, GenicamDevice, Received
 from acquire.genicam.formats import decode, preferred, readable
 from acquire.genicam.library import Aravis, GenicamError, has_aravis, load_aravis
@@ -38,6 +36,8 @@ log = logging.getLogger(__name__)
 
 QUARTZ = 3e-4  # what the rate of a camera's clock may be wrong by
 GIGE_NUMBERS, ALL_NUMBERS = 65535, 2**64  # GigE counts from 1 to 65535 and begins again
+
+_ABOUT = ("id", "vendor", "model", "serial_nbr", "address", "protocol")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +70,6 @@ class FoundCamera:
             self.protocol,
             self.place,
         )
-
-
-_ABOUT = ("id", "vendor", "model", "serial_nbr", "address", "protocol")
 
 
 def find_cameras(library: Aravis) -> list[FoundCamera]:
@@ -108,20 +105,7 @@ def name_of(library: Aravis, target: str, where: str) -> str:
     exact = [one for one in found if target and target == one.id]
     if len(found) == 1 or exact:
         return (exact or found)[0].id
-    here = "; ".join(Message("genicam:{id}  {one}", one.id, one) for one in cameras) or Message("none")
-    if found:
-        raise ConfigError(
-            "{where}: {count} cameras are meant; give one of them. Cameras here: {here}",
-            where,
-            len(found),
-            here,
-        )
-    raise DeviceError(
-        "{where}: no such GigE or USB3 camera answers. Cameras here: {here}. Check cable, power and address "
-        "(docs/machine-vision.md)",
-        where,
-        here,
-    )
+    raise not_one(where, len(found), [Message("genicam:{id}  {one}", one.id, one) for one in cameras])
 
 
 def _is_ip(text: str) -> bool:
@@ -193,51 +177,22 @@ class GenicamDriver:
             self._device.close()
             raise
         self.cycle = GIGE_NUMBERS if self._device.is_gige else ALL_NUMBERS
-        self.info = self._describe()
+        self.info = self.setup.info
         self._clock, self._unstamped = DeviceClock(QUARTZ), False
         self._trigger: SoftwareTrigger | None = None
 
     @property
     def alike(self) -> tuple[CameraIdentity, tuple[str, int, int]]:
         """Who it is, and what its pictures are."""
-        return self._device.identity, self.setup.picture
-
-    def _describe(self) -> CameraInfo:
-        setup, device = self.setup, self._device
-        return CameraInfo(
-            address=self._address,
-            name=f"{device.identity}, {'GigE' if device.is_gige else 'USB3'} Vision",
-            width=setup.width,
-            height=setup.height,
-            bits=setup.bits,
-            live=True,
-            clock="device",
-            fps=setup.fps,
-            exposure_s=setup.exposure_s,
-            pixel_format=setup.format.name,
-            controls=setup.controls,
-            warnings=setup.warnings,
-            settings=setup.settings,
-            formats=setup.formats,
-            white_level=setup.white,
-            pause_s=self._pause_s(),
-        )
-
-    def _pause_s(self) -> float:
-        """Time without a picture that is no fault; a camera that waits for a trigger may rest for hours."""
-        if self._settings.stall_s is not None:
-            return self._settings.stall_s
-        if self._settings.waits_for_trigger:
-            return math.inf
-        return longest_pause_s(self.setup.fps, self.setup.exposure_s)
+        return self._device.identity, (self.info.pixel_format, self.info.width, self.info.height)
 
     def start(self) -> None:
         """Stream, and trigger where this program does."""
         if self._device.streaming:
             return
         self._device.start(self._settings.buffers)
-        if self._settings.fires_triggers and self.setup.fps:
-            self._trigger = SoftwareTrigger(self._device, 1 / self.setup.fps)
+        if self._settings.fires_triggers and self.info.fps:
+            self._trigger = SoftwareTrigger(self._device, 1 / self.info.fps)
 
     def fetch(self, timeout_s: float) -> Picture | None:
         """See ``Driver``."""
@@ -250,13 +205,13 @@ class GenicamDriver:
 
     def _take(self, content: memoryview, padding: int) -> NDArray[Any] | None:
         try:
-            return decode(content, self.setup.format, self.setup.width, self.setup.height, padding)
+            return decode(content, self.setup.format, self.info.width, self.info.height, padding)
         except DataError as error:
             log.debug("%s: %s", self._address, error)
             return None
 
     def _picture(self, received: Received, arrived: float) -> Picture:
-        if not received.trouble and received.size != (self.setup.width, self.setup.height):
+        if not received.trouble and received.size != (self.info.width, self.info.height):
             raise GenicamError("its pictures are {size}x{size2} now", received.size[0], received.size[1])
         trouble = received.trouble or (Message("bytes are missing") if received.taken is None else "")
         if trouble:

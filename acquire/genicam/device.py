@@ -112,15 +112,12 @@ class GenicamDevice:
             self._handler = library.on_signal(self._device, "control-lost", self.lost.set)
             library.call("arv_camera_set_range_check_policy", self._handle, RANGE_CHECK)
             self.is_gige = bool(library.call("arv_camera_is_gv_device", self._handle))
-            self._require_control()
+            if self.is_gige and not self._library.call("arv_gv_device_is_controller", self._device):
+                raise GenicamError("another program holds the camera")
             self.identity = self._identify()
         except BaseException:
             self.close()
             raise
-
-    def _require_control(self) -> None:
-        if self.is_gige and not self._library.call("arv_gv_device_is_controller", self._device):
-            raise GenicamError("another program holds the camera")
 
     def _identify(self) -> CameraIdentity:
         names = ("vendor_name", "model_name", "device_serial_number")

@@ -23,13 +23,16 @@ HOW_TO_INSTALL = "sudo apt install libaravis-0.8-0 (docs/machine-vision.md)"
 _object, _text, _bool, _int, _uint = c.c_void_p, c.c_char_p, c.c_int, c.c_int, c.c_uint
 _int64, _uint64, _double, _size = c.c_int64, c.c_uint64, c.c_double, c.c_size_t
 
+_Bounds = tuple[float, float]
+
+_Handler = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p)
+
 
 class _GError(c.Structure):
     _fields_ = (("domain", c.c_uint32), ("code", c.c_int), ("message", c.c_char_p))
 
 
 _ERROR = c.POINTER(c.POINTER(_GError))
-_Bounds = tuple[float, float]
 
 
 class GenicamError(DeviceFault):
@@ -111,8 +114,6 @@ CALLS: dict[str, tuple[Any, ...]] = {
     "g_error_free": (None, _object),
     "g_type_name_from_instance": (_text, _object),
 }  # fmt: skip
-
-_Handler = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p)
 
 
 class Aravis:

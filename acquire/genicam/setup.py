@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from acquire.bounds import NotAllowed, as_number, same_value
-from acquire.camera.timing import Bounded, exposure_and_gain
+from acquire.bounds import NotAllowed, as_number, in_steps, not_kept, not_possible, same_value
+from acquire.camera.timing import Bounded, drifting, exposure_and_gain, longest_pause_s
 from acquire.errors import ConfigError, DeviceError
-from acquire.frame import CameraSetting
+from acquire.frame import CameraInfo
 from acquire.genicam.device import NO_ADJUSTMENT, GenicamDevice
 from acquire.genicam.formats import FORMATS, MonoFormat, preferred, readable
 from acquire.genicam.library import GenicamError
 from acquire.genicam.settings import NO_TRIGGER, GenicamSettings
-from acquire.settings import keys_of
+from acquire.settings import no_feature
 from acquire.text import Message
 
 # Set to "Off", so that nothing changes by itself during a test.
@@ -43,41 +44,24 @@ class GenicamSetup:
 
     Attributes
     ----------
+    info : CameraInfo
     format : MonoFormat
-    x, y, width, height : int, px
-    fps, exposure_s, gain : float or None
-    bits, white : int, int or None
-    controls : mapping of str to JSON value
-    settings : tuple of CameraSetting
-    formats : tuple of str
-    warnings : tuple of str
+    x, y : int, px
+    gain : float or None
     """
 
+    info: CameraInfo
     format: MonoFormat
     x: int
     y: int
-    width: int
-    height: int
-    fps: float | None
-    exposure_s: float | None
     gain: float | None
-    bits: int
-    white: int | None
-    controls: dict[str, Any]
-    settings: tuple[CameraSetting, ...]
-    formats: tuple[str, ...]
-    warnings: tuple[str, ...]
-
-    @property
-    def picture(self) -> tuple[str, int, int]:
-        """What must be the same after the camera was away."""
-        return self.format.name, self.width, self.height
 
     def kept(self, asked: GenicamSettings) -> GenicamSettings:
         """What to ask of the camera when it comes back: it may have lost its power and all its settings."""
+        info, exposure_s = self.info, self.info.exposure_s
         return replace(
-            asked, format=self.format.name, x=self.x, y=self.y, width=self.width, height=self.height,
-            exposure_us=None if self.exposure_s is None else self.exposure_s * 1e6, gain=self.gain,
+            asked, format=self.format.name, x=self.x, y=self.y, width=info.width, height=info.height,
+            exposure_us=None if exposure_s is None else exposure_s * 1e6, gain=self.gain,
         )  # fmt: skip
 
 
@@ -89,7 +73,7 @@ def set_up(device: GenicamDevice, settings: GenicamSettings, where: str) -> Geni
     device : GenicamDevice
     settings : GenicamSettings
     where : str
-        The address, for messages.
+        The address.
 
     Raises
     ------
@@ -132,18 +116,10 @@ def _put_on_manual(device: GenicamDevice) -> None:
 
 def _set_feature(device: GenicamDevice, feature: str, value: str, where: str) -> None:
     if not device.has(feature):
-        raise ConfigError(
-            "{where}: this camera has no feature {feature}; known settings: {listed}",
-            where,
-            repr(feature),
-            keys_of(GenicamSettings),
-        )
+        raise no_feature(where, repr(feature), GenicamSettings)
     kind = device.kind(feature)
     if kind == "Enumeration" and value not in device.choices(feature):
-        offered = ", ".join(device.choices(feature))
-        raise ConfigError(
-            "{where}: {feature}={value} is not possible; allowed: {offered}", where, feature, value, offered
-        )
+        raise not_possible(where, feature, value, ", ".join(device.choices(feature)))
     try:
         device.set_text(feature, value)
     except GenicamError as error:
@@ -151,9 +127,7 @@ def _set_feature(device: GenicamDevice, feature: str, value: str, where: str) ->
             "{where}: {feature}={value}: the camera refuses it ({error})", where, feature, value, error
         ) from error
     if kind != "Command" and not same_value(got := device.text(feature), value):
-        raise ConfigError(
-            "{where}: {feature}={value}: the camera makes it {got}; ask for that", where, feature, value, got
-        )
+        raise not_kept(where, feature, value, got)
 
 
 def _choose_format(device: GenicamDevice, asked: str | None, where: str) -> MonoFormat:
@@ -167,17 +141,10 @@ def _choose_format(device: GenicamDevice, asked: str | None, where: str) -> Mono
         )
     name = preferred(offered) if asked is None else asked
     if name not in usable:
-        raise ConfigError(
-            "{where}: format={asked} is not possible; the camera offers {listed}",
-            where,
-            asked,
-            ", ".join(usable),
-        )
+        raise not_possible(where, "format", asked, ", ".join(usable))
     device.set_text("PixelFormat", name)
     if (got := device.text("PixelFormat")) != name:
-        raise ConfigError(
-            "{where}: asked for format={name}, the camera gives {got}; ask for that", where, name, got
-        )
+        raise not_kept(where, "format", name, got)
     return FORMATS[name]
 
 
@@ -201,21 +168,10 @@ def _set_region(device: GenicamDevice, settings: GenicamSettings, where: str) ->
 def _set_whole(device: GenicamDevice, feature: str, key: str, value: int, where: str) -> None:
     low, high, step = device.integer_bounds(feature)
     if not low <= value <= high or (value - low) % max(step, 1):
-        steps = Message(" in steps of {step}", step) if step > 1 else ""
-        raise ConfigError(
-            "{where}: {key}={value} is not possible; allowed: {low} to {high}{steps}",
-            where,
-            key,
-            value,
-            low,
-            high,
-            steps,
-        )
+        raise not_possible(where, key, value, in_steps(low, high, step))
     device.set_integer(feature, value)
     if (got := device.integer(feature)) != value:
-        raise ConfigError(
-            "{where}: {key}={value}: the camera makes it {got}; ask for that", where, key, value, got
-        )
+        raise not_kept(where, key, value, got)
 
 
 def _set_trigger(device: GenicamDevice, settings: GenicamSettings, where: str) -> None:
@@ -225,12 +181,7 @@ def _set_trigger(device: GenicamDevice, settings: GenicamSettings, where: str) -
         return
     offered = device.choices("TriggerSource") if device.has("TriggerSource") else []
     if settings.trigger not in offered:
-        raise ConfigError(
-            "{where}: trigger={trigger} is not possible; allowed: {listed}",
-            where,
-            settings.trigger,
-            ", ".join([NO_TRIGGER, *offered]),
-        )
+        raise not_possible(where, "trigger", settings.trigger, ", ".join([NO_TRIGGER, *offered]))
     if settings.fires_triggers and settings.fps is None:
         raise ConfigError(
             "{where}: trigger=Software needs fps=, the rate at which pictures are triggered", where
@@ -238,13 +189,7 @@ def _set_trigger(device: GenicamDevice, settings: GenicamSettings, where: str) -
     device.ask("arv_camera_set_trigger", settings.trigger)
     got = device.text("TriggerMode"), device.text("TriggerSource")
     if got != ("On", settings.trigger):
-        raise ConfigError(
-            "{where}: trigger={trigger}: the camera makes it {got}, {got2}",
-            where,
-            settings.trigger,
-            got[1],
-            got[0],
-        )
+        raise not_kept(where, "trigger", settings.trigger, f"{got[1]}, {got[0]}")
 
 
 def _set_number(device: GenicamDevice, what: str, key: str, value: float, where: str) -> None:
@@ -255,15 +200,11 @@ def _set_number(device: GenicamDevice, what: str, key: str, value: float, where:
     try:
         as_number(value, *device.bounds_of(what))
     except NotAllowed as allowed:
-        raise ConfigError(
-            "{where}: {key}={value:g} is not possible; allowed: {allowed}", where, key, value, allowed
-        ) from None
+        raise not_possible(where, key, f"{value:g}", allowed) from None
     device.ask(f"arv_camera_set_{what}", value)
     got = device.ask(f"arv_camera_get_{what}")
     if abs(got - value) > 0.01 * abs(value):
-        raise ConfigError(
-            "{where}: {key}={value:g}: the camera makes it {got:g}; ask for that", where, key, value, got
-        )
+        raise not_kept(where, key, f"{value:g}", f"{got:g}")
 
 
 def _set_packets(device: GenicamDevice, settings: GenicamSettings, where: str) -> None:
@@ -279,12 +220,7 @@ def _set_packets(device: GenicamDevice, settings: GenicamSettings, where: str) -
     device.ask("arv_camera_gv_set_packet_size", settings.packet_size)
     got = device.ask("arv_camera_gv_get_packet_size")
     if got != settings.packet_size:
-        raise ConfigError(
-            "{where}: packet_size={packet_size}: the camera makes it {got}; ask for that",
-            where,
-            settings.packet_size,
-            got,
-        )
+        raise not_kept(where, "packet_size", settings.packet_size, got)
 
 
 def _in_force(
@@ -295,25 +231,37 @@ def _in_force(
         for what in ("exposure_time", "gain")
     )
     fps = _rate(device, settings)
+    exposure_s = None if exposure_us is None else exposure_us * 1e-6
     bits = _bits(settings, pixel_format, where)
-    return GenicamSetup(
-        format=pixel_format,
-        x=device.integer("OffsetX") if device.has("OffsetX") else 0,
-        y=device.integer("OffsetY") if device.has("OffsetY") else 0,
+    info = CameraInfo(
+        address=where,
+        name=f"{device.identity}, {'GigE' if device.is_gige else 'USB3'} Vision",
         width=device.integer("Width"),
         height=device.integer("Height"),
-        fps=fps,
-        exposure_s=None if exposure_us is None else exposure_us * 1e-6,
-        gain=gain,
         bits=bits,
-        white=_white(device, settings, bits),
+        live=True,
+        clock="device",
+        fps=fps,
+        exposure_s=exposure_s,
+        pixel_format=pixel_format.name,
         controls=dict(_shown(device, settings)),
+        warnings=tuple(_warnings(device, settings, fps)),
         settings=exposure_and_gain(
             _bounded(device, "exposure_time", exposure_us), _bounded(device, "gain", gain), fps
         ),
         formats=tuple(readable(device.choices("PixelFormat"))),
-        warnings=tuple(_warnings(device, settings, fps)),
+        white_level=_white(device, settings, bits),
+        pause_s=_pause_s(settings, fps, exposure_s),
     )
+    x, y = (device.integer(name) if device.has(name) else 0 for name in ("OffsetX", "OffsetY"))
+    return GenicamSetup(info, pixel_format, x, y, gain)
+
+
+def _pause_s(settings: GenicamSettings, fps: float | None, exposure_s: float | None) -> float:
+    """Time without a picture that is no fault; a camera that waits for a trigger may rest for hours."""
+    if settings.stall_s is not None:
+        return settings.stall_s
+    return math.inf if settings.waits_for_trigger else longest_pause_s(fps, exposure_s)
 
 
 def _rate(device: GenicamDevice, settings: GenicamSettings) -> float | None:
@@ -325,11 +273,9 @@ def _rate(device: GenicamDevice, settings: GenicamSettings) -> float | None:
     for feature in RESULTING_RATES:
         if device.has(feature):
             return float(device.text(feature)) or None
-    return float(device.ask("arv_camera_get_frame_rate")) or None if _has_rate(device) else None
-
-
-def _has_rate(device: GenicamDevice) -> bool:
-    return bool(device.ask("arv_camera_is_frame_rate_available"))
+    if not device.ask("arv_camera_is_frame_rate_available"):
+        return None
+    return float(device.ask("arv_camera_get_frame_rate")) or None
 
 
 def _bits(settings: GenicamSettings, pixel_format: MonoFormat, where: str) -> int:
@@ -363,11 +309,8 @@ def _bounded(device: GenicamDevice, what: str, value: float | None) -> Bounded |
 
 
 def _warnings(device: GenicamDevice, settings: GenicamSettings, fps: float | None) -> Iterator[str]:
-    automatic = [name for name in AUTOMATIC if device.has(name) and device.text(name) != "Off"]
-    if automatic:
-        yield Message(
-            "the camera goes on changing by itself: {listed}; grey levels may drift", ", ".join(automatic)
-        )
+    if words := drifting([name for name in AUTOMATIC if device.has(name) and device.text(name) != "Off"]):
+        yield words
     if device.has("Gamma") and not same_value(device.text("Gamma"), "1"):
         yield Message(
             "Gamma is {text}: grey levels are not proportional to light; give Gamma=1", device.text("Gamma")
@@ -384,11 +327,9 @@ def _warnings(device: GenicamDevice, settings: GenicamSettings, fps: float | Non
             if device.has(TEST_PACKET)
             else Message("it cannot try larger ones by itself")
         )
-        yield (
-            Message(
-                "packets of {size} bytes: {larger}; set the MTU of the network card to 9000, then packet_size=8000 "
-                "(docs/machine-vision.md)",
-                size,
-                larger,
-            )
+        yield Message(
+            "packets of {size} bytes: {larger}; set the MTU of the network card to 9000, then packet_size=8000 "
+            "(docs/machine-vision.md)",
+            size,
+            larger,
         )

@@ -40,6 +40,16 @@ _EVERY_S = 1.0
 _PROGRESS = "\0"  # a line of the child
 _said = [0.0]
 
+log = logging.getLogger(__name__)
+_HELD = (errno.EAGAIN, errno.EACCES)
+
+_BOUNDS = ("v110", "v110")  # the format that survives SIGKILL; older ones promise nothing
+
+CACHE_BYTES, METADATA_BYTES = 16 << 10, 256 << 10
+"""Of values of each dataset, and of the structure of a file, that HDF5 keeps in memory: enough to append."""
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
 
 def probe(path: Path, package: str, timeout_s: float | None = None, *, words: Sequence[str] = ()) -> None:
     """Read ``path`` by ``python -P -m package path``, with more ``words``, first.
@@ -102,10 +112,6 @@ def reason(error: Exception) -> str:
     return word(words.partition("'")[0] or (plain or text)[:200])
 
 
-log = logging.getLogger(__name__)
-_HELD = (errno.EAGAIN, errno.EACCES)
-
-
 def open_file(path: Path, mode: str = "r", **options: Any) -> h5py.File:
     """Open an HDF5 file, without a lock where its file system has none; ``options`` as of ``h5py.File``.
 
@@ -143,13 +149,6 @@ def abandon_file(file: h5py.File) -> None:
         log.debug("abandoning a file: %s", error)
 
 
-_BOUNDS = ("v110", "v110")  # the format that survives SIGKILL; older ones promise nothing
-
-
-CACHE_BYTES, METADATA_BYTES = 16 << 10, 256 << 10
-"""Of values of each dataset, and of the structure of a file, that HDF5 keeps in memory: enough to append."""
-
-
 def create_file(path: Path, declare: Callable[[h5py.File], object]) -> h5py.File:
     """Make a file with what ``declare`` puts into it, open to append while others read (SWMR).
 
@@ -181,9 +180,6 @@ def create_file(path: Path, declare: Callable[[h5py.File], object]) -> h5py.File
     file.id.set_mdc_config(cache)
     file.swmr_mode = True
     return file
-
-
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,19 @@ from acquire.clock import Clock
 from acquire.system import forget_pages, to_disk
 from acquire.text import Message
 
+NETWORK = frozenset({"nfs", "nfs4", "cifs", "smb3", "smbfs", "fuse.sshfs", "9p", "afs", "ceph", "davfs"})
+
+SYNC_S, CLOSE_TIMEOUT_S = 1.0, 10.0
+"""Between two times that a file is brought to its disk, and the longest wait for the last one."""
+
+SYNC_BYTES, LOOK_S = 32 << 20, 0.1
+"""So much is brought sooner; time between two looks at it. A second of fast pictures at once holds others up."""
+
+KEPT_BYTES = 8 << 20
+"""Of the end of a file, which is written to again, stay in memory."""
+
+_CANNOT = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP)
+
 
 def free_bytes(path: str | os.PathLike[str]) -> int:
     """Bytes free for this user on the disk that holds ``path``.
@@ -41,9 +54,6 @@ def forecast(path: str | os.PathLike[str], bytes_per_s: float) -> float:
     return free_bytes(path) / bytes_per_s if bytes_per_s > 0 else math.inf
 
 
-NETWORK = frozenset({"nfs", "nfs4", "cifs", "smb3", "smbfs", "fuse.sshfs", "9p", "afs", "ceph", "davfs"})
-
-
 def network_share(
     path: str | os.PathLike[str], mounts: str | os.PathLike[str] = "/proc/mounts"
 ) -> str | None:
@@ -62,18 +72,6 @@ def network_share(
         if (place + "/").startswith(point.rstrip("/") + "/") and len(point) >= len(best):
             best, kind = point, fields[2]
     return kind if kind in NETWORK else None
-
-
-SYNC_S, CLOSE_TIMEOUT_S = 1.0, 10.0
-"""Between two times that a file is brought to its disk, and the longest wait for the last one."""
-
-SYNC_BYTES, LOOK_S = 32 << 20, 0.1
-"""So much is brought sooner; time between two looks at it. A second of fast pictures at once holds others up."""
-
-KEPT_BYTES = 8 << 20
-"""Of the end of a file, which is written to again, stay in memory."""
-
-_CANNOT = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP)
 
 
 def path_of(descriptor: int, path: Path) -> Path:

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 
+NO_UNIT = "none"
+
 
 class GrowingDataset:
     """Appends along the first axis of a dataset that has ``maxshape[0] = None``.
@@ -94,9 +96,6 @@ class RowTable:
             rows = np.stack(held)
             for name, column in self._columns.items():
                 column.append(rows[name])
-
-
-NO_UNIT = "none"
 
 
 def set_attributes(item: Any, *, fixed: bool = True, **attributes: Any) -> None:

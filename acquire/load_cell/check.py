@@ -25,6 +25,10 @@ from acquire.text.quantity import MINUS
 MIN_VALUES = 3  # fewer give no noise
 ROBUST_VALUES = 12  # values from which a few odd ones do not count
 
+LINES_SHOWN = 5
+SLOW_HZ = 5.0
+STUCK = 20  # samples without any change
+
 
 @dataclass(frozen=True, slots=True)
 class LoadStillness:
@@ -94,11 +98,6 @@ def _rise(t: NDArray[np.float64], f: NDArray[np.float64]) -> float:
     away = t - t.mean()
     square = float(away @ away)
     return float(away @ f) / square * float(np.ptp(t)) if square > 0 else 0.0
-
-
-LINES_SHOWN = 5
-SLOW_HZ = 5.0
-STUCK = 20  # samples without any change
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,6 +216,7 @@ def report(listened: ListenResult, info: LoadCellInfo) -> LoadReport:
     flags = Counter(str(flag.name).lower() for sample in samples for flag in sample.flags)
     span = float(times[-1] - times[0]) if len(times) > 1 else 0.0
     greatest = float(np.abs(forces).max()) if forces.size else math.nan
+    newest = dict.fromkeys(sample.raw for sample in reversed(samples) if sample.raw)
     found = LoadReport(
         samples=len(samples),
         good=len(forces),
@@ -234,7 +234,7 @@ def report(listened: ListenResult, info: LoadCellInfo) -> LoadReport:
         moved_N=_moved(good, listened),
         of_capacity=greatest / info.capacity_N if info.capacity_N and forces.size else None,
         flags=tuple(sorted(flags.items())),
-        lines=_last_lines(samples),
+        lines=tuple(newest)[:LINES_SHOWN][::-1],
         remarks=(),
     )
     return dataclasses.replace(found, remarks=tuple(_remarks(found, samples, still.step_N)))
@@ -248,11 +248,6 @@ def _moved(good: Sequence[LoadSample], listened: ListenResult) -> float:
         parts.setdefault(int((sample.t - listened.began) / tenth), []).append(sample.force)
     means = [math.fsum(part) / len(part) for part in parts.values()]
     return max(means) - min(means) if means else math.nan
-
-
-def _last_lines(samples: Sequence[LoadSample]) -> tuple[bytes, ...]:
-    newest = dict.fromkeys(sample.raw for sample in reversed(samples) if sample.raw)
-    return tuple(newest)[:LINES_SHOWN][::-1]
 
 
 def _remarks(found: LoadReport, samples: Sequence[LoadSample], digit_N: float) -> Iterator[Message]:

@@ -17,6 +17,19 @@ from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.opening import Closing
 from acquire.text import Message, word
 
+LOAD_CELLS: Registry[LoadCell] = Registry(
+    Message("load cell"),
+    "phasedic.load_cells",
+    {
+        "": "acquire.serial_line.cell:open_serial",
+        "none": "acquire.load_cell.contract:open_none",
+        "session": "acquire.session.devices:open_session_load",
+    },
+    fallback="acquire.serial_line.cell:open_serial",
+    settings_group="phasedic.load_cell_settings",
+    settings={"": "acquire.serial_line.settings:SerialOptions"},
+)
+
 
 @runtime_checkable
 class LoadCell(Protocol):
@@ -55,20 +68,6 @@ class LoadCell(Protocol):
     def stop(self) -> None: ...
 
     def close(self) -> None: ...
-
-
-LOAD_CELLS: Registry[LoadCell] = Registry(
-    Message("load cell"),
-    "phasedic.load_cells",
-    {
-        "": "acquire.serial_line.cell:open_serial",
-        "none": "acquire.load_cell.contract:open_none",
-        "session": "acquire.session.devices:open_session_load",
-    },
-    fallback="acquire.serial_line.cell:open_serial",
-    settings_group="phasedic.load_cell_settings",
-    settings={"": "acquire.serial_line.settings:SerialOptions"},
-)
 
 
 def open_load_cell(address: str, on_event: EventSink = ignore_event) -> LoadCell:
@@ -125,7 +124,7 @@ def open_none(address: Address, on_event: EventSink) -> NoLoadCell:
     return NoLoadCell()
 
 
-class ZeroedLoadCell:
+class ZeroedLoadCell(Closing):
     """A load cell whose forces count from another force: the zero that was taken before the test.
 
     A tare makes the present load zero whatever was subtracted before.
@@ -149,11 +148,6 @@ class ZeroedLoadCell:
     def __enter__(self) -> Self:
         self._cell.__enter__()
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._cell.__exit__(kind, error, trace)
 
     def __iter__(self) -> Iterator[LoadSample]:
         for sample in self._cell:
@@ -180,16 +174,13 @@ class ZeroedLoadCell:
     def _event(self, event: Event) -> None:
         """Pass an event on; that of a tare with the step of the forces as they are given here."""
         if event.kind is EventKind.TARE and "step_N" in event.data:
-            event = self._tared(event)
+            old = self._zero_N
+            if event.data.get("undo", self._undoing):
+                self._zero_N = self._before.pop() if self._before else old
+            else:
+                self._before.append(old)
+                self._zero_N = 0.0
+            step = event.data["step_N"]
+            shown = None if step is None else step + self._zero_N - old
+            event = dataclasses.replace(event, data={**event.data, "step_N": shown})
         self._on_event(event)
-
-    def _tared(self, event: Event) -> Event:
-        old = self._zero_N
-        if event.data.get("undo", self._undoing):
-            self._zero_N = self._before.pop() if self._before else old
-        else:
-            self._before.append(old)
-            self._zero_N = 0.0
-        step = event.data["step_N"]
-        shown = None if step is None else step + self._zero_N - old
-        return dataclasses.replace(event, data={**event.data, "step_N": shown})

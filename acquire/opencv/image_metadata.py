@@ -15,6 +15,9 @@ from pathlib import Path
 from acquire.errors import DataError
 from acquire.files.picture import read_bytes
 
+_TAKEN = re.compile(rb"\d{4}:\d\d:\d\d \d\d:\d\d:\d\d(?=\0)")
+_HEAD = 1 << 16
+
 
 def read_stamps(path: Path, images: Sequence[Path]) -> list[float]:
     """Times in seconds, one a picture, in the order of the pictures.
@@ -93,10 +96,6 @@ def _check(path: Path, times: list[float], images: Sequence[Path]) -> None:
             raise DataError(
                 "{path}: the times run backwards ({later:g} s after {earlier:g} s)", path, later, earlier
             )
-
-
-_TAKEN = re.compile(rb"\d{4}:\d\d:\d\d \d\d:\d\d:\d\d(?=\0)")
-_HEAD = 1 << 16
 
 
 def taken_times(paths: Sequence[Path]) -> list[float]:

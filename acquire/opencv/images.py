@@ -238,13 +238,11 @@ class ImageFiles(CameraBase):
     def _warnings(self, first: NDArray[Any]) -> Iterator[str]:
         pages, taken = tiff_pages(self._usual), _pages_of(self._usual)
         if len(taken) < len(pages):
-            yield (
-                Message(
-                    "{name}: {count} of {len2} pages are taken, the others are smaller (thumbnails)",
-                    self._usual.name,
-                    len(taken),
-                    len(pages),
-                )
+            yield Message(
+                "{name}: {count} of {len2} pages are taken, the others are smaller (thumbnails)",
+                self._usual.name,
+                len(taken),
+                len(pages),
             )
         if any(path.suffix.lower() in LOSSY for path in self._paths):
             yield Message(
@@ -262,13 +260,11 @@ class ImageFiles(CameraBase):
             )
         for bits in (10, 12, 14):
             if self._settings.bits is None and first.itemsize == 2 and 2**8 <= first.max() < 2**bits:
-                yield (
-                    Message(
-                        "16-bit files whose largest value is {most}: if the camera has {bits} bits say bits={bits}, so "
-                        "that clipped pixels are seen",
-                        first.max(),
-                        bits,
-                    )
+                yield Message(
+                    "16-bit files whose largest value is {most}: if the camera has {bits} bits say bits={bits}, so "
+                    "that clipped pixels are seen",
+                    first.max(),
+                    bits,
                 )
                 return
 

@@ -47,6 +47,18 @@ DOUBTFUL = ("mn", "mg")  # with a capital M: milli- or mega-
 Mode = Literal["listen", "stream", "poll"]
 Parity = Literal["N", "E", "O"]
 
+# Imported when used; each module has a PROTOCOL.
+PROTOCOLS: Mapping[str, str] = {
+    "ascii": "acquire.protocols.ascii",
+    "mt-sics": "acquire.protocols.mt_sics",
+    "aed-standard": "acquire.protocols.aed_standard",
+    "mark10": "acquire.protocols.mark10",
+    "sauter": "acquire.protocols.sauter",
+    "hbm-aed": "acquire.protocols.hbm_aed",
+    "modbus": "acquire.protocols.modbus",
+    "lines": "acquire.protocols.lines",
+}
+
 
 def _name(text: str) -> str:
     """``lb.`` is lb."""
@@ -214,19 +226,6 @@ class Protocol:
     def make_parser(self, options: Options) -> Parser:
         """The parser of an address, from which it takes the settings of the protocol; raises ConfigError."""
         return take_settings(self.settings, options).parser(options.address.text)
-
-
-# Imported when used; each module has a PROTOCOL.
-PROTOCOLS: Mapping[str, str] = {
-    "ascii": "acquire.protocols.ascii",
-    "mt-sics": "acquire.protocols.mt_sics",
-    "aed-standard": "acquire.protocols.aed_standard",
-    "mark10": "acquire.protocols.mark10",
-    "sauter": "acquire.protocols.sauter",
-    "hbm-aed": "acquire.protocols.hbm_aed",
-    "modbus": "acquire.protocols.modbus",
-    "lines": "acquire.protocols.lines",
-}
 
 
 def find_protocol(name: str) -> Protocol:

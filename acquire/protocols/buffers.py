@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Reading
 
+_THOUSANDS = re.compile(r"[-+]?[0-9]{1,3}(?:\.[0-9]{3})+,[0-9]*")
+
 
 class HeldBytes:
     """What has come since the last message.
@@ -161,9 +163,6 @@ class LineParser(Parser):
 def bad(line: Line, flags: LoadFlag = LoadFlag.NONE) -> Reading:
     """A line that gives no value and why: without flags it does not match the grammar."""
     return Reading(math.nan, None, line.data, line.start, flags=flags or LoadFlag.ERROR)
-
-
-_THOUSANDS = re.compile(r"[-+]?[0-9]{1,3}(?:\.[0-9]{3})+,[0-9]*")
 
 
 def number(text: str, decimal_comma: bool = False) -> float:

@@ -4,7 +4,7 @@ Each reading is one query for a span of registers. Frames carry a CRC-16: a dama
 
 What cannot be detected: a wrong register map (type, word order, scale); compare the display.
 
-The register map of a Modbus transmitter: read from TOML, checked, nothing hard-coded.
+The register map is read from TOML and checked; nothing is hard-coded.
 """
 
 from __future__ import annotations
@@ -35,6 +35,11 @@ FLAGS = {
     "net": LoadFlag.NET,
 }
 MAX_REGISTERS = 32  # registers of one query that every known transmitter answers
+
+LIMIT = 256  # longest frame of Modbus RTU
+EXCEPTION_BYTES, ECHO_BYTES = 5, 8
+WRITE_ONE = 6
+VALUELESS = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD | LoadFlag.ERROR
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,12 +189,6 @@ def _one_of(value: Any, allowed: tuple[str, ...], where: str) -> str:
             "{where} = {value} is not possible; allowed: {listed}", where, repr(value), ", ".join(allowed)
         )
     return str(value)
-
-
-LIMIT = 256  # longest frame of Modbus RTU
-EXCEPTION_BYTES, ECHO_BYTES = 5, 8
-WRITE_ONE = 6
-VALUELESS = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD | LoadFlag.ERROR
 
 
 def crc16(data: bytes) -> bytes:

@@ -138,19 +138,15 @@ class ArrivalRate:
     ``DeviceClock`` does with milliseconds. What comes more than 50 ms, or one period, after its time has
     waited somewhere. So have more messages than the device can have made. After a pause it is
     unknown whether the device or the line has paused: messages are late until they have come at their pace for
-    ``settle_s``. Where no pace is known (at first, or of a device that sends when it likes) all but the last
+    ``SETTLE_S``. Where no pace is known (at first, or of a device that sends when it likes) all but the last
     message of a read are late.
-
-    Parameters
-    ----------
-    late_s, settle_s : float, s
     """
 
     RISE, FALL = 0.1, 0.2  # how far the pace known may be wrong, slow and fast
     GROUP_S, GROUPS, KNOWN = 0.25, 31, 2
+    LATE_S, SETTLE_S = 0.05, 0.25
 
-    def __init__(self, late_s: float = 0.05, settle_s: float = 0.25) -> None:
-        self._late_s, self._settle_s = late_s, settle_s
+    def __init__(self) -> None:
         self._periods: deque[float] = deque(maxlen=self.GROUPS)
         self.restart()
 
@@ -160,7 +156,7 @@ class ArrivalRate:
         self._group: tuple[float, int] | None = None  # its beginning, messages in it
         self._due = self._tie = self._last = math.nan
         self._other = self._other_since = math.nan
-        self._credit = self._late_s
+        self._credit = self.LATE_S
 
     @property
     def period(self) -> float:
@@ -185,8 +181,11 @@ class ArrivalRate:
             return [True] * (len(times) - 1) + [False]
         if math.isnan(self._tie):
             self._due, self._tie, self._last = times[0] - period, 0.0, times[-1]
-        delays = self._delays(times, period)
-        limit = max(self._late_s, period)
+        delays = []
+        for t in times:
+            self._due += period
+            delays.append(t - self._due)
+        limit = max(self.LATE_S, period)
         if self._doubtful(delays[-1], times[-1], limit) and not self._keeps_pace(
             delays[-1], times[-1], period
         ):
@@ -205,17 +204,10 @@ class ArrivalRate:
             begun, count = times[-1], 0
         self._group = begun, count
 
-    def _delays(self, times: Sequence[float], period: float) -> list[float]:
-        delays = []
-        for t in times:
-            self._due += period
-            delays.append(t - self._due)
-        return delays
-
     def _doubtful(self, delay: float, now: float, limit: float) -> bool:
         """Whether the last message is late, or one too many; else it may tie the pace anew."""
         elapsed, self._last = now - self._last, now
-        self._credit = min(self._late_s, self._credit + self.FALL * elapsed)
+        self._credit = min(self.LATE_S, self._credit + self.FALL * elapsed)
         fall = max(self._tie - delay, 0.0)
         if delay - self._tie > limit or fall > self._credit:
             return True
@@ -229,9 +221,9 @@ class ArrivalRate:
         if math.isnan(self._other) or self._other - delay > self.FALL * elapsed + period:
             self._other, self._other_since = delay, now
             return False
-        if elapsed < max(self._settle_s, 1.2 * period):
+        if elapsed < max(self.SETTLE_S, 1.2 * period):
             return False
-        self._tie, self._credit = delay, self._late_s
+        self._tie, self._credit = delay, self.LATE_S
         return True
 
 

@@ -22,6 +22,17 @@ from acquire.text import Message
 CONNECT_S = 3.0
 WRITE_S = 0.5
 
+SE, SB, WILL, WONT, DO, DONT, IAC = 240, 250, 251, 252, 253, 254, 255
+BINARY, SGA, COM_PORT = 0, 3, 44
+BAUD, SIZE, PARITY, STOP, CONTROL = 1, 2, 3, 4, 5
+ANSWER = 100  # what the server adds to the number of a command
+PARITIES = {"N": 1, "O": 2, "E": 3}
+STOPS = {1.0: 1, 2.0: 2, 1.5: 3}
+NO_FLOW_CONTROL, DTR_ON, RTS_ON = 1, 8, 11
+MAX_NEGOTIATION = 64  # bytes kept of a negotiation
+
+_OURS, _THEIRS = frozenset({BINARY, SGA, COM_PORT}), frozenset({BINARY, SGA, COM_PORT})
+
 
 class Port(Protocol):
     """Where bytes come from and go to; every method raises one of ``PORT_ERRORS`` when it is gone."""
@@ -135,18 +146,6 @@ class TcpPort:
             self._socket.shutdown(socket.SHUT_RDWR)
         for one in (self._socket, self._woken, self._waker):
             one.close()
-
-
-SE, SB, WILL, WONT, DO, DONT, IAC = 240, 250, 251, 252, 253, 254, 255
-BINARY, SGA, COM_PORT = 0, 3, 44
-BAUD, SIZE, PARITY, STOP, CONTROL = 1, 2, 3, 4, 5
-ANSWER = 100  # what the server adds to the number of a command
-PARITIES = {"N": 1, "O": 2, "E": 3}
-STOPS = {1.0: 1, 2.0: 2, 1.5: 3}
-NO_FLOW_CONTROL, DTR_ON, RTS_ON = 1, 8, 11
-MAX_NEGOTIATION = 64  # bytes kept of a negotiation
-
-_OURS, _THEIRS = frozenset({BINARY, SGA, COM_PORT}), frozenset({BINARY, SGA, COM_PORT})
 
 
 class Telnet:

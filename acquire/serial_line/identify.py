@@ -3,11 +3,10 @@
 Listening sends nothing. ``questions`` lists what asking would send, so that it can be shown first:
 an unknown machine may move.
 
-A pattern for ``protocol=lines``, made from lines that no other protocol understands.
-
-Lines are alike but for their numbers. The number behind a word such as *weight* or *force* is the value: sketches for
-the HX711 (``one reading: 12.4 | average: 12.3``), the plotter of the Arduino (``Force:12.3,Raw:8123``), JSON. Without
-such a word the first number that changes and is no clock may be it, which a person has to confirm.
+From lines that no other protocol understands, a pattern for ``protocol=lines`` is made. They are alike but for their
+numbers. The number behind a word such as *weight* or *force* is the value: sketches for the HX711 (``one reading: 12.4
+| average: 12.3``), the plotter of the Arduino (``Force:12.3,Raw:8123``), JSON. Without such a word the first number
+that changes and is no clock may be it, which a person has to confirm.
 """
 
 from __future__ import annotations
@@ -38,6 +37,28 @@ _VALUE = re.compile(
 _OTHER = re.compile(r"raw|adc|count|time|temp|average|volt|status", re.IGNORECASE)
 _UNIT = re.compile(r'[\s"]*([A-Za-z]+\.?)(?!["\s]*[:=\w])|.*?"unit[s]?"\s*:\s*"([A-Za-z]+\.?)"')
 _MAY_BE_ONE = re.compile(r"[ ,.]*")  # between two numbers: 1,234 or 1 234
+
+SPEEDS = (9600, 115200, 57600, 19200, 2400, 4800, 38400, 1200)
+LISTEN_S = 1.5
+MIN_LINES, MAX_BYTES = 5, 1 << 16
+# What sends unasked, the strictest grammar first; ascii with columns where the plain one leaves a choice.
+UNASKED = (
+    ("mt-sics", ""),
+    ("aed-standard", ""),
+    ("ascii", ""),
+    ("ascii", "millis=1"),
+    ("ascii", "millis=1&column=2"),
+    ("ascii", "decimal=comma"),
+    ("ascii", "decimal=comma&millis=1"),
+    ("hbm-aed", "decimals=0"),
+    ("lines", "preset=rinstrum"),
+)
+ASKED = ("mt-sics", "aed-standard", "mark10", "sauter", "hbm-aed", "modbus")
+ASKED_SETTINGS = {"modbus": "profile=laumas-tlb", "hbm-aed": "decimals=0"}
+SURE = 0.8  # part of the lines that must be readings
+COUNTS = 1000  # whole numbers from here on may be counts of a converter
+
+Opener = Callable[[LineSettings], Port]
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,29 +125,6 @@ def _pattern(skeleton: Sequence[str], column: int) -> str:
 
 def _literal(text: str) -> str:
     return "".join(r"\s*" if part == " " else re.escape(part) for part in re.split("( )", text))
-
-
-SPEEDS = (9600, 115200, 57600, 19200, 2400, 4800, 38400, 1200)
-LISTEN_S = 1.5
-MIN_LINES, MAX_BYTES = 5, 1 << 16
-# What sends unasked, the strictest grammar first; ascii with columns where the plain one leaves a choice.
-UNASKED = (
-    ("mt-sics", ""),
-    ("aed-standard", ""),
-    ("ascii", ""),
-    ("ascii", "millis=1"),
-    ("ascii", "millis=1&column=2"),
-    ("ascii", "decimal=comma"),
-    ("ascii", "decimal=comma&millis=1"),
-    ("hbm-aed", "decimals=0"),
-    ("lines", "preset=rinstrum"),
-)
-ASKED = ("mt-sics", "aed-standard", "mark10", "sauter", "hbm-aed", "modbus")
-ASKED_SETTINGS = {"modbus": "profile=laumas-tlb", "hbm-aed": "decimals=0"}
-SURE = 0.8  # part of the lines that must be readings
-COUNTS = 1000  # whole numbers from here on may be counts of a converter
-
-Opener = Callable[[LineSettings], Port]
 
 
 @dataclass(frozen=True, slots=True)

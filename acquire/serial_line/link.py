@@ -33,6 +33,11 @@ CLOSE_S = 0.5
 Opener = Callable[[LineSettings], Port]
 Report = Callable[[str, str], None]  # level, sentence
 
+MAX_BAD_LINES = 10  # in a row
+LATE_S = 0.05
+SKIP_S = 0.25  # that a port may stay full before what waits in it is skipped
+AGAIN_S = 10.0  # without a flood until it is reported anew
+
 
 def close_port(port: Port | None) -> None:
     """Close a port, and wait for that no longer than half a second."""
@@ -237,12 +242,6 @@ class Link:
             self._again = None
         port, self._port = self._port, None
         close_port(port)
-
-
-MAX_BAD_LINES = 10  # in a row
-LATE_S = 0.05
-SKIP_S = 0.25  # that a port may stay full before what waits in it is skipped
-AGAIN_S = 10.0  # without a flood until it is reported anew
 
 
 class LoadWatch:

@@ -19,6 +19,8 @@ LINE_ERRORS: tuple[type[Exception], ...] = (OSError, *TERMINAL_ERRORS)
 PORT_ERRORS: tuple[type[Exception], ...] = (*LINE_ERRORS, TypeError, ValueError)
 """What a port that is gone raises; TypeError and ValueError come from one closed while it is read."""
 
+_PYSERIALS = {"logging", "ign_set_control", "poll_modem"}  # settings of its URLs that mean nothing here
+
 
 @dataclass(frozen=True, slots=True)
 class PortInfo:
@@ -179,7 +181,6 @@ def _rfc2217(line: LineSettings) -> Port:
 
 
 _NETWORK: Mapping[str, Callable[[LineSettings], Port]] = {"socket": _socket, "rfc2217": _rfc2217}
-_PYSERIALS = {"logging", "ign_set_control", "poll_modem"}  # settings of its URLs that mean nothing here
 
 
 def _host_and_port(url: str) -> tuple[str, int]:

@@ -21,6 +21,10 @@ UNDONE = 16  # tares that can be undone
 
 Seen = tuple[float, float, str]  # time, gross force, why it cannot be used
 
+BEYOND = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD
+
+Report = Callable[[str, str], None]  # level, sentence
+
 
 class TareZero:
     """The offset that is taken off every force, and the samples that decide whether it may move.
@@ -43,7 +47,10 @@ class TareZero:
 
     def why_not(self, now: float) -> str:
         """Why no tare should be made now; "" where the load is still."""
-        window = self._window_s()
+        # Half a second; of a slow device as long as a few samples take.
+        last = [t for t, *_ in itertools.islice(reversed(self._seen), 8)]
+        steps = [later - earlier for later, earlier in itertools.pairwise(last)]
+        window = min(max(WINDOW_S, 3.5 * statistics.median(steps)), MAX_WINDOW_S) if steps else WINDOW_S
         recent = [seen for seen in self._seen if seen[0] >= now - window]
         if not recent:
             return Message("no valid sample in the last {window:.1f} s", window)
@@ -65,12 +72,6 @@ class TareZero:
                 "the load is not still: it moved by {moved:.4g} N in the last {window:.1f} s", moved, window
             )
         return ""
-
-    def _window_s(self) -> float:
-        """Half a second; of a slow device as long as a few samples take."""
-        last = [t for t, *_ in itertools.islice(reversed(self._seen), 8)]
-        steps = [later - earlier for later, earlier in itertools.pairwise(last)]
-        return min(max(WINDOW_S, 3.5 * statistics.median(steps)), MAX_WINDOW_S) if steps else WINDOW_S
 
     def _judge(self, seen: list[Seen]) -> LoadStillness:
         return stillness([t for t, *_ in seen], [gross for _, gross, _ in seen], self.step_N)
@@ -114,11 +115,6 @@ class TareZero:
         return step
 
 
-BEYOND = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD
-
-Report = Callable[[str, str], None]  # level, sentence
-
-
 class Scaling:
     """Makes samples of readings and reports what is wrong with them, once each time it begins.
 
@@ -150,7 +146,12 @@ class Scaling:
         if not math.isnan(force):
             gross, flags = self._gross(force, unit, flags)
             force, flags = self._stepped(gross - self.zero.offset, flags)
-        self._see(t, force, flags)
+        # What a tare may rest on; late readings and lines that are none do not count either way.
+        if flags & BEYOND:
+            self.zero.saw(t, math.nan, Message("in overload"))
+        elif not math.isnan(force) and LoadFlag.STALE not in flags:
+            unfit = Message("unstable, as the device says") if LoadFlag.UNSTABLE in flags else ""
+            self.zero.saw(t, force + self.zero.offset, unfit)
         self._watch(flags, force)
         return LoadSample(t, force, unit, reading.stable, flags, reading.raw, reading.device_ms)
 
@@ -158,7 +159,9 @@ class Scaling:
         factor = self._newtons(unit)
         if factor is None:
             return math.nan, flags | LoadFlag.ERROR
-        self._learn_step(value, factor)
+        # The last digit of the display, from the most digits it has shown.
+        self._decimals = max(self._decimals, len(f"{value:.9g}".partition(".")[2].partition("e")[0]))
+        self.zero.step_N = abs(factor) * 10.0**-self._decimals
         gross = self._settings.sign * (value - self._settings.zero) * factor
         capacity = self._settings.given.capacity
         if capacity is not None and abs(gross) > capacity:
@@ -166,11 +169,6 @@ class Scaling:
             if not self._settings.protocol.flags_overload:
                 return math.nan, flags | (LoadFlag.OVERLOAD if gross > 0 else LoadFlag.UNDERLOAD)
         return gross, flags
-
-    def _learn_step(self, value: float, factor: float) -> None:
-        """The last digit of the display, from the most digits it has shown."""
-        self._decimals = max(self._decimals, len(f"{value:.9g}".partition(".")[2].partition("e")[0]))
-        self.zero.step_N = abs(factor) * 10.0**-self._decimals
 
     def _stepped(self, force: float, flags: LoadFlag) -> tuple[float, LoadFlag]:
         if math.isnan(force):
@@ -180,14 +178,6 @@ class Scaling:
             flags |= LoadFlag.STEP
         self._last_force = force
         return force, flags
-
-    def _see(self, t: float, force: float, flags: LoadFlag) -> None:
-        """What a tare may rest on; late readings and lines that are none do not count either way."""
-        if flags & BEYOND:
-            self.zero.saw(t, math.nan, Message("in overload"))
-        elif not math.isnan(force) and LoadFlag.STALE not in flags:
-            unfit = Message("unstable, as the device says") if LoadFlag.UNSTABLE in flags else ""
-            self.zero.saw(t, force + self.zero.offset, unfit)
 
     def _newtons(self, unit: str) -> float | None:
         """Newtons per unit of the line; None, and reported once, where it is unknown."""

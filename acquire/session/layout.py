@@ -278,17 +278,13 @@ def create(file: h5py.File, about: SessionInfo, checksum: bool) -> None:
         described = {"description": _stored_json(descriptions.get(name.rpartition("/")[2]))}
         new_datasets(group, form.items, described, checksum=checksum)
         if form.title:
-            _add_title(group, form.title)
+            # As a dataset of fixed length and UTF-8: viewers show what is marked as ASCII as bytes.
+            data = np.array(form.title.encode(), h5py.string_dtype("utf-8", len(form.title)))
+            set_attributes(group.create_dataset("title", data=data), units=NO_UNIT)
 
 
 def _stored_json(value: Any) -> np.bytes_:
     return np.bytes_(to_json(value))
-
-
-def _add_title(group: h5py.Group, words: str) -> None:
-    """As a dataset of fixed length and UTF-8: viewers show what is marked as ASCII as bytes."""
-    data = np.array(words.encode(), h5py.string_dtype("utf-8", len(words)))
-    set_attributes(group.create_dataset("title", data=data), units=NO_UNIT)
 
 
 def event_rows(event: Event, start: float) -> NDArray[np.bytes_]:

@@ -16,30 +16,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire import hdf5
 from acquire.clock import ClockPair
 from acquire.errors import DataError, PhasedicError
 from acquire.events import Event
 from acquire.frame import Burst, CameraInfo, Frame, frozen
-from acquire.hdf5 import (
-    DAMAGE,
-    Declared,
-    PaddedFile,
-    PictureReader,
-    as_text,
-    check_format,
-    check_links,
-    check_size,
-    open_dataset,
-    open_datasets,
-    open_file,
-    open_group,
-    probe,
-    read_attributes,
-    read_object,
-    read_scalar,
-    read_superblock,
-    still_reading,
-)
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.opening import Closing
 from acquire.record_mode import RecordMode
@@ -52,6 +33,9 @@ UNFINISHED = Message(
     "was not closed by its writer (killed, or still recording); everything complete in it is read. "
     "'phasedic recover' makes a clean copy"
 )
+
+ADVICE = Message("; the file is damaged: 'phasedic recover' saves what can be read")
+NOTHING = Message("; the file is damaged, and nothing of it can be saved")
 
 
 class SessionPart(Closing):
@@ -84,7 +68,7 @@ class SessionPart(Closing):
         self._follows = self.recovered == UNFINISHED
         try:
             self._read()
-        except DAMAGE as error:
+        except hdf5.DAMAGE as error:
             self.file.close()
             what = Message("its description cannot be read")
             raise damaged(self.path, what, error, self._advice or NOTHING) from error
@@ -93,18 +77,18 @@ class SessionPart(Closing):
             raise DataError(error.text) from error
 
     def _read(self) -> None:
-        check_format(self.path, self.file, layout.ROOT, layout.FORMAT, layout.FORMAT_VERSION)
-        root = read_attributes(self.file, layout.ROOT)
-        check_links(self.file)
-        entry = self.entry = open_group(self.file, "entry")
+        hdf5.check_format(self.path, self.file, layout.ROOT, layout.FORMAT, layout.FORMAT_VERSION)
+        root = hdf5.read_attributes(self.file, layout.ROOT)
+        hdf5.check_links(self.file)
+        entry = self.entry = hdf5.open_group(self.file, "entry")
         held = _values(entry, layout.ENTRY)
         self.config = stored.config_from(held["config"], Message("{path}: config", self.path))
         self.metadata, self.versions = (
-            read_object(held[name], about(self.path, name)) for name in ("metadata", "versions")
+            hdf5.read_object(held[name], about(self.path, name)) for name in ("metadata", "versions")
         )
-        instrument = open_group(entry, "instrument")
+        instrument = hdf5.open_group(entry, "instrument")
         camera, cell = (
-            _values(open_group(instrument, name), items)["description"]
+            _values(hdf5.open_group(instrument, name), items)["description"]
             for name, items in (("camera", layout.CAMERA), ("load_cell", layout.LOAD_CELL))
         )
         self.camera: CameraInfo = stored.camera_from(camera, Message("{path}: the camera", self.path))
@@ -112,11 +96,11 @@ class SessionPart(Closing):
             cell, Message("{path}: the load cell", self.path)
         )
         self._form = layout.groups(self.camera)
-        self.mode = _mode(read_attributes(entry, layout.OF_ENTRY))
-        set_id = as_text(root["set_id"])
+        self.mode = _mode(hdf5.read_attributes(entry, layout.OF_ENTRY))
+        set_id = hdf5.as_text(root["set_id"])
         self.set_id, self.part = "" if set_id == layout.NO_SET else set_id, int(root["part"])
-        self.start = ClockPair.from_iso(float(held["start_monotonic_s"]), as_text(held["start_time"]))
-        self._groups = {name: open_group(entry, name) for name in ("frames", "bursts", "load", "clock")}
+        self.start = ClockPair.from_iso(float(held["start_monotonic_s"]), hdf5.as_text(held["start_time"]))
+        self._groups = {name: hdf5.open_group(entry, name) for name in ("frames", "bursts", "load", "clock")}
         self.refresh()
 
     def refresh(self) -> None:
@@ -138,7 +122,7 @@ class SessionPart(Closing):
             for name in ("events", "ledger"):
                 self.entry[name].id.refresh()
         self._images, self._sums, self._clipped, lines = (
-            open_dataset(self._groups[group], name, self._form[group].items[name])
+            hdf5.open_dataset(self._groups[group], name, self._form[group].items[name])
             for group, name in (
                 ("frames", "image"),
                 ("bursts", "sum"),
@@ -146,9 +130,9 @@ class SessionPart(Closing):
                 ("load", "lines"),
             )
         )
-        self._pictures = PictureReader(self._images)
+        self._pictures = hdf5.PictureReader(self._images)
         self._loads = LoadTable(self._groups["load"], lines, whole=self._whole, closed=not self._follows)
-        self._events, self._frame_counts = open_datasets(self.entry, layout.NOTES).values()
+        self._events, self._frame_counts = hdf5.open_datasets(self.entry, layout.NOTES).values()
 
     def _check_order(self) -> None:
         """Frames are found by their sequence numbers."""
@@ -166,7 +150,7 @@ class SessionPart(Closing):
     def _troubles_of_the_load(self) -> tuple[str, ...]:
         try:
             return self._loads.troubles()
-        except (*DAMAGE, DataError):
+        except (*hdf5.DAMAGE, DataError):
             return ()  # load_samples() raises
 
     def __len__(self) -> int:
@@ -255,7 +239,7 @@ class SessionPart(Closing):
         with _reading(self.path, Message("the index of the pictures cannot be read"), self._advice):
             for pictures in (self._images, self._sums, self._clipped):
                 pictures.id.get_num_chunks()
-                still_reading()
+                hdf5.still_reading()
 
     def close(self) -> None:
         """Close the file; idempotent."""
@@ -272,12 +256,8 @@ class _reading:
         pass
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, DAMAGE):
+        if isinstance(error, hdf5.DAMAGE):
             raise damaged(self._path, self._what, error, self._advice) from error
-
-
-ADVICE = Message("; the file is damaged: 'phasedic recover' saves what can be read")
-NOTHING = Message("; the file is damaged, and nothing of it can be saved")
 
 
 def damaged(path: Path, what: str, error: BaseException, advice: str = ADVICE) -> DataError:
@@ -287,30 +267,32 @@ def damaged(path: Path, what: str, error: BaseException, advice: str = ADVICE) -
 
 
 def _open_file(path: Path, probed: bool, salvage: bool) -> tuple[h5py.File, str | None]:
-    block = read_superblock(path)
+    block = hdf5.read_superblock(path)
     there = path.stat().st_size
     is_cut = not block.unfinished and there < block.size
     if is_cut and not salvage:
         try:
-            check_size(path, block)
+            hdf5.check_size(path, block)
         except DataError as error:
             raise DataError("{error}, or save what is there with 'phasedic recover'", error) from None
     if (block.unfinished or is_cut) and not probed:
-        probe(path, "acquire.session", words=["salvage"] if salvage else [])
+        hdf5.probe(path, "acquire.session", words=["salvage"] if salvage else [])
     try:
         if is_cut:
-            return h5py.File(PaddedFile(path, block.size), "r"), Message(
+            return h5py.File(hdf5.PaddedFile(path, block.size), "r"), Message(
                 "is truncated: {there} of {size} bytes are there", there, block.size
             )
-        return open_file(path, swmr=block.unfinished), UNFINISHED if block.unfinished else None
+        return hdf5.open_file(path, swmr=block.unfinished), UNFINISHED if block.unfinished else None
     except (OSError, RuntimeError) as error:
         raise damaged(path, Message("it cannot be opened"), error, NOTHING if salvage else ADVICE) from error
 
 
-def _values(group: h5py.Group, items: Mapping[str, Declared]) -> dict[str, Any]:
-    return {name: read_scalar(item, items[name]) for name, item in open_datasets(group, items).items()}
+def _values(group: h5py.Group, items: Mapping[str, hdf5.Declared]) -> dict[str, Any]:
+    return {
+        name: hdf5.read_scalar(item, items[name]) for name, item in hdf5.open_datasets(group, items).items()
+    }
 
 
 def _mode(attributes: Mapping[str, Any]) -> RecordMode:
     x, y, width, height = (int(value) for value in attributes["crop"])
-    return RecordMode.parse(as_text(attributes["record"]), (x, y, width, height) if width else None)
+    return RecordMode.parse(hdf5.as_text(attributes["record"]), (x, y, width, height) if width else None)

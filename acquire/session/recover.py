@@ -121,7 +121,10 @@ def _copy(part: SessionPart, writer: SessionWriter) -> Recovered:
     if frame_counts is not None:
         writer.write_ledger(frame_counts)
     done = Recovered(writer.path, frames, bursts, samples, len(events), tuple(unreadable))
-    writer.write_event(_note(part, done))
+    text = f"copied from {part.path.name}: {done.line()}"
+    level: Level = "warning" if done.unreadable else "info"
+    data = {"unreadable": list(done.unreadable[:20]), "frames": done.frames}
+    writer.write_event(Event(ClockPair.now().monotonic, EventKind.RECORDER, "recover", text, level, data))
     return done
 
 
@@ -146,10 +149,3 @@ def _try(read: Callable[[], Item], unreadable: list[str]) -> Item | None:
     except DataError as error:
         unreadable.append(error.text)
         return None
-
-
-def _note(part: SessionPart, done: Recovered) -> Event:
-    text = f"copied from {part.path.name}: {done.line()}"
-    level: Level = "warning" if done.unreadable else "info"
-    data = {"unreadable": list(done.unreadable[:20]), "frames": done.frames}
-    return Event(ClockPair.now().monotonic, EventKind.RECORDER, "recover", text, level, data)

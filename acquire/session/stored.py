@@ -11,18 +11,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire import hdf5
 from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import CameraInfo
-from acquire.hdf5 import (
-    DAMAGE,
-    Declared,
-    JsonField,
-    check_object,
-    open_datasets,
-    read_object,
-    stored_rows,
-)
 from acquire.load_sample import LoadCellInfo
 from acquire.session import layout
 from acquire.text import Message, about, word
@@ -109,9 +101,9 @@ def load_from(text: Any, where: str) -> LoadCellInfo | None:
     return LoadCellInfo(**_described(text, layout.LOAD_FIELDS, where))
 
 
-def _described(text: Any, form: Mapping[str, JsonField], where: str) -> dict[str, Any]:
-    values = read_object(text, where)
-    check_object(values, form, where)
+def _described(text: Any, form: Mapping[str, hdf5.JsonField], where: str) -> dict[str, Any]:
+    values = hdf5.read_object(text, where)
+    hdf5.check_object(values, form, where)
     return {name: values[name] for name in form if name in values} | {
         "warnings": tuple(map(str, values["warnings"]))
     }
@@ -151,13 +143,13 @@ def read_column(
     starts = np.arange(first - first % step, n, step)
     try:
         values = np.asarray(item[first:n])
-    except DAMAGE:
+    except hdf5.DAMAGE:
         if whole:
             raise
         values = np.full(max(n - first, 0), missing, item.dtype)
         for start in starts.tolist():
             low, high = max(start, first), min(start + step, n)
-            with contextlib.suppress(*DAMAGE):
+            with contextlib.suppress(*hdf5.DAMAGE):
                 values[low - first : high - first] = item[low:high]
     if not whole and len(values) > 1 and item.name.endswith("_s"):
         written = np.logical_or.reduceat(values != 0, np.maximum(starts - first, 0))
@@ -167,8 +159,8 @@ def read_column(
 
 def _stored_rows(item: h5py.Dataset, whole: bool) -> int:
     try:
-        return stored_rows(item)
-    except DAMAGE:
+        return hdf5.stored_rows(item)
+    except hdf5.DAMAGE:
         if whole:
             raise
         return int(item.shape[0])
@@ -193,7 +185,7 @@ def same_length(group: h5py.Group, items: Sequence[h5py.Dataset], *, whole: bool
 def usable(
     group: h5py.Group,
     table: Mapping[str, NDArray[Any]],
-    columns: Mapping[str, Declared],
+    columns: Mapping[str, hdf5.Declared],
     first: int = 0,
     *,
     whole: bool,
@@ -214,7 +206,7 @@ def usable(
 
 def read_rows(
     group: h5py.Group,
-    columns: Mapping[str, Declared],
+    columns: Mapping[str, hdf5.Declared],
     pictures: Sequence[h5py.Dataset] = (),
     *,
     whole: bool,
@@ -234,7 +226,7 @@ def read_rows(
     DataError
         Columns are missing or of another kind; where ``whole``, also of another length or out of range.
     """
-    held = open_datasets(group, columns)
+    held = hdf5.open_datasets(group, columns)
     n = same_length(group, [*held.values(), *pictures], whole=whole)
     table = {name: read_column(item, n, columns[name].missing, whole=whole) for name, item in held.items()}
     for name in columns.keys() - held.keys():
@@ -249,7 +241,7 @@ def read_rows(
     return Rows(kept, places, odd.words())
 
 
-def _beyond(where: str, table: Any, outside: Any, columns: Mapping[str, Declared], first: int) -> str:
+def _beyond(where: str, table: Any, outside: Any, columns: Mapping[str, hdf5.Declared], first: int) -> str:
     name = next(name for name, rows in outside.items() if rows.any())
     row = int(np.argmax(outside[name]))
     low, high = columns[name].low, columns[name].high
@@ -304,13 +296,13 @@ def events_from(rows: NDArray[np.bytes_], where: str, *, whole: bool) -> list[Ev
 
 
 def _event_from(text: bytes, where: str) -> Event | None:
-    values = read_object(text, where)
-    check_object(values, layout.EVENT_FIELDS, where)
+    values = hdf5.read_object(text, where)
+    hdf5.check_object(values, layout.EVENT_FIELDS, where)
     if values["kind"] not in {*EventKind}:
         return None
     kind = EventKind(values["kind"])
     if kind in _NAMES_A_BURST:
-        check_object(values["data"], layout.BURST_FIELDS, where)
+        hdf5.check_object(values["data"], layout.BURST_FIELDS, where)
     return Event(
         values["monotonic_s"], kind, values["source"], taken(values), values["level"], values["data"]
     )
@@ -318,11 +310,11 @@ def _event_from(text: bytes, where: str) -> Event | None:
 
 def config_from(text: Any, where: str) -> dict[str, Any]:
     """The configuration: sections of keys."""
-    config = read_object(text, where)
-    check_object(config, dict.fromkeys(config, JsonField(dict)), where)
+    config = hdf5.read_object(text, where)
+    hdf5.check_object(config, dict.fromkeys(config, hdf5.JsonField(dict)), where)
     return config
 
 
 def ledger_from(text: bytes, where: str) -> dict[str, Any] | None:
     """The final counts; None where they were not written."""
-    return read_object(text, where) if text else None
+    return hdf5.read_object(text, where) if text else None

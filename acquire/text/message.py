@@ -31,6 +31,9 @@ _HARMFUL = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u00ad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ud800-\udfff]"
 )
 
+# A device or file by its address at the beginning of a sentence, with its settings; a path goes on after them.
+_ADDRESS = re.compile(r"^([^\s?]+)\?[A-Za-z_]\w*=[^\s/]*(?=: |$)")
+
 
 def filled(template: str, values: Mapping[str, Any], shown: Callable[[Any, str], str]) -> str:
     """The template with each field replaced by what ``shown`` makes of its value and format."""
@@ -214,10 +217,6 @@ def changed(text: object, change: Callable[[str], str]) -> str:
         for key, one in text.values.items()
     }
     return Message(text.template, **values)
-
-
-# A device or file by its address at the beginning of a sentence, with its settings; a path goes on after them.
-_ADDRESS = re.compile(r"^([^\s?]+)\?[A-Za-z_]\w*=[^\s/]*(?=: |$)")
 
 
 def brief(text: object) -> str:

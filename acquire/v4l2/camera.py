@@ -9,17 +9,17 @@ from __future__ import annotations
 
 import errno
 import logging
-from dataclasses import dataclass
 from typing import Any
 
 from numpy.typing import NDArray
 
 from acquire.addresses import Address
+from acquire.bounds import not_kept, not_possible
 from acquire.camera.live import DeviceFault, Driver, LiveCamera, Picture
-from acquire.camera.timing import StampOf, longest_pause_s
+from acquire.camera.timing import StampOf, drifting, longest_pause_s
 from acquire.errors import ConfigError, DataError, DeviceError
 from acquire.events import EventSink
-from acquire.frame import CameraInfo, CameraSetting
+from acquire.frame import CameraInfo
 from acquire.settings import read_settings
 from acquire.text import Message
 from acquire.v4l2 import api
@@ -33,49 +33,23 @@ from acquire.v4l2.controls import (
     still_automatic,
 )
 from acquire.v4l2.device import Identity, Mode, NotACamera, Stamp, V4L2Device
-from acquire.v4l2.faults import cameras_here, fault_in_words, find_again, identities, why_not_open
-from acquire.v4l2.formats import FORMATS, PixelFormat, decode, picture_size, preferred, warning_of
+from acquire.v4l2.formats import FORMATS, decode, picture_size, preferred, warning_of
+from acquire.v4l2.listing import cameras_here, fault_in_words, find_again, identities, why_not_open
 
 log = logging.getLogger(__name__)
 
 EMPTY_WAKES = 50  # wake-ups without a picture, after which the device counts as dead
 
 
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """What is in force.
-
-    Attributes
-    ----------
-    mode : Mode
-    format : PixelFormat
-    controls : mapping of str to JSON value
-    exposure_s : float or None, s
-    settings : tuple of CameraSetting
-    formats : tuple of str
-    rates : tuple of float, 1/s
-    warnings : tuple of str
-    """
-
-    mode: Mode
-    format: PixelFormat
-    controls: dict[str, Any]
-    exposure_s: float | None
-    settings: tuple[CameraSetting, ...]
-    formats: tuple[str, ...]
-    rates: tuple[float, ...]
-    warnings: tuple[str, ...]
-
-
-def set_up(device: V4L2Device, settings: V4L2Settings, where: str) -> Setup:
-    """Set the camera up.
+def set_up(device: V4L2Device, settings: V4L2Settings, where: str) -> CameraInfo:
+    """Set the camera up; what is in force then.
 
     Parameters
     ----------
     device : V4L2Device
     settings : V4L2Settings
     where : str
-        The address, for messages.
+        The address.
 
     Raises
     ------
@@ -93,7 +67,7 @@ def set_up(device: V4L2Device, settings: V4L2Settings, where: str) -> Setup:
     controls = apply_controls(device, settings, where)
     if settings.fps is not None:
         _set_fps(device, fourcc, settings.fps, where)
-    return _in_force(device, settings, controls)
+    return _in_force(device, settings, controls, where)
 
 
 def _choose_input(device: V4L2Device, index: int, where: str) -> None:
@@ -121,9 +95,7 @@ def _choose_format(device: V4L2Device, asked: str | None, where: str) -> str:
             )
         return best
     if asked not in usable:
-        raise ConfigError(
-            "{where}: format={asked} is not possible; the camera offers {list}", where, asked, _list(usable)
-        )
+        raise not_possible(where, "format", asked, _list(usable))
     return asked
 
 
@@ -144,12 +116,7 @@ def _set_format(device: V4L2Device, fourcc: str, settings: V4L2Settings, where: 
             api.FIELDS_APART[got.field],
         )
     if got.fourcc != fourcc:
-        raise ConfigError(
-            "{where}: asked for format={fourcc}, the driver gives {fourcc2}; ask for that",
-            where,
-            fourcc,
-            got.fourcc,
-        )
+        raise not_kept(where, "format", fourcc, got.fourcc)
     asked = (settings.width or got.width, settings.height or got.height)
     if (got.width, got.height) != asked:
         sizes = _list([str(size) for size in device.sizes(fourcc)])
@@ -185,17 +152,15 @@ def _set_fps(device: V4L2Device, fourcc: str, fps: float, where: str) -> None:
         )
 
 
-def _in_force(device: V4L2Device, settings: V4L2Settings, controls: dict[int, Control]) -> Setup:
+def _in_force(
+    device: V4L2Device, settings: V4L2Settings, controls: dict[int, Control], address: str
+) -> CameraInfo:
     mode = device.mode()
     pixel_format = FORMATS[mode.fourcc]
-    automatic = still_automatic(controls)
-    warnings = [warning_of(pixel_format, full_range=mode.full_range, plane=settings.plane)]
-    if automatic:
-        warnings.append(
-            Message(
-                "the camera goes on changing by itself: {listed}; grey levels may drift", ", ".join(automatic)
-            )
-        )
+    warnings = [
+        warning_of(pixel_format, full_range=mode.full_range, plane=settings.plane),
+        drifting(still_automatic(controls)),
+    ]
     if mode.field in api.FIELDS_WOVEN:
         warnings.append(
             Message(
@@ -203,15 +168,26 @@ def _in_force(device: V4L2Device, settings: V4L2Settings, controls: dict[int, Co
                 "progressive input (input=) or mode of the source"
             )
         )
-    return Setup(
-        mode=mode,
-        format=pixel_format,
+    width, height = picture_size(mode.width, mode.height, pixel_format, settings.plane)
+    exposed_s = exposure_s(controls)
+    return CameraInfo(
+        address=address,
+        name=str(device.identity),
+        width=width,
+        height=height,
+        bits=pixel_format.bits,
+        live=True,
+        clock="device",
+        fps=mode.fps,
+        exposure_s=exposed_s,
+        pixel_format=mode.fourcc,
         controls={control.name: control.shown() for control in controls.values()},
-        exposure_s=exposure_s(controls),
+        warnings=tuple(text for text in warnings if text),
         settings=changeable(controls, mode.fps),
         formats=tuple(offer.fourcc for offer in device.formats() if offer.fourcc in FORMATS),
         rates=tuple(device.rates(mode.fourcc, mode.width, mode.height)),
-        warnings=tuple(text for text in warnings if text),
+        white_level=settings.white,
+        pause_s=settings.stall_s or longest_pause_s(mode.fps, exposed_s),
     )
 
 
@@ -245,39 +221,11 @@ class V4L2Driver:
         self._device, self._running, self._wakes = V4L2Device(path, kernel), False, 0
         self.identity = self._device.identity
         try:
-            self._setup = set_up(self._device, settings, address)
+            self.info = set_up(self._device, settings, address)
+            self.alike: Mode = self._device.mode()  # who it is decides where it is looked for
         except BaseException:
             self._device.close()
             raise
-        self.info = self._describe(address)
-
-    @property
-    def alike(self) -> Mode:
-        """What its pictures are; who it is decides where it is looked for."""
-        return self._setup.mode
-
-    def _describe(self, address: str) -> CameraInfo:
-        setup, mode, settings = self._setup, self._setup.mode, self._settings
-        width, height = picture_size(mode.width, mode.height, setup.format, settings.plane)
-        return CameraInfo(
-            address=address,
-            name=str(self.identity),
-            width=width,
-            height=height,
-            bits=setup.format.bits,
-            live=True,
-            clock="device",
-            fps=mode.fps,
-            exposure_s=setup.exposure_s,
-            pixel_format=mode.fourcc,
-            controls=setup.controls,
-            warnings=setup.warnings,
-            settings=setup.settings,
-            formats=setup.formats,
-            rates=setup.rates,
-            white_level=settings.white,
-            pause_s=settings.stall_s or longest_pause_s(mode.fps, setup.exposure_s),
-        )
 
     def start(self) -> None:
         """Stream; raises DeviceError."""
@@ -313,10 +261,10 @@ class V4L2Driver:
         return Picture(image, stamp.time, stamp.sequence, trouble, "device", stamp_of(stamp))
 
     def _take(self, content: memoryview) -> NDArray[Any] | None:
-        mode, kind = self._setup.mode, self._setup.format
+        mode = self.alike
         try:
             size = mode.width, mode.height, mode.bytes_per_line
-            return decode(content, kind, *size, self._settings.plane)
+            return decode(content, FORMATS[mode.fourcc], *size, self._settings.plane)
         except DataError as error:
             log.debug("%s: %s", self.name, error)
             return None

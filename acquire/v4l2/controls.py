@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from acquire.bounds import NotAllowed
+from acquire.bounds import NotAllowed, in_steps
 from acquire.errors import ConfigError
 from acquire.frame import CameraSetting
 from acquire.settings import FLAG, choice, keys_of, number, others, setting, whole
@@ -124,8 +124,7 @@ class Control:
         """What it may be set to, in words."""
         if self.menu:
             return ", ".join(Message("{value} ({words})", value, words) for value, words in self.menu.items())
-        step = Message(" in steps of {step}", self.step) if self.step > 1 else ""
-        return Message("{minimum} to {maximum}{step}", self.minimum, self.maximum, step)
+        return in_steps(self.minimum, self.maximum, self.step)
 
     def shown(self) -> int | str:
         """The value as it is stored: the words of a menu, else the number."""

@@ -33,6 +33,14 @@ JPEG_WARNING = Message(
     "biased by them; ask for a raw format if the camera has one"
 )
 
+_ORDERS = ("BGGR", "GBRG", "GRBG", "RGGB")
+_BAYER = {
+    8: ("BA81", "GBRG", "GRBG", "RGGB"),
+    10: ("BG10", "GB10", "BA10", "RG10"),
+    12: ("BG12", "GB12", "BA12", "RG12"),
+    16: ("BYR2", "GB16", "GR16", "RG16"),
+}
+
 
 @dataclass(frozen=True, slots=True)
 class PixelFormat:
@@ -63,14 +71,6 @@ class PixelFormat:
             self.kind
         ]
 
-
-_ORDERS = ("BGGR", "GBRG", "GRBG", "RGGB")
-_BAYER = {
-    8: ("BA81", "GBRG", "GRBG", "RGGB"),
-    10: ("BG10", "GB10", "BA10", "RG10"),
-    12: ("BG12", "GB12", "BA12", "RG12"),
-    16: ("BYR2", "GB16", "GR16", "RG16"),
-}
 
 # In the order in which they are chosen when none is asked for; JPEG never is.
 FORMATS: dict[str, PixelFormat] = {

@@ -1,6 +1,6 @@
 """A figure of a test: a number with the interval it lies in, or the reason why it cannot be had; and the noise floor.
 
-The noise floor of a finished test: how many instants at its start are still, and how ZOIs scatter in them.
+The noise floor is found in the instants at the start of a test that are still: how ZOIs scatter in them.
 """
 
 from __future__ import annotations

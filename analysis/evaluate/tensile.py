@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from acquire.text import Message, joined
+from analysis.evaluate import strengths
 from analysis.evaluate.curve import Curve, Floats, Loading, first_crossing, noise, reading
 from analysis.evaluate.elastic import (
     FILM,
@@ -33,14 +34,6 @@ from analysis.evaluate.figure import Figure
 from analysis.evaluate.flow import anisotropy, hardening
 from analysis.evaluate.programme import KindOfTest
 from analysis.evaluate.seen import Unseen, confirmed, unseen, without_stopped
-from analysis.evaluate.strengths import (
-    Yield,
-    proof_strength,
-    strain_at_break,
-    strain_at_top,
-    tensile_strength,
-    yield_point,
-)
 from analysis.evaluate.tensile_figures import Band, Span, Standard, StrainZero, TensileFigures, TensileOptions
 
 _PARTS, _IN_PART = 10, 5  # of a strain rate held against a standard, and the points that each needs
@@ -183,7 +176,7 @@ def _of_film(figures: TensileFigures, limit: float | None) -> TensileFigures:
 
 
 def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:
-    loading, strength = Loading.of(curve), tensile_strength(curve)
+    loading, strength = Loading.of(curve), strengths.tensile_strength(curve)
     if loading.n < MIN_POINTS or loading.stress[loading.top] <= 0:
         words = Message(
             "only {n} measurements have strain and a tensile force, {MIN_POINTS} are needed: are sign (--load-sign) "
@@ -205,7 +198,7 @@ def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:
 @dataclass(frozen=True, slots=True)
 class _Elastic:
     line: FittedLine
-    flow: Yield
+    flow: strengths.Yield
     zero: StrainZero
 
 
@@ -228,8 +221,8 @@ def _elastic(loading: Loading, options: TensileOptions) -> _Elastic | str:
                 MIN_POINTS,
             )
         zero = _zero(loading, options, line)
-        found = _Elastic(line, yield_point(loading, line), zero)
-        known = [f for f in (found.flow.upper, proof_strength(loading, line, 0.002)) if f.known]
+        found = _Elastic(line, strengths.yield_point(loading, line), zero)
+        known = [f for f in (found.flow.upper, strengths.proof_strength(loading, line, 0.002)) if f.known]
         limit = known[0].value if known else float(loading.stress[loading.top])
         of = Message("the yield strength") if known else Message("the highest stress")
     return found or Message("no points")
@@ -275,8 +268,8 @@ def _with_line(
     loading: Loading, options: TensileOptions, elastic: _Elastic, strength: Figure
 ) -> TensileFigures:
     line, flow, zero = elastic.line, elastic.flow, elastic.zero.strain
-    rp01, rp02, rp1 = (proof_strength(loading, line, offset) for offset in (0.001, 0.002, 0.01))
-    agt, at = (_from_zero(f(loading), zero) for f in (strain_at_top, strain_at_break))
+    rp01, rp02, rp1 = (strengths.proof_strength(loading, line, offset) for offset in (0.001, 0.002, 0.01))
+    agt, at = (_from_zero(f(loading), zero) for f in (strengths.strain_at_top, strengths.strain_at_break))
     ends = [float(loading.stress[k]) for k in (loading.top, -1)]
     region = replace(loading, strain=loading.elastic, noise_strain=noise(loading.elastic))
     slope = line_through(region, line.first, line.last) or line
@@ -347,8 +340,8 @@ def _without_line(loading: Loading, options: TensileOptions, why: str) -> Tensil
     how = Message("as measured") if options.zero != "preload" else Message("the first value")
     return replace(
         _nothing(Message("no elastic line: {why}", why), options),
-        Agt=_from_zero(strain_at_top(loading), zero),
-        At=_from_zero(strain_at_break(loading), zero),
+        Agt=_from_zero(strengths.strain_at_top(loading), zero),
+        At=_from_zero(strengths.strain_at_break(loading), zero),
         seconds=seconds_of(loading, options.standard),
         zero=StrainZero(zero, how),
     )

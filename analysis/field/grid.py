@@ -5,9 +5,8 @@ least-squares weight of its pixels: a product of one line along x and the same l
 sigma = size/6. Where the paper has an analysis window, the weight of its least squares is the square of that
 window (docs/method.md); here the window is the weight.
 
-Why a ZOI has a value, or has none.
-
-The motion that a field predicts for the next one.
+Of each ZOI there is a status, which says why it has a value or none, and the motion that a field predicts for the next
+one.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""A rectangular part of a field as a field of its own.
+"""What is said of a part of a field, or of all of it.
 
-Blocks of ZOIs without a value, and the share of an area that is left.
-
-How much less sharp a picture is than its reference: a width in px, from the variance that its blur has grown by.
+A rectangular part is a field of its own. Of an area in which blocks of ZOIs have no value, a share is left. A picture
+that is less sharp than its reference has a blur: a width in px, from the variance that it has grown by.
 """
 
 from __future__ import annotations

@@ -16,29 +16,16 @@ from typing import Literal, Protocol, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.field import uncertainty
 from analysis.field.grid import Motion, Status, Window, ZoiGrid
-from analysis.field.uncertainty import (
-    PAIR_INDEX,
-    CommonError,
-    Floats,
-    Measure,
-    PictureError,
-    StrainTensor,
-    Sums,
-    combination,
-    fixed_sum,
-    products,
-    strain_tensor,
-    variance_of_sum,
-)
 
 
 class NamedValues(Protocol):
     """A result with values by their names."""
 
-    def value(self, name: str, /) -> Floats: ...
+    def value(self, name: str, /) -> uncertainty.Floats: ...
 
-    def sigma(self, name: str, /) -> Floats: ...
+    def sigma(self, name: str, /) -> uncertainty.Floats: ...
 
 
 class Value:
@@ -48,19 +35,19 @@ class Value:
         self.__doc__ = text
 
     def __set_name__(self, owner: type, name: str) -> None:
-        combination(name)  # a name that is not known is refused here
+        uncertainty.combination(name)  # a name that is not known is refused here
         self.name = name
 
     @overload
     def __get__(self, field: None, owner: type) -> Self: ...
 
     @overload
-    def __get__(self, field: NamedValues, owner: type) -> Floats: ...
+    def __get__(self, field: NamedValues, owner: type) -> uncertainty.Floats: ...
 
-    def __get__(self, field: NamedValues | None, owner: type) -> Self | Floats:
+    def __get__(self, field: NamedValues | None, owner: type) -> Self | uncertainty.Floats:
         return self if field is None else self.of(field)
 
-    def of(self, field: NamedValues) -> Floats:
+    def of(self, field: NamedValues) -> uncertainty.Floats:
         return field.value(self.name)
 
 
@@ -73,7 +60,7 @@ class Sigma(Value):
     def __set_name__(self, owner: type, name: str) -> None:
         super().__set_name__(owner, name.removeprefix("sigma_"))
 
-    def of(self, field: NamedValues) -> Floats:
+    def of(self, field: NamedValues) -> uncertainty.Floats:
         return field.sigma(self.name)
 
 
@@ -119,7 +106,7 @@ class StrainField:
     """
 
     grid: ZoiGrid
-    parameters: Floats
+    parameters: uncertainty.Floats
     covariance: NDArray[np.float32]
     covariance_reference: NDArray[np.float32]
     residual: NDArray[np.float32]
@@ -129,10 +116,10 @@ class StrainField:
     noise: float = float("nan")
     window: Window = "gaussian"
     motion: Motion | None = None
-    measure: Measure = "small"
-    sums: Sums | None = None
-    common: CommonError | None = None
-    picture: PictureError | None = None
+    measure: uncertainty.Measure = "small"
+    sums: uncertainty.Sums | None = None
+    common: uncertainty.CommonError | None = None
+    picture: uncertainty.PictureError | None = None
     blur: NDArray[np.float32] | None = None
     parts: NDArray[np.uint8] | None = None
 
@@ -176,7 +163,7 @@ class StrainField:
         covariance = np.zeros((21, *grid.shape), np.float32)
         for i, name in enumerate(names):
             sigma = sigmas.get(name, 0.0) if isinstance(sigmas, Mapping) else sigmas
-            covariance[PAIR_INDEX[i, i]] = _filled(sigma, grid) ** 2
+            covariance[uncertainty.PAIR_INDEX[i, i]] = _filled(sigma, grid) ** 2
         if status is None:
             status = np.where(grid.active, Status.OK, Status.NOT_MEASURED)
         states = np.array(status, np.uint8)
@@ -236,7 +223,7 @@ class StrainField:
         parts = self.parts if where is None else self.parts[where]
         return max(len(np.unique(parts[parts > 0])), 1)
 
-    def value(self, name: str) -> Floats:
+    def value(self, name: str) -> uncertainty.Floats:
         """A value by its name (see ``VALUES``), (R, C); read-only where it is one of the parameters.
 
         Raises
@@ -248,12 +235,14 @@ class StrainField:
             strain = self.strain(self.measure)
             return 2 * strain.exy if name == "gamma_xy" else np.asarray(getattr(strain, name))
         half = len(self.parameters) // 2
-        terms = [(c, self.parameters[i % 3 + half * (i // 3)]) for i, c in combination(name).items()]
+        terms = [
+            (c, self.parameters[i % 3 + half * (i // 3)]) for i, c in uncertainty.combination(name).items()
+        ]
         if len(terms) == 1 and terms[0][0] == 1:
             return np.asarray(terms[0][1])
         return np.asarray(sum(c * values for c, values in terms))
 
-    def sigma(self, name: str, part: Literal["all", "reference", "current"] = "all") -> Floats:
+    def sigma(self, name: str, part: Literal["all", "reference", "current"] = "all") -> uncertainty.Floats:
         """Standard uncertainty of a value, (R, C), in its unit.
 
         ``part`` separates what the noise of the reference causes, which is common to all
@@ -274,9 +263,9 @@ class StrainField:
         shares = (self.sigma(name, "current")[known] / sigma[known]) ** 2
         return float(np.median(shares)) if shares.size else 1.0
 
-    def _variance(self, name: str, covariance: NDArray[np.float32]) -> Floats:
-        (first, factor), *others = products(name)
-        out: Floats = covariance[first].astype(np.float64)
+    def _variance(self, name: str, covariance: NDArray[np.float32]) -> uncertainty.Floats:
+        (first, factor), *others = uncertainty.products(name)
+        out: uncertainty.Floats = covariance[first].astype(np.float64)
         if factor != 1:
             out *= factor
         for pair, factor in others:
@@ -300,15 +289,15 @@ class StrainField:
         count = int(np.count_nonzero(chosen))
         if count == 0:
             return float("nan"), float("nan")
-        value = fixed_sum(self.value(name)[chosen]) / count
+        value = uncertainty.fixed_sum(self.value(name)[chosen]) / count
         # A ZOI without predicted noise (sigma NaN) leaves the mean without a sigma, not without a value.
         own = np.sqrt(np.maximum(self._variance(name, self.covariance), 0))
-        variance = variance_of_sum(np.where(chosen, own, 0.0), name, self.grid, self.window)
+        variance = uncertainty.variance_of_sum(np.where(chosen, own, 0.0), name, self.grid, self.window)
         sigma = float(np.sqrt(max(variance, 0.0)) / count) * self._beyond_overlap(name, where)
         if self.common is None:
             return value, sigma
         shares = np.zeros((6, *self.grid.shape))
-        for i, share in combination(name).items():
+        for i, share in uncertainty.combination(name).items():
             shares[i] = share * chosen / count
         return value, math.hypot(sigma, math.sqrt(self.common.variance_of_sum(shares)))
 
@@ -319,7 +308,7 @@ class StrainField:
         gauge = self.grid.active if where is None else self.grid.active & np.asarray(where, bool)
         return self.sums.factor(name, gauge)
 
-    def strain(self, measure: Measure = "small") -> StrainTensor:
+    def strain(self, measure: uncertainty.Measure = "small") -> uncertainty.StrainTensor:
         """The strain of a measure: "small", "engineering" (elongations), "green" (Green-Lagrange) or "hencky".
 
         Raises
@@ -327,18 +316,18 @@ class StrainField:
         ValueError
             Unknown measure.
         """
-        return strain_tensor(measure, self.du_dx, self.du_dy, self.dv_dx, self.dv_dy)
+        return uncertainty.strain_tensor(measure, self.du_dx, self.du_dy, self.dv_dx, self.dv_dy)
 
     @property
-    def rotation(self) -> Floats:
+    def rotation(self) -> uncertainty.Floats:
         """Finite rotation by polar decomposition of F = I + grad u, (R, C), rad."""
         return np.asarray(np.arctan2(self.dv_dx - self.du_dy, 2 + self.du_dx + self.dv_dy))
 
     @property
-    def principal(self) -> tuple[Floats, Floats, Floats]:
+    def principal(self) -> tuple[uncertainty.Floats, uncertainty.Floats, uncertainty.Floats]:
         """Largest and smallest principal small strain and the angle of the first to x (rad)."""
         return self.strain("small").principal
 
 
-def _filled(values: ArrayLike, grid: ZoiGrid) -> Floats:
+def _filled(values: ArrayLike, grid: ZoiGrid) -> uncertainty.Floats:
     return np.array(np.broadcast_to(np.asarray(values, np.float64), grid.shape))

@@ -5,10 +5,8 @@ Coarse to fine: one displacement for the whole region by zero-mean normalised co
 pyramid, then each ZOI tries the displacements of the blocks around it and climbs to the best
 whole pixel. Blocks depend on the images and the region alone, never on which ZOIs are active.
 
-Where small blocks of a picture are in another one, to a whole pixel: compiled.
-
-By zero-mean normalised correlation, as ``cv2.matchTemplate`` has it, which took 25 us a block with its call; the loop
-takes 3 (AMD EPYC, November 2026).
+Blocks are matched by a compiled loop, by zero-mean normalised correlation as ``cv2.matchTemplate`` has it: that took
+25 us a block with its call; the loop takes 3 (AMD EPYC, November 2026).
 """
 
 from __future__ import annotations

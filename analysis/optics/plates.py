@@ -3,7 +3,7 @@
 Reference-sample compensation: B. Pan, L. Yu, D. Wu, Experimental Mechanics 53 (2013) 1751-1761. The fit is the
 generalised least squares of ``analysis.evaluate.affine``, with the shapes of ``plane``.
 
-The grid that has the ZOIs of the specimen and of the plates beside it.
+One grid has the ZOIs of the specimen and of the plates beside it.
 """
 
 from __future__ import annotations

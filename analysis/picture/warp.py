@@ -9,11 +9,10 @@ order of tiles (all within 3 %). Overlapping ZOIs share a warp in ``smooth``. Es
 rows, with 0.7 of the arithmetic but a skew error with rotation (3e-4 px and 35 um/m at 1 degree); polynomials of the
 tap weights along a row; cutting the corners of the window.
 
-Rows of the deformed image under a motion of third degree: what ZOIs near each other share. Compiled.
-
-A motion is (2, 10): of u and of v, px, the coefficients of 1, x, y, x^2, xy, y^2, x^3, x^2 y, x y^2, y^3, with x and
-y in units of ``unit`` px from the middle of a tile. Along a row the fractions are polynomials of third degree, too:
-within 16 px a sine of 0.3 px and 128 px period bends by 0.02 px.
+ZOIs near each other share rows under a motion of third degree. Such a motion is (2, 10): of u and of v, px, the
+coefficients of 1, x, y, x^2, xy, y^2, x^3, x^2 y, x y^2, y^3, with x and y in units of ``unit`` px from the middle of a
+tile. Along a row the fractions are polynomials of third degree, too: within 16 px a sine of 0.3 px and 128 px period
+bends by 0.02 px.
 """
 
 from __future__ import annotations

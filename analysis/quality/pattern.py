@@ -1,9 +1,8 @@
 """What the grey levels of a few frames show: of light and bits, and of the pattern.
 
-Pattern of each ZOI and size of the speckle, by differences of pixels alone.
-
-Cheap enough for pictures that are judged several times a second; ``analysis.picture`` has the same of a
-filtered pattern, and what the kernel makes of it.
+The pattern of each ZOI and the size of the speckle come from differences of pixels alone: cheap enough for pictures
+that are judged several times a second; ``analysis.picture`` has the same of a filtered pattern, and what the kernel
+makes of it.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 The module of a command is imported only when the command is called, so that ``phasedic --help`` starts fast. Each
 module has ``add_arguments(parser)`` and ``command(arguments) -> exit code``.
 
-Words of a command line as people type and drop them: quotes that stayed, and patterns that the shell expanded.
+Words are taken as people type and drop them: with quotes that stayed, and patterns that the shell expanded.
 """
 
 from __future__ import annotations
@@ -27,6 +27,42 @@ OF_PICTURES = ("replay", "check", "scale", "lens", "readout", "study", "average"
 """Commands with one source of pictures: many files stand for it."""
 _STORE = argparse._StoreAction  # of one value, where the last one counts
 OF_SOURCES = ("--camera", "--back", "--beside")
+
+# Shown at the end of the help of each command; a test parses them all.
+EXAMPLES = {
+    "run": "phasedic run --camera '/dev/video0?format=Y12&fps=30' --load '/dev/ttyUSB0?protocol=ascii&unit=N' --report",
+    "demo": "phasedic demo --specimen hole",
+    "examples": "phasedic examples first-hour",
+    "docs": "phasedic docs troubleshooting",
+    "init": "phasedic init --camera '/dev/video0?format=Y12&fps=30' --section 20,2",
+    "scale": "phasedic scale --camera /dev/video0 --points 100,200,900,200 --length 25",
+    "lens": "phasedic lens 'board/*.png' --checkerboard 9x6 --square 10 --out lens.toml",
+    "readout": "phasedic readout '/dev/video0?exposure_us=2000' --lamp 100 --config rig.toml",
+    "page": "phasedic page --camera '/dev/video0?format=Y12&fps=30'",
+    "replay": "phasedic replay 'shots/*.tif' --zoi 32 --step 8 --load forces.csv --section 20,2 --out out",
+    "batch": "phasedic batch 'runs/*/session.h5' --zoi 32 --step 8 --section 20,2 --workers 4 --out asked-again",
+    "study": "phasedic study runs/20261122T081747Z/session.h5 --zoi 24,32,48,64,96 --order 1,2 --roi all",
+    "sides": "phasedic sides runs/front runs/back",
+    "map": "phasedic map out eyy.png --field eyy --over shots/0000.tif",
+    "show": "phasedic show runs/20261122T081747Z --from 2 --to 10",
+    "export": "phasedic export runs/20261122T081747Z --to vtk --fields u,v,eyy --mm --scale 0.02 --y-up",
+    "report": "phasedic report runs/20261122T081747Z --field eyy --pdf",
+    "characterise": "phasedic characterise --pattern reference.tif --target 100 --out characterisation",
+    "inspect": "phasedic inspect runs/20261122T081747Z/session.h5 --zoi 10,12 --frame 40 --out zoi.png",
+    "check": "phasedic check --camera '/dev/video0?format=Y12&fps=30' --target 50",
+    "average": "phasedic average --camera /dev/video0 --frames 64 --out dark.tif",
+    "load-check": "phasedic load-check --load '/dev/ttyUSB0?protocol=mt-sics' --seconds 10",
+    "identify": "phasedic identify /dev/ttyUSB0",
+    "load-calibrate": "phasedic load-calibrate --load '/dev/ttyUSB0?unit=g' --mass 5 --out cell.toml",
+    "recover": "phasedic recover damaged.h5 --out rescued.h5",
+    "warm-up": "phasedic warm-up",
+    "devices": "phasedic devices",
+    "completion": "phasedic completion > ~/.local/share/bash-completion/completions/phasedic",
+}
+
+HELP_ALL = "--help-all"
+
+Command = Callable[[argparse.Namespace], int]
 
 
 def understood(argv: Sequence[str]) -> list[str]:
@@ -85,39 +121,6 @@ def _source(files: Sequence[str]) -> str:
     start = os.path.commonprefix([str(path) for path in pictures])  # noqa: RUF071 (of the letters)
     pattern = f"{start}*{ends.pop() if len(ends) == 1 else ''}"
     return next((source for source in (folder, pattern) if set(listed(source)) == pictures), "")
-
-
-# Shown at the end of the help of each command; a test parses them all.
-EXAMPLES = {
-    "run": "phasedic run --camera '/dev/video0?format=Y12&fps=30' --load '/dev/ttyUSB0?protocol=ascii&unit=N' --report",
-    "demo": "phasedic demo --specimen hole",
-    "examples": "phasedic examples first-hour",
-    "docs": "phasedic docs troubleshooting",
-    "init": "phasedic init --camera '/dev/video0?format=Y12&fps=30' --section 20,2",
-    "scale": "phasedic scale --camera /dev/video0 --points 100,200,900,200 --length 25",
-    "lens": "phasedic lens 'board/*.png' --checkerboard 9x6 --square 10 --out lens.toml",
-    "readout": "phasedic readout '/dev/video0?exposure_us=2000' --lamp 100 --config rig.toml",
-    "page": "phasedic page --camera '/dev/video0?format=Y12&fps=30'",
-    "replay": "phasedic replay 'shots/*.tif' --zoi 32 --step 8 --load forces.csv --section 20,2 --out out",
-    "batch": "phasedic batch 'runs/*/session.h5' --zoi 32 --step 8 --section 20,2 --workers 4 --out asked-again",
-    "study": "phasedic study runs/20261122T081747Z/session.h5 --zoi 24,32,48,64,96 --order 1,2 --roi all",
-    "sides": "phasedic sides runs/front runs/back",
-    "map": "phasedic map out eyy.png --field eyy --over shots/0000.tif",
-    "show": "phasedic show runs/20261122T081747Z --from 2 --to 10",
-    "export": "phasedic export runs/20261122T081747Z --to vtk --fields u,v,eyy --mm --scale 0.02 --y-up",
-    "report": "phasedic report runs/20261122T081747Z --field eyy --pdf",
-    "characterise": "phasedic characterise --pattern reference.tif --target 100 --out characterisation",
-    "inspect": "phasedic inspect runs/20261122T081747Z/session.h5 --zoi 10,12 --frame 40 --out zoi.png",
-    "check": "phasedic check --camera '/dev/video0?format=Y12&fps=30' --target 50",
-    "average": "phasedic average --camera /dev/video0 --frames 64 --out dark.tif",
-    "load-check": "phasedic load-check --load '/dev/ttyUSB0?protocol=mt-sics' --seconds 10",
-    "identify": "phasedic identify /dev/ttyUSB0",
-    "load-calibrate": "phasedic load-calibrate --load '/dev/ttyUSB0?unit=g' --mass 5 --out cell.toml",
-    "recover": "phasedic recover damaged.h5 --out rescued.h5",
-    "warm-up": "phasedic warm-up",
-    "devices": "phasedic devices",
-    "completion": "phasedic completion > ~/.local/share/bash-completion/completions/phasedic",
-}
 
 
 def example_of(command: str) -> str:
@@ -184,8 +187,6 @@ COMMANDS = {
     "devices": Entry("live.commands.devices", "list cameras with their formats, and serial ports"),
 }
 
-HELP_ALL = "--help-all"
-
 
 class _AllOptions(argparse.RawDescriptionHelpFormatter):
     """Says headings, descriptions line by line, and the help of each option in the language of the terminal."""
@@ -236,9 +237,6 @@ def not_empty(word: str) -> str:
     if not word:
         raise bad_value("is empty; give a value, or leave it out")
     return word
-
-
-Command = Callable[[argparse.Namespace], int]
 
 
 def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:

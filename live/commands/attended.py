@@ -245,14 +245,11 @@ class Keyboard:
     def _work(self) -> None:
         with contextlib.suppress(OSError, ValueError):
             if self._terminal is None:
-                self._take_lines()
+                for text in self._stream:
+                    if text.strip() and (reply := answer(text, self._controls)) != "ok":
+                        self._screen.print(reply)
             else:
                 self._take_keys(self._terminal)
-
-    def _take_lines(self) -> None:
-        for text in self._stream:
-            if text.strip() and (reply := answer(text, self._controls)) != "ok":
-                self._screen.print(reply)
 
     def _take_keys(self, terminal: Terminal) -> None:
         keys = Keys(self._controls, self._screen)

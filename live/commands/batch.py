@@ -10,23 +10,7 @@ from pathlib import Path
 from acquire.errors import EXIT_WORDS, LOSS, ConfigError
 from acquire.system import cores
 from acquire.text import Message
-from live.commands.options import (
-    FORCES,
-    OF_PICTURES,
-    POSITIVE,
-    add_as_measured,
-    add_config_file,
-    add_help_all,
-    add_metadata,
-    add_options,
-    add_picture_order,
-    add_section,
-    add_time_span,
-    add_verbose,
-    in_picture_order,
-    overrides,
-    whole,
-)
+from live.commands import options
 from live.commands.process import signals
 from live.ui.terminal.screen import TerminalScreen
 
@@ -41,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", dest="folder", required=True, metavar="DIR", help=words)
     parser.add_argument(
         "--workers",
-        type=whole(1),
+        type=options.whole(1),
         default=cores(),
         metavar="N",
         help="number of processes (default: one per core)",
@@ -49,18 +33,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     words = "scheduler of a running Dask cluster instead of --workers: tcp://HOST:PORT (extra cluster)"
     parser.add_argument("--scheduler", metavar="ADDRESS", help=words)
     words = "split longer sessions into chunks of S seconds for several workers (differs by less than 0.005 sigma)"
-    parser.add_argument("--chunk", dest="chunk_s", type=POSITIVE, metavar="S", help=words)
-    add_as_measured(parser)
-    add_time_span(parser)
-    add_config_file(parser)
-    add_picture_order(parser, dest="measure.order")
-    add_options(parser, "measurement", *OF_PICTURES)
-    add_options(parser, "evaluation", *OUTPUT)
-    add_options(parser, "files of forces", *FORCES)
-    add_section(parser)
-    add_metadata(parser)
-    add_verbose(parser)
-    add_help_all(parser)
+    parser.add_argument("--chunk", dest="chunk_s", type=options.POSITIVE, metavar="S", help=words)
+    options.add_as_measured(parser)
+    options.add_time_span(parser)
+    options.add_config_file(parser)
+    options.add_picture_order(parser, dest="measure.order")
+    options.add_options(parser, "measurement", *options.OF_PICTURES)
+    options.add_options(parser, "evaluation", *OUTPUT)
+    options.add_options(parser, "files of forces", *options.FORCES)
+    options.add_section(parser)
+    options.add_metadata(parser)
+    options.add_verbose(parser)
+    options.add_help_all(parser)
 
 
 def command(arguments: argparse.Namespace) -> int:
@@ -74,14 +58,14 @@ def command(arguments: argparse.Namespace) -> int:
         )
     request = CampaignRequest(
         tests=[
-            replace(test, source=in_picture_order(test.source, arguments.picture_order))
+            replace(test, source=options.in_picture_order(test.source, arguments.picture_order))
             for test in find_tests(arguments.tests)
         ],
         reference=arguments.reference,
         out=Path(arguments.folder),
         workers=arguments.workers,
         config=arguments.config,
-        overrides=overrides(arguments),
+        overrides=options.overrides(arguments),
         start_s=arguments.start_s,
         end_s=arguments.end_s,
         as_measured=arguments.as_measured,

@@ -24,19 +24,7 @@ from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
 from acquire.text import Message, about, word
 from acquire.text.message import printable
-from live.commands.options import (
-    MEASURE,
-    PICTURES,
-    POSITIVE,
-    add_config_file,
-    add_help_all,
-    add_lens,
-    add_options,
-    add_verbose,
-    configured,
-    overrides,
-    require_new,
-)
+from live.commands import options
 from live.commands.process import interrupts
 from live.config.cameras import camera_configs
 from live.config.loading import Config
@@ -63,6 +51,10 @@ PERIOD_S = 1 / 3
 BAR_LENGTH = 30
 CLOSE_S = 5.0
 MAX_NOTES = 4  # the newest
+
+ShowCheck = Callable[[RollingFrames, QuickCheck, list[CheckLine]], None]
+
+LISTEN_S = 3.0
 
 
 def watch(config: Config, target: float | None, screen: Screen, stopping: Stopping) -> CheckFigures:
@@ -158,9 +150,6 @@ class RenewedLines:
             self._stream.write("\n")
 
 
-ShowCheck = Callable[[RollingFrames, QuickCheck, list[CheckLine]], None]
-
-
 @contextmanager
 def _viewed(config: Config, notes: list[str]) -> Iterator[ShowCheck]:
     """A function that shows a check in the view: the picture, and the lines as its status card.
@@ -214,15 +203,15 @@ def _cell(text: str) -> str:
     return printable(text).replace("|", "/")
 
 
-LISTEN_S = 3.0
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic check``."""
-    add_options(parser, "devices", "camera", "back", "beside", "crop", "dark", "flat", "load")
-    add_options(parser, "recording of the test", "record", "no-record", "seconds", "out")
+    options.add_options(parser, "devices", "camera", "back", "beside", "crop", "dark", "flat", "load")
+    options.add_options(parser, "recording of the test", "record", "no-record", "seconds", "out")
     parser.add_argument(
-        "--target", type=POSITIVE, metavar="UM_M", help="largest strain noise of one ZOI for the test, um/m"
+        "--target",
+        type=options.POSITIVE,
+        metavar="UM_M",
+        help="largest strain noise of one ZOI for the test, um/m",
     )
     parser.add_argument(
         "--snapshot",
@@ -234,25 +223,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="repeat the check three times a second until Ctrl-C, with the peak of the sharpness",
     )
-    add_config_file(parser)
-    add_options(parser, "measurement", *(name for name in MEASURE if name != "strain"), "axis")
-    add_lens(parser)
-    add_options(parser, "view of --watch", "no-view")
-    add_verbose(parser)
-    add_help_all(parser)
+    options.add_config_file(parser)
+    options.add_options(
+        parser, "measurement", *(name for name in options.MEASURE if name != "strain"), "axis"
+    )
+    options.add_lens(parser)
+    options.add_options(parser, "view of --watch", "no-view")
+    options.add_verbose(parser)
+    options.add_help_all(parser)
 
 
 def command(arguments: argparse.Namespace) -> int:
     """Run the check; 0 for GO, 6 for NO-GO."""
     screen = TerminalScreen()
-    config = configured(arguments)
+    config = options.configured(arguments)
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (see phasedic devices)")
     target = None if arguments.target is None else arguments.target * 1e-6
-    cameras = camera_configs(config, overrides(arguments))
+    cameras = camera_configs(config, options.overrides(arguments))
     snapshots = {name: _snapshot_of(name, arguments.snapshot) for name in cameras}
     for path in filter(None, snapshots.values()):
-        require_new(path, *PICTURES)
+        options.require_new(path, *options.PICTURES)
     check_load_port(config.load.address)
     if arguments.watch:
         first, one = next(iter(cameras.items()))

@@ -26,12 +26,8 @@ def script(shell: str) -> str:
 
     parser = full_parser(COMMANDS)
     for own in subparsers(parser).choices.values():
-        _complete_files(own, shtab.FILE)
+        # Complete file names for every argument with a free value: shtab reads the attribute ``complete``.
+        for action in own._actions:
+            if action.nargs != 0 and action.choices is None:
+                action.complete = shtab.FILE  # type: ignore[attr-defined]
     return str(shtab.complete(parser, shell))
-
-
-def _complete_files(parser: argparse.ArgumentParser, files: object) -> None:
-    """Complete file names for every argument with a free value: shtab reads the attribute ``complete``."""
-    for action in parser._actions:
-        if action.nargs != 0 and action.choices is None:
-            action.complete = files  # type: ignore[attr-defined]

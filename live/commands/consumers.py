@@ -1,15 +1,24 @@
-"""The standard consumers of a test: results, view and status card; in a live run also alarms and strain output."""
+"""What tests have in common, measured live or replayed: their standard consumers, and what is done at the end.
+
+The consumers are results, view and status card, in a live run also alarms and strain output; at the end there are
+summaries, front and back put together, report, exit code.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from acquire.addresses import Options, parse_address
+from acquire.errors import EXIT_WORDS, LOSS, PhasedicError
 from acquire.events import EventKind, Level
 from acquire.serial_line.ports import LineSettings
 from acquire.text import Message
+from live.commands.sides import TABLE, put_together
+from live.config.cameras import BACK, FRONT
 from live.config.figures import DEFAULT_CHANNELS, OF_LOAD, joint_channels
 from live.config.gauges import gauge_colours, outlines
 from live.config.listen_address import ListenAddress, read_token
@@ -18,6 +27,7 @@ from live.pipeline.consumer import Compose, Consumer, RunInfo, Screen
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import ChannelValues
 from live.pipeline.timed.course import shown_names
+from live.results.finished.figures_file import FILE
 from live.results.sides import JointChannels
 from live.results.summary import StatusCard
 from live.results.writer import write_results
@@ -26,6 +36,12 @@ from live.run.strain_output import LineFormat, SerialOut, StrainOut, TcpOut, Udp
 from live.ui.rerun.consumer import CardWriter, FiguresWriter, RerunConsumer
 from live.ui.rerun.messages import ViewSetup
 from live.ui.rerun.view import View, spawn_viewer
+from live.ui.terminal.screen import CamerasScreen
+from live.ui.terminal.summary import print_summary
+
+if TYPE_CHECKING:
+    from live.replay.replay import Replayed
+    from live.run.outcome import Outcome
 
 OUTPUT_NAME = "strain out"
 
@@ -184,3 +200,44 @@ def _announce(view: View, spawn: bool, screen: Screen, run_state: RunState) -> N
     screen.print(Message("no viewer is opened ({why}); the test runs without it. To open one:", why))
     for line in view.instructions.splitlines():
         screen.print(f"  {line}")
+
+
+def finish_test(
+    cameras: Mapping[str, Outcome | Replayed],
+    lines: Mapping[str, Sequence[str]],
+    folder: Path,
+    code: int,
+    screen: Screen,
+    *,
+    verbose: bool = False,
+) -> int:
+    """Print the summary of each camera with its ``lines``, and what is of all; the exit code, which was ``code``.
+
+    A report is made where that is configured: one, of all cameras. Figures or a report that could not be written are a
+    loss.
+    """
+    every, several = CamerasScreen(screen), len(cameras) > 1
+    report = next(iter(cameras.values())).config.output.report
+    for name, one in cameras.items():
+        own, alone = every.of(name), report and not several
+        print_summary(
+            own, one.run_state, one.test, one.folder, lines[name], verbose=verbose, with_report=alone
+        )
+        if not (one.folder / FILE).exists():
+            code = code or LOSS
+    if several:
+        screen.print()
+    if FRONT in cameras:
+        try:
+            put_together(folder / FRONT, folder / BACK, folder / TABLE, screen)
+        except PhasedicError as error:
+            screen.print(Message("warning: front and back were not put together: {why}", error))
+            code = code or LOSS
+    if report:
+        from live.commands.report import write_report
+
+        if write_report(folder, screen):
+            code = code or LOSS
+    if code in EXIT_WORDS:
+        screen.print(Message("exit code {code}: {words}", code, EXIT_WORDS[code]))
+    return code

@@ -1,8 +1,7 @@
 """``phasedic devices``: cameras with their formats, serial ports, and the number of measuring threads.
 
-The report of ``phasedic devices --report``: what devices of a stranger do, measured, without pictures and names.
-
-Cameras are opened and watched for some seconds; serial ports are listened to, and nothing is sent.
+With ``--report`` it writes what devices of a stranger do, measured, without pictures and names: cameras are opened and
+watched for some seconds; serial ports are listened to, and nothing is sent.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from acquire.text import Message
 from hw_mocks.deformation import Affine
-from hw_mocks.speckle import Image, Speckle
+from hw_mocks.speckle import Speckle
 from live.commands.docs import shipped
 from live.config.new_files import new_folder
 from live.ui.terminal.screen import print_line
@@ -66,17 +66,13 @@ class Strip:
         edge = self._half * (1 - nu * axial) - np.abs(np.arange(columns) - x0 - shift[0])
         cover = np.clip(edge + 0.5, 0, 1).astype(np.float32)
         image = BACKGROUND + (image - BACKGROUND) * cover
-        _draw_ruler(image)
+        # A black line each 5 mm at the left edge, from row 50 on.
+        for row in range(RULER_PX, image.shape[0] - RULER_PX // 2, RULER_PX):
+            image[row - 1 : row + 2, 8:28] = 0.0
         if blur:
             image = load_cv2().GaussianBlur(image, (0, 0), blur)
         noisy = 20 + 215 * image + self._noise.normal(0, NOISE_GL, self._shape)
         return np.asarray(np.clip(np.rint(noisy), 0, 255).astype(np.uint8))
-
-
-def _draw_ruler(image: Image | NDArray[np.float64]) -> None:
-    """A black line each 5 mm at the left edge, from row 50 on."""
-    for row in range(RULER_PX, image.shape[0] - RULER_PX // 2, RULER_PX):
-        image[row - 1 : row + 2, 8:28] = 0.0
 
 
 def strain_at(stress_Pa: float) -> float:

@@ -13,15 +13,7 @@ from acquire.errors import LOSS, DeviceError
 from acquire.files.picture import write_picture
 from acquire.text import Amount, Message, about, joined, word
 from acquire.text.message import printable
-from live.commands.options import (
-    PICTURES,
-    add_help_all,
-    add_options,
-    add_section,
-    add_verbose,
-    overrides,
-    require_new,
-)
+from live.commands import options
 from live.config.loading import load_config
 from live.config.rig_file import new_rig
 from live.pipeline.consumer import Screen
@@ -52,11 +44,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--snapshot", metavar="FILE", help="new picture of the set-up (default: beside the rig file)"
     )
-    add_options(parser, "devices (default: those found)", "camera", "crop", "load", "dark", "flat")
-    add_options(parser, "measurement", *MEASURE)
-    add_section(parser)
-    add_verbose(parser)
-    add_help_all(parser)
+    options.add_options(parser, "devices (default: those found)", "camera", "crop", "load", "dark", "flat")
+    options.add_options(parser, "measurement", *MEASURE)
+    options.add_section(parser)
+    options.add_verbose(parser)
+    options.add_help_all(parser)
 
 
 def command(arguments: argparse.Namespace) -> int:
@@ -65,11 +57,11 @@ def command(arguments: argparse.Namespace) -> int:
     rig = Path(arguments.file)
     png = Path(arguments.snapshot) if arguments.snapshot else rig.with_suffix(".png")
     mask = rig.with_name(f"{rig.stem}-mask.png") if arguments.fixed else None
-    require_new(rig)
-    require_new(png, *PICTURES)
+    options.require_new(rig)
+    options.require_new(png, *options.PICTURES)
     if mask is not None:
-        require_new(mask)
-    given = overrides(arguments)
+        options.require_new(mask)
+    given = options.overrides(arguments)
     found = find_devices(given, screen)
     config = load_config(None, {**given, "camera.address": found.camera, "load.address": found.load})
     first = first_look(config, screen)

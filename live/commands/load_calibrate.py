@@ -28,7 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic load-calibrate``."""
     parser.add_argument("--load", required=True, metavar="ADDRESS", help="address of the load cell")
     parser.add_argument("--mass", type=POSITIVE, metavar="KG", help="the known load as a mass")
-    parser.add_argument("--force", type=number(), metavar="N", help="the known load as a force")
+    parser.add_argument(
+        "--force", type=number(), metavar="N", help="the known load as a force, N; negative in compression"
+    )
     parser.add_argument("--out", required=True, metavar="FILE", help="file for the calibration")
     words = "ask nothing: take the three readings at once and accept the result (a program moves the load)"
     parser.add_argument("--yes", action="store_true", help=words)

@@ -236,7 +236,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--title", help="title (default: map, time and ZOI)")
     words = "median filter of N x N ZOIs, for display only"
     parser.add_argument("--median", type=whole(), default=1, metavar="N", help=words)
-    words = "Gaussian filter, for display only"
+    words = "standard deviation of a Gaussian filter, for display only"
     parser.add_argument("--low-pass", type=number(), default=0.0, metavar="PX", help=words)
     words = "reduce the blur by the ZOI, for display only (order 1): 3 or 7 steps, noted in the title"
     parser.add_argument("--deconvolve", type=whole(), default=0, metavar="STEPS", help=words)
@@ -272,6 +272,6 @@ def _warn_of_motion(strain: Strain, row: int) -> None:
     moved = float(np.nanmax(np.hypot(strain.maps("u", row), strain.maps("v", row)), initial=0.0))
     if moved > _VISIBLE_PX:
         print_line(
-            f"note: the map lies on the reference picture; the specimen moved by up to {moved:.0f} px since, so give"
-            " the reference to --over, or phasedic export --to png, which moves the map with it"
+            f"note: the ZOIs lie where they were in the reference; the specimen moved by up to {moved:.0f} px since:"
+            " phasedic export --to png moves the map with it"
         )

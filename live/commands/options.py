@@ -3,7 +3,7 @@
 An option is declared with its key in ``live.config.sections``: name, type, default and help stand once. Its value
 is stored under "section.key".
 
-Gauges that are added to a finished run, read from its stored maps (``--gauges`` of report, show and export).
+Report, show and export have ``--gauges`` in common: gauges added to a finished run, read from its stored maps.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from analysis.evaluate import Gauge, GaugeSet
 from live.commands.arguments import HELP_ALL, bad_value, not_empty
 from live.config.gauges import gauges_for
 from live.config.loading import Config, lens_in, load_config, options
+from live.config.new_files import check_free
 from live.config.values import numbers_of
 from live.results.layout import gauge_columns
 from live.results.run_folder import RunFolder
@@ -197,8 +198,7 @@ def add_gauge_option(parser: argparse.ArgumentParser) -> None:
 
 def require_new(path: Path, *endings: str) -> None:
     """Raises ConfigError if the file exists, its folder does not, or its name ends in none of ``endings``."""
-    if path.exists() or path.is_symlink():
-        raise ConfigError("{path} exists; nothing is overwritten, choose another name", path)
+    check_free(path)
     if not path.parent.is_dir():
         raise ConfigError(
             "{path}: there is no folder {folder}; make it, or choose another name", path, path.parent

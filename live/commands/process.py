@@ -33,6 +33,9 @@ _LEAST = {"NUMBA_NUM_THREADS": 1, "SOURCE_DATE_EPOCH": 0}
 """Whole numbers in the environment for which numba ends the program where they are none."""
 _LAYERS = ("NUMBA_THREADING_LAYER", "NUMBA_THREADING_LAYER_PRIORITY")
 
+QUEUE_SIZE = 2000  # writes
+STALL_S = 1.0  # the end waits so long for a blocked stream
+
 
 @contextlib.contextmanager
 def signals(stop: Callable[[], None], screen: Screen | None) -> Iterator[None]:
@@ -148,10 +151,6 @@ def _check_threading_layer(given: str) -> None:
         raise ConfigError(
             "{given} is not possible ({why}); give omp or workqueue, or unset it", given, why
         ) from error
-
-
-QUEUE_SIZE = 2000  # writes
-STALL_S = 1.0  # the end waits so long for a blocked stream
 
 
 class NonBlockingStream:

@@ -10,18 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquire.errors import exit_code_of_all
-from live.commands.finishing import finish_test
-from live.commands.options import (
-    FORCES,
-    OF_PICTURES,
-    add_as_measured,
-    add_measure,
-    add_options,
-    add_picture_order,
-    add_time_span,
-    in_picture_order,
-    overrides,
-)
+from live.commands import options
+from live.commands.consumers import finish_test
 from live.commands.process import signals
 from live.results.folder import check_folder, make_folder
 from live.ui.terminal.screen import CamerasScreen, TerminalScreen
@@ -37,13 +27,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="folder of a run (of one camera or several), session.h5, pictures in a folder, 'files:shots/*.tif' or"
         " 'video:file.mp4'",
     )
-    add_as_measured(parser)
-    add_time_span(parser)
-    add_picture_order(parser, dest="measure.order")
+    options.add_as_measured(parser)
+    options.add_time_span(parser)
+    options.add_picture_order(parser, dest="measure.order")
     words = "forces: the export of a testing machine, or a CSV with a header such as file,force_kN or time_s,force_N"
     parser.add_argument("--load", dest="forces", metavar="FILE.csv", help=words)
-    add_options(parser, "file of forces", *FORCES)
-    add_measure(parser, measure=OF_PICTURES)
+    options.add_options(parser, "file of forces", *options.FORCES)
+    options.add_measure(parser, measure=options.OF_PICTURES)
 
 
 def command(arguments: argparse.Namespace) -> int:
@@ -53,7 +43,7 @@ def command(arguments: argparse.Namespace) -> int:
     from live.replay.source import ReplayRequest
 
     request = ReplayRequest(
-        source=in_picture_order(arguments.source, arguments.picture_order),
+        source=options.in_picture_order(arguments.source, arguments.picture_order),
         as_measured=arguments.as_measured,
         start_s=arguments.start_s,
         end_s=arguments.end_s,
@@ -98,7 +88,7 @@ def _of_each(request: ReplayRequest) -> dict[str, ReplayRequest]:
 
 def _overrides(arguments: argparse.Namespace) -> dict[str, Any]:
     """The values that the command line sets, and the file of the forces as metadata."""
-    given = overrides(arguments)
+    given = options.overrides(arguments)
     return (
         given
         if arguments.forces is None

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 from acquire.errors import EXIT_WORDS
 from acquire.text import Message
 from live.commands.attended import attended, page_opened
-from live.commands.consumers import standard_consumers
-from live.commands.finishing import finish_test
+from live.commands.consumers import finish_test, standard_consumers
 from live.commands.options import add_measure, add_options, configured, overrides
 from live.config.cameras import FRONT, camera_configs
 from live.config.loading import Config

@@ -172,22 +172,9 @@ def selected_rows(run: RunFolder, request: ShowRequest) -> tuple[int, ...]:
     DataError
         The run has no time step.
     """
-    t = run.strain.time_s
-    if not len(t):
-        raise DataError("{path}: holds no measurement, there is nothing to show", run.strain.path)
-    low = -math.inf if request.start_s is None else request.start_s
-    high = math.inf if request.end_s is None else request.end_s
-    rows = np.flatnonzero((t >= low) & (t <= high))
-    if not len(rows):
-        raise ConfigError(
-            "--from, --to: no measurement between {low:g} and {high:g} s; they reach from {first:.6g} to {last:.6g} s",
-            low,
-            high,
-            t[0],
-            t[-1],
-        )
+    rows = run.strain.rows_between(request.start_s, request.end_s, "--from, --to")
     every = request.every or math.ceil(len(rows) * _bytes_each(run) / MAX_BYTES)
-    return tuple(int(row) for row in rows[::-1][::every][::-1])
+    return rows[::-1][::every][::-1]
 
 
 def _bytes_each(run: RunFolder) -> float:

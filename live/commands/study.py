@@ -13,16 +13,8 @@ import numpy as np
 
 from acquire.errors import ConfigError
 from acquire.text import Message
+from live.commands import options
 from live.commands.arguments import bad_value
-from live.commands.options import (
-    add_config_file,
-    add_help_all,
-    add_options,
-    add_picture_order,
-    add_verbose,
-    in_picture_order,
-    overrides,
-)
 from live.config.new_files import check_free, new_folder
 from live.config.values import AUTO, numbers_of
 from live.results.report.saving import save_figures
@@ -35,6 +27,11 @@ if TYPE_CHECKING:
 
 MEASURE = ("roi", "mask", "burst", "reference-burst", "estimator", "strain", "bending", "noise", "axis")
 WINDOWS = ("gaussian", "uniform", "tukey", "bi-triangular")
+
+_HEAD = Message(
+    "  zoi step order window        l10 px  VSG px  noise µm/m  over predicted  strain µm/m     ±"
+    "  gradient µm/m/px  valid"
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,13 +47,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--step", type=_numbers, metavar="PX,PX", help="distances of ZOIs (default: a quarter of the side)"
     )
-    add_picture_order(parser, _numbers, default=[1])
+    options.add_picture_order(parser, _numbers, default=[1])
     parser.add_argument(
         "--window",
         type=_windows,
         default=["gaussian"],
         metavar="NAME,NAME",
-        help="weights (default gaussian)",
+        help="weights: gaussian, uniform, tukey, bi-triangular (default gaussian)",
     )
     words = "time without motion, s (default: from the force)"
     words += "; none: no such time, the noise is predicted"
@@ -67,10 +64,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", dest="folder", default="study", metavar="DIR", help=f"{words} (default study)"
     )
-    add_config_file(parser)
-    add_options(parser, "measurement", *MEASURE)
-    add_verbose(parser)
-    add_help_all(parser)
+    options.add_config_file(parser)
+    options.add_options(parser, "measurement", *MEASURE)
+    options.add_verbose(parser)
+    options.add_help_all(parser)
 
 
 def command(arguments: argparse.Namespace) -> int:
@@ -84,8 +81,8 @@ def command(arguments: argparse.Namespace) -> int:
     check_free(out)
     settings, found = _settings(arguments), []
     config_file = Path(arguments.config) if arguments.config else None
-    source = in_picture_order(arguments.source, arguments.picture_order)
-    request = ReplayRequest(source, config_file, overrides(arguments), reference=arguments.reference)
+    source = options.in_picture_order(arguments.source, arguments.picture_order)
+    request = ReplayRequest(source, config_file, options.overrides(arguments), reference=arguments.reference)
     with open_source(request) as (material, config):
         screen.print(material.words)
         if AUTO in (config.measure.roi, config.measure.gauges):
@@ -130,11 +127,6 @@ def _settings(arguments: argparse.Namespace) -> list[StudySetting]:
 
 
 # -- output -------------------------------------------------------------------------------------
-
-_HEAD = Message(
-    "  zoi step order window        l10 px  VSG px  noise µm/m  over predicted  strain µm/m     ±"
-    "  gradient µm/m/px  valid"
-)
 
 
 def _line(one: StudyResult) -> str:

@@ -16,6 +16,8 @@ _UNITS = {
 }  # fmt: skip
 """Unit in a name -> kind of quantity for a person, and what one is in SI units."""
 
+_JOINT = ("mean_", "bending_", "sigma_mean_")
+
 
 @dataclass(frozen=True, slots=True)
 class LiveFigure:
@@ -223,7 +225,6 @@ OF_SNAPSHOT = tuple(figure for figure in FIGURES if figure.part in ("value", "si
 """Whose channels are of a figure of the snapshot: ``of``, and its ``part``."""
 LIVE = tuple(figure for figure in FIGURES if figure.live)
 """Of the snapshot, from the attribute of ``TimeStep`` with their plain name."""
-_JOINT = ("mean_", "bending_", "sigma_mean_")
 
 
 def columns(only: Iterable[str] = ("",)) -> tuple[str, ...]:

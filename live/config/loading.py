@@ -11,7 +11,8 @@ import dataclasses
 import math
 import reprlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,23 +22,9 @@ from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
 from acquire.text import Message, meant
 from analysis.evaluate import AUTO_GAUGES
+from live.config import sections
 from live.config.figures import CYCLE_CHANNELS, channel_names
 from live.config.gauges import DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_checks
-from live.config.sections import (
-    AlarmConfig,
-    CameraConfig,
-    LensConfig,
-    LoadConfig,
-    MeasureConfig,
-    OperateConfig,
-    OutputConfig,
-    PlateConfig,
-    RecordConfig,
-    ScaleConfig,
-    SpecimenConfig,
-    StrainOutConfig,
-    ViewConfig,
-)
 from live.config.values import AUTO, Check, Option, in_px
 
 Section = TypeVar("Section")
@@ -49,42 +36,42 @@ _REMOVED_KEYS = {
 }
 """Keys of earlier versions, with advice: left out of a stored configuration, refused in a new one."""
 
-
-@dataclass(frozen=True, slots=True)
-class Config:
-    """All sections, the virtual gauges by name, and free metadata (specimen, operator, material, note ...)."""
-
-    camera: CameraConfig = field(default_factory=CameraConfig)
-    load: LoadConfig = field(default_factory=LoadConfig)
-    measure: MeasureConfig = field(default_factory=MeasureConfig)
-    scale: ScaleConfig = field(default_factory=ScaleConfig)
-    lens: LensConfig = field(default_factory=LensConfig)
-    record: RecordConfig = field(default_factory=RecordConfig)
-    operate: OperateConfig = field(default_factory=OperateConfig)
-    strain_out: StrainOutConfig = field(default_factory=StrainOutConfig)
-    view: ViewConfig = field(default_factory=ViewConfig)
-    specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
-    output: OutputConfig = field(default_factory=OutputConfig)
-    alarm: tuple[AlarmConfig, ...] = ()
-    gauges: Mapping[str, GaugeTable] = field(default_factory=dict)
-    plate: Mapping[str, PlateConfig] = field(default_factory=dict)
-    metadata: Mapping[str, Any] = field(default_factory=dict)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Nested plain values for JSON: the keys of each section, the alarms by number."""
-        plain = dataclasses.asdict(self)
-        for name, used in (("plate", bool(self.plate)), ("lens", self.lens != LensConfig())):
-            if not used:  # a section that versions before do not have
-                del plain[name]
-        return plain | {"alarm": {str(n): alarm for n, alarm in enumerate(plain["alarm"], 1)}}
-
-
 _SHAPES = (
     frozenset({"specimen.width_mm", "specimen.thickness_mm"}),
     frozenset({"specimen.diameter_mm"}),
     frozenset({"specimen.area_mm2"}),
 )
 """Keys that say the section in one way."""
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """All sections, the virtual gauges by name, and free metadata (specimen, operator, material, note ...)."""
+
+    camera: sections.CameraConfig = field(default_factory=sections.CameraConfig)
+    load: sections.LoadConfig = field(default_factory=sections.LoadConfig)
+    measure: sections.MeasureConfig = field(default_factory=sections.MeasureConfig)
+    scale: sections.ScaleConfig = field(default_factory=sections.ScaleConfig)
+    lens: sections.LensConfig = field(default_factory=sections.LensConfig)
+    record: sections.RecordConfig = field(default_factory=sections.RecordConfig)
+    operate: sections.OperateConfig = field(default_factory=sections.OperateConfig)
+    strain_out: sections.StrainOutConfig = field(default_factory=sections.StrainOutConfig)
+    view: sections.ViewConfig = field(default_factory=sections.ViewConfig)
+    specimen: sections.SpecimenConfig = field(default_factory=sections.SpecimenConfig)
+    output: sections.OutputConfig = field(default_factory=sections.OutputConfig)
+    alarm: tuple[sections.AlarmConfig, ...] = ()
+    gauges: Mapping[str, GaugeTable] = field(default_factory=dict)
+    plate: Mapping[str, sections.PlateConfig] = field(default_factory=dict)
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Nested plain values for JSON: the keys of each section, the alarms by number."""
+        plain = dataclasses.asdict(self)
+        for name, used in (("plate", bool(self.plate)), ("lens", self.lens != sections.LensConfig())):
+            if not used:  # a section that versions before do not have
+                del plain[name]
+        return plain | {"alarm": {str(n): alarm for n, alarm in enumerate(plain["alarm"], 1)}}
+
 
 _SECTIONS: dict[str, type] = {
     f.name: f.default_factory  # type: ignore[misc]
@@ -216,8 +203,20 @@ def _read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
 def _plain_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     if text is None and not path.exists():
         raise ConfigError("{path}: there is no such configuration file", path)
+    with as_toml(path):
+        return tomllib.loads(toml_text(path) if text is None else text)
+
+
+def toml_text(path: Path) -> str:
+    """The text of a file."""
+    return read_bytes(path, MAX_BYTES).decode("utf-8-sig")
+
+
+@contextmanager
+def as_toml(path: Path) -> Iterator[None]:
+    """Around the reading of a file and of its TOML: raises ConfigError where that fails."""
     try:
-        return tomllib.loads(read_bytes(path, MAX_BYTES).decode("utf-8-sig") if text is None else text)
+        yield
     except (DataError, UnicodeDecodeError) as error:
         raise ConfigError("{path}: cannot be read ({error}); give a text file in TOML", path, error) from None
     except RecursionError:
@@ -257,7 +256,7 @@ def _px_per_mm(tree: Mapping[str, Any], where: str) -> float | None:
     content = tree.get("scale")
     if not isinstance(content, Mapping):
         return None
-    return _section(ScaleConfig, "scale", content, where).px_per_mm
+    return _section(sections.ScaleConfig, "scale", content, where).px_per_mm
 
 
 def _section(
@@ -313,9 +312,9 @@ def _named_table(dotted: str, table: Any, where: str) -> Mapping[str, Any]:
     return table
 
 
-def _plate(name: str, table: Any, where: str, px_per_mm: float | None) -> PlateConfig:
+def _plate(name: str, table: Any, where: str, px_per_mm: float | None) -> sections.PlateConfig:
     dotted = f"plate.{name}"
-    plate = _section(PlateConfig, dotted, _named_table(dotted, table, where), where, px_per_mm)
+    plate = _section(sections.PlateConfig, dotted, _named_table(dotted, table, where), where, px_per_mm)
     if plate.box is None:
         raise ConfigError("{where}: {dotted}: give box = [x, y, width, height] in px", where, dotted)
     return plate
@@ -327,13 +326,13 @@ def _gauge(name: str, table: Any, where: str, px_per_mm: float | None) -> GaugeT
     return {"kind": DEFAULT_KIND, **values}
 
 
-def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:
+def _alarms(content: Any, where: str) -> tuple[sections.AlarmConfig, ...]:
     if isinstance(content, Mapping):  # by number, as stored in files
         content = list(content.values())
     if not isinstance(content, list | tuple) or not all(isinstance(table, Mapping) for table in content):
         raise ConfigError("{where}: alarm must be tables, [[alarm]] with keys below it", where)
     alarms = tuple(
-        _section(AlarmConfig, Message("alarm {number}", number), table, where)
+        _section(sections.AlarmConfig, Message("alarm {number}", number), table, where)
         for number, table in enumerate(content, 1)
     )
     for number, alarm in enumerate(alarms, 1):

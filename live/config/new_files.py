@@ -21,7 +21,7 @@ def free_name(wanted: str, is_taken: Callable[[str], bool], mark: str = "-") -> 
 def check_free(*paths: Path) -> None:
     """Raise ConfigError where one of ``paths`` exists."""
     for path in paths:
-        if path.exists():
+        if path.exists() or path.is_symlink():
             raise ConfigError("{path} exists already and is not overwritten; choose another name", path)
 
 

@@ -13,9 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquire.errors import ConfigError, DataError
-from acquire.files.picture import read_bytes
-from live.config.loading import MAX_BYTES, Config, load_config
-from live.config.new_files import replaced_file
+from live.config.loading import Config, as_toml, load_config, toml_text
+from live.config.new_files import check_free, replaced_file
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument
@@ -29,8 +28,7 @@ def new_rig(path: Path, text: str, changes: Mapping[str, Any] | None = None) -> 
     ConfigError
         The file exists (nothing is overwritten) or cannot be written, or the text is not a configuration.
     """
-    if path.exists() or path.is_symlink():
-        raise ConfigError("{path} exists; nothing is overwritten, choose another name", path)
+    check_free(path)
     return _write_checked(path, _changed(_parsed(text, path), changes or {}, path))
 
 
@@ -80,24 +78,19 @@ def _changed(document: TOMLDocument, changes: Mapping[str, Any], path: Path) -> 
 
 
 def _read(path: Path) -> TOMLDocument:
-    if not path.exists():
-        return _parsed("", path)
-    try:
-        return _parsed(read_bytes(path, MAX_BYTES).decode("utf-8-sig"), path)
-    except (DataError, UnicodeDecodeError) as error:
-        raise ConfigError("{path}: cannot be read ({error}); give a text file in TOML", path, error) from None
+    with as_toml(path):
+        return _parsed(toml_text(path) if path.exists() else "", path)
 
 
 def _parsed(text: str, path: Path) -> TOMLDocument:
     import tomlkit
     from tomlkit.exceptions import TOMLKitError
 
-    try:
-        return tomlkit.parse(text)
-    except RecursionError:
-        raise ConfigError("{path}: not valid TOML: too many brackets within brackets", path) from None
-    except (TOMLKitError, ValueError) as error:
-        raise ConfigError("{path}: not valid TOML: {error}", path, error) from None
+    with as_toml(path):
+        try:
+            return tomlkit.parse(text)
+        except TOMLKitError as error:  # some are no ValueError
+            raise ValueError(error) from None
 
 
 def _change(document: TOMLDocument, section: str, key: str, value: Any, path: Path) -> None:

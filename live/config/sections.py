@@ -234,8 +234,8 @@ class StrainOutConfig:
     format: str = key(choice("json", "csv"), "json",
         "format of a line; csv begins with the names of the channels", Option("strain-format", expert=True))
     channels: tuple[str, ...] | None = key(NAMES, None,
-        "channels of a line (docs/control.md; default: time, frame, axial strain and its sigma and rate, force,"
-        " stress, lost share, latency and all gauges)",
+        "channels of a line (docs/control.md; default: strain, force, stress, their ages and states, lost share,"
+        " latency, all gauges)",
         Option("strain-channels", "NAME,NAME", expert=True))
 
 

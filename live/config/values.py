@@ -20,6 +20,18 @@ from live.config.listen_address import SOCKET, ListenAddress
 
 Number = TypeVar("Number", int, float)
 
+_NUMBER = r"[-+]?(?:[0-9]+[.]?[0-9]*|[.][0-9]+)"
+_IN_MM = re.compile(rf"\s*({_NUMBER}(?:\s*,\s*{_NUMBER})*)\s*mm\s*")
+
+MAX_BESIDE = 7
+
+LENS_PARAMETERS = 8
+
+AUTO, ALL = REGIONS = ("auto", "all")
+"""Named regions: the specimen found in the picture, or the picture except a rim."""
+GIVEN = "given"
+"""Only the gauges of the configuration; with ``AUTO``, others are placed too."""
+
 
 @dataclass(frozen=True, slots=True)
 class Check:
@@ -85,10 +97,6 @@ def number(low: float = -math.inf, high: float = math.inf) -> Check:
 def integer(low: int, high: int) -> Check:
     """A whole number within bounds."""
     return Check(lambda value: as_integer(value, low, high), int)
-
-
-_NUMBER = r"[-+]?(?:[0-9]+[.]?[0-9]*|[.][0-9]+)"
-_IN_MM = re.compile(rf"\s*({_NUMBER}(?:\s*,\s*{_NUMBER})*)\s*mm\s*")
 
 
 def length(check: Check, *, whole: bool = False) -> Check:
@@ -286,10 +294,8 @@ def _addresses(value: Any) -> tuple[str, ...]:
     return tuple(_text(one) for one in given)
 
 
-MAX_BESIDE = 7
 ADDRESSES = Check(_addresses)
 """Of further cameras: one, or several in brackets."""
-LENS_PARAMETERS = 8
 COVARIANCE = Check(_covariance)
 """Of the parameters of a lens."""
 SIGN = Check(_sign, int)
@@ -317,10 +323,6 @@ POINT = length(Check(_point))
 """x, y in px."""
 CORNERS = length(Check(_corners))
 """x, y in px of each corner of a polygon."""
-AUTO, ALL = REGIONS = ("auto", "all")
-"""Named regions: the specimen found in the picture, or the picture except a rim."""
-GIVEN = "given"
-"""Only the gauges of the configuration; with ``AUTO``, others are placed too."""
 REGION = length(Check(_region, _read_region), whole=True)
 """A box, or one of ``REGIONS``."""
 RECORD_MODE = Check(_record_mode)

@@ -3,7 +3,7 @@
 Results, view, status card and strain output are consumers. To write one, derive from ``Consumer``
 and define the methods you want; ``examples/second_consumer.py`` is one in ten lines.
 
-The interface of a screen: what every part of the program may print for a person.
+A ``Screen`` is what every part of the program may print for a person.
 """
 
 from __future__ import annotations

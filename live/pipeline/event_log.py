@@ -3,7 +3,7 @@
 A listener that is added later (the session is opened after the devices) gets the past events too, except
 the one event for each burst, and those that came again and again (``Repeats``): they would fill the memory.
 
-Events that come again and again: counted, and kept once.
+``Repeats`` counts these and keeps them once.
 """
 
 from __future__ import annotations

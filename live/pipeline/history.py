@@ -1,6 +1,6 @@
 """The history of a test: its time steps as columns, and the load axis found from them.
 
-Columns of numbers and texts that grow by the hour: the newest blocks in memory, the others in a temporary file.
+Columns of numbers and texts grow by the hour: their newest blocks are in memory, the others in a temporary file.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The state of a test at one time: what status line, status card, view and page show.
 
-The values of the output channels at a measurement or at any moment, with the newest force.
+The values of the output channels, at a measurement or at any moment with the newest force, come from it too.
 """
 
 from __future__ import annotations

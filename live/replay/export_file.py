@@ -21,24 +21,8 @@ from acquire.text import Message
 from acquire.text.message import counted
 from acquire.text.quantity import number as grouped
 from live.config.sections import LoadConfig
+from live.replay import export_text
 from live.replay.export_table import Table, blocks, cell_of, find_table, is_heading, is_remark
-from live.replay.export_text import (
-    CLOCK,
-    DATE,
-    EMPTY,
-    NUMBERISH,
-    Rows,
-    days_of,
-    decimal_mark,
-    is_value,
-    name_and_unit,
-    newtons_of,
-    numbers_in,
-    seconds_per,
-    time_of_day,
-    two_readings,
-    vote,
-)
 
 MAX_ROWS, MAX_NAMES = 20_000_000, 1_000_000
 _MARKS = {"point": ".", "comma": ","}
@@ -89,7 +73,7 @@ def read_export(file: BinaryIO, where: str, given: LoadConfig) -> Export:
         No text, no table, what has two readings, a cell that is no number, times that do not rise, too many rows.
     """
     table = find_table(file, where, given)
-    mark = _MARKS.get(given.decimal or "") or decimal_mark(
+    mark = _MARKS.get(given.decimal or "") or export_text.decimal_mark(
         (rows for _, rows in blocks(file, table, where)), table.key if table.by_name else None, where
     )
     reader = _Reader(table, mark, where, given)
@@ -115,8 +99,10 @@ class _Reader:
         self._dates: list[tuple[int, str]] = []  # rows from which a date holds
         self._n_texts, self._n_unread, self._other, self._first_text = 0, 0, "", ""
         force, _, time = (part.strip() for part in (given.unit or "").partition(","))
-        self._unit = force or name_and_unit(table.heads[table.force])[1]
-        self._time_unit = time or (name_and_unit(table.heads[table.key])[1] if table.key is not None else "")
+        self._unit = force or export_text.name_and_unit(table.heads[table.force])[1]
+        self._time_unit = time or (
+            export_text.name_and_unit(table.heads[table.key])[1] if table.key is not None else ""
+        )
         self._newtons, self._seconds = self._factors()
 
     def _factors(self) -> tuple[float, float]:
@@ -133,7 +119,7 @@ class _Reader:
             self._remarks.append(
                 Message("the force has no unit: taken as newtons; if it is another, give --load-unit kN")
             )
-        newtons, seconds = newtons_of(self._unit), seconds_per(self._time_unit or "s")
+        newtons, seconds = export_text.newtons_of(self._unit), export_text.seconds_per(self._time_unit or "s")
         if newtons is None:
             raise DataError(
                 "{where}: forces in {unit} are not known; give N, kN, kgf or lbf: --load-unit kN",
@@ -149,7 +135,7 @@ class _Reader:
             )
         return newtons, seconds or 1.0
 
-    def take(self, line: int, rows: Rows) -> None:
+    def take(self, line: int, rows: export_text.Rows) -> None:
         """Take the rows that begin at ``line``."""
         lines: Sequence[int] = range(line, line + len(rows))
         rows = self._of_width(lines, rows)
@@ -175,7 +161,7 @@ class _Reader:
                 *(self._where, grouped(MAX_ROWS), grouped(MAX_NAMES)),
             )
 
-    def _of_width(self, lines: Sequence[int], rows: Rows) -> Rows:
+    def _of_width(self, lines: Sequence[int], rows: export_text.Rows) -> export_text.Rows:
         """The same rows; what a comma that is the decimal mark too has cut is refused, or mended if that is given."""
         n, force = len(self._table.heads), self._table.force
         if max(map(len, rows)) <= n:
@@ -187,7 +173,7 @@ class _Reader:
                 for row in rows
             ]
         for number, row in zip(lines, rows, strict=True):
-            if any(cell.strip() for cell in row[n:]) and NUMBERISH.fullmatch(cell_of(row, force)):
+            if any(cell.strip() for cell in row[n:]) and export_text.NUMBERISH.fullmatch(cell_of(row, force)):
                 why = (
                     Message("is the comma the decimal mark too? give --load-decimal comma, or")
                     if commas
@@ -199,7 +185,7 @@ class _Reader:
                 )
         return rows
 
-    def _all_plain(self, rows: Rows) -> tuple[Sequence[Any], Sequence[float]] | None:
+    def _all_plain(self, rows: export_text.Rows) -> tuple[Sequence[Any], Sequence[float]] | None:
         """Times and forces where every row has both; None otherwise, for ``_values`` to tell row by row."""
         key, force = self._table.key, self._table.force
         if self._table.by_name or self._other or not self._forces:
@@ -219,7 +205,7 @@ class _Reader:
         return None if times is None or None in times else (times, forces)
 
     def _numbers(self, cells: Sequence[str]) -> Sequence[float] | None:
-        return numbers_in(cells, self._mark)
+        return export_text.numbers_in(cells, self._mark)
 
     def _number(self, cell: str) -> float | None:
         numbers = self._numbers([cell])
@@ -231,7 +217,7 @@ class _Reader:
             return None
         t = self._table
         value, key = cell_of(row, t.force), cell_of(row, t.key)
-        force = math.nan if value.lower() in EMPTY else self._number(value)
+        force = math.nan if value.lower() in export_text.EMPTY else self._number(value)
         at = (
             (key or None)
             if t.by_name
@@ -250,7 +236,7 @@ class _Reader:
             self._other = f"line {line}: another table begins ({', '.join(filter(None, texts))[:60]!r})"
         elif self._other:
             self._n_unread += 1
-        elif at is not None or is_value(key) or (not key and force is not None and value):
+        elif at is not None or export_text.is_value(key) or (not key and force is not None and value):
             bad = value if force is None else key
             shown = self._table.separator.join(row)[:60]
             raise DataError(
@@ -270,11 +256,11 @@ class _Reader:
     def _time(self, cell: str, row: Sequence[str]) -> float | tuple[str, float] | None:
         """A number, or the date and seconds since midnight."""
         if not self._forces and not self._is_clock:
-            self._is_clock = CLOCK.fullmatch(cell) is not None
+            self._is_clock = export_text.CLOCK.fullmatch(cell) is not None
         if not self._is_clock:
             return self._number(cell)
-        found, date = time_of_day(cell), cell_of(row, self._table.date)
-        return (date, found[1]) if found and not found[0] and DATE.fullmatch(date) else found
+        found, date = export_text.time_of_day(cell), cell_of(row, self._table.date)
+        return (date, found[1]) if found and not found[0] and export_text.DATE.fullmatch(date) else found
 
     def _since_midnight(self, found: Sequence[tuple[str, float]]) -> Array:
         """Seconds from dates and times of the day; a day more where the date is another, or without one falls."""
@@ -293,7 +279,7 @@ class _Reader:
 
     def _to_dates(self, times: Array) -> Array:
         """The same times, with the days that the dates are apart."""
-        days = days_of([date for _, date in self._dates])
+        days = export_text.days_of([date for _, date in self._dates])
         if days is None:
             raise DataError(
                 "{where}: the dates {first} to {last} do not rise, or can be read in two ways; give times in seconds:"
@@ -331,8 +317,8 @@ class _Reader:
         """Note whether the cells of a column prove their decimal mark, or could have groups of thousands."""
         for cell in cells:
             if self._mark in cell:
-                if NUMBERISH.fullmatch(cell):
-                    kinds[vote(cell)] = cell
+                if export_text.NUMBERISH.fullmatch(cell):
+                    kinds[export_text.vote(cell)] = cell
             elif "plain" not in kinds and not {".", ","} & {*cell} and self._number(cell):
                 kinds["plain"] = cell
 
@@ -356,7 +342,7 @@ class _Reader:
             )
         for kinds in self._kinds.values():
             if self._given.decimal is None and kinds.keys() >= {"?", "plain"} and self._mark not in kinds:
-                raise two_readings(self._where, kinds["?"])
+                raise export_text.two_readings(self._where, kinds["?"])
         times = self._to_dates(np.array(self._times)) if self._times else None
         clock = self._zero(times)
         return Export(

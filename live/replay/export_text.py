@@ -1,12 +1,8 @@
 """How the text of an export is read: its lines, its numbers, its headings.
 
-The text of an exported file: its encoding, its lines in blocks, and their cells.
-
-The form of the numbers and times in an exported file: decimal mark, groups of thousands, hours and minutes.
-
-What the heading of an exported column means: force, time, name of a picture or number of a row, and its unit.
-
-Names are those of common testing machines, in the languages of their programs; units stand in brackets, after a
+Lines come in blocks, after their encoding is known, and are cut into cells. Numbers and times have a form: decimal
+mark, groups of thousands, hours and minutes. A heading means force, time, name of a picture or number of a row. Names
+are those of common testing machines, in the languages of their programs; units stand in brackets, after a
 slash, comma, blank or underscore, or below the heading.
 """
 
@@ -44,6 +40,57 @@ _CONTROL = re.compile(r"[\x00-\x08\x0e-\x19\x1c-\x1f\x7f]")
 _JAPANESE = re.compile("荷重|試験力|時間|時刻")
 
 Rows = list[list[str]]
+
+_BETWEEN_THOUSANDS = " \u00a0\u2009\u202f'\u2019"
+_GROUPED = re.compile(
+    rf"(?>[-+]?(?:\d{{1,3}}(?:[,{_BETWEEN_THOUSANDS}]\d{{3}})+|\d+)(?:\.\d*)?(?:[eE][-+]?\d+)?\n)*+"
+)
+_PLAIN = str.maketrans("", "", "0123456789+-.eE\n")
+_TO_POINT = {".": str.maketrans("\u2212", "-"), ",": str.maketrans(".,\u2212", ",.-")}
+_NO_GROUPS = str.maketrans("", "", "," + _BETWEEN_THOUSANDS)
+NUMBERISH = re.compile(r"[-+\u2212]?[.,]?\d[\d.,'\u2019 \u00a0\u2009\u202f]*(?:[eE][-+]?\d+)?")
+"""A number in any form, not yet read."""
+CLOCK = re.compile(
+    r"(?:(\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[T ]+)?(?:(\d{1,3}):)?(\d{1,2}):(\d{1,2})(?:([.,:])(\d+))?"
+    r"\s*(?:([AaPp])\.?[Mm]\.?|Z|UTC|[-+]\d\d:?\d\d)?"
+)
+"""Date, hours, minutes, seconds, mark, fraction, A or P of a time of the day or an elapsed one."""
+DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
+EMPTY = ("", "nan", "-", "--", "---", "n/a", "#n/a", "#nv", "null", "1.#qnan", "-1.#ind")
+"""Cells without a force, in lower case."""
+
+_WORDS = {
+    "force": "force load f kraft last charge effort 荷重 試験力 力 fuerza carga forza carico"
+    " forca kracht siła сила усилие нагрузка 载荷 负荷 试验力 拉力 力值 하중",
+    "time": "time t seconds zeit temps duree 時間 tiempo tempo tijd tid czas время 时间 시간 x_value",
+    "clock": "timestamp date datum datetime uhrzeit heure clock 時刻 日時",
+    "date": "date datum fecha data 日付",
+    "name": "file filename picture image name bild bilddatei datei dateiname fichier photo ファイル 画像",
+    "row": "index no nr number point sample frame row nummer #",
+    "neutral": "axial axiale standard test tensile traction primary elapsed running measured actual applied cell"
+    " channel ch ai value signal d de essai der des gemessen",
+    "other": "max maximum maximal maximale peak min minimum break bruch rupture rate speed displacement extension"
+    " strain stress spannung contrainte position setpoint command demand target soll sollwert consigne error"
+    " temperature stiffness step line limit constant mode type unit drop",
+}
+"""The words of each kind, folded; of ``name`` and ``row`` they are the whole heading. ``other`` makes it none."""
+_ENDINGS = {
+    "force": ("kraft", "荷重", "試験力", "载荷", "负荷", "试验力"),
+    "time": ("zeit", "時間", "时间"),
+}
+_SECONDS = {
+    1.0: "s sec secs second seconds sek sekunde sekunden seconde secondes 秒",
+    1e-3: "ms msec millisecond milliseconds millisekunden",
+    1e-6: "us µs usec microsecond microseconds",
+    60.0: "min mins minute minutes minuten 分",
+    3600.0: "h hr hour hours std stunde stunden heure heures",
+}
+_ALIASES = {
+    "newton": "N", "newtons": "N", "kilonewton": "kN", "kilonewtons": "kN", "kip": "klbf", "kips": "klbf",
+}  # fmt: skip
+_BRACKETS = re.compile(r"(.*?)\s*[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]\s*")
+_BARE = re.compile(r"(.*?)(?:\s*[/,|]\s*|[\s_]+(?:in\s+)?)([^\s/,|_]+)")
+_LONGEST_UNIT = 8
 
 
 def encoding_of(file: BinaryIO, where: str) -> str:
@@ -108,25 +155,6 @@ def split_rows(lines: list[str], separator: str) -> tuple[Rows, int | None]:
         rows += [[]] * (reader.line_num - 1 - len(rows))
         rows.append(row)
     return rows, broken
-
-
-_BETWEEN_THOUSANDS = " \u00a0\u2009\u202f'\u2019"
-_GROUPED = re.compile(
-    rf"(?>[-+]?(?:\d{{1,3}}(?:[,{_BETWEEN_THOUSANDS}]\d{{3}})+|\d+)(?:\.\d*)?(?:[eE][-+]?\d+)?\n)*+"
-)
-_PLAIN = str.maketrans("", "", "0123456789+-.eE\n")
-_TO_POINT = {".": str.maketrans("\u2212", "-"), ",": str.maketrans(".,\u2212", ",.-")}
-_NO_GROUPS = str.maketrans("", "", "," + _BETWEEN_THOUSANDS)
-NUMBERISH = re.compile(r"[-+\u2212]?[.,]?\d[\d.,'\u2019 \u00a0\u2009\u202f]*(?:[eE][-+]?\d+)?")
-"""A number in any form, not yet read."""
-CLOCK = re.compile(
-    r"(?:(\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[T ]+)?(?:(\d{1,3}):)?(\d{1,2}):(\d{1,2})(?:([.,:])(\d+))?"
-    r"\s*(?:([AaPp])\.?[Mm]\.?|Z|UTC|[-+]\d\d:?\d\d)?"
-)
-"""Date, hours, minutes, seconds, mark, fraction, A or P of a time of the day or an elapsed one."""
-DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}")
-EMPTY = ("", "nan", "-", "--", "---", "n/a", "#n/a", "#nv", "null", "1.#qnan", "-1.#ind")
-"""Cells without a force, in lower case."""
 
 
 def is_value(cell: str) -> bool:
@@ -240,40 +268,6 @@ def time_of_day(cell: str) -> tuple[str, float] | None:
         return None  # 12:30 and 12:30:15:04
     hours = int(h or 0) % (12 if half else 1000) + 12 * (half in ("p", "P"))
     return date or "", 3600.0 * hours + 60.0 * int(m) + float(f"{s}.{fraction or 0}")
-
-
-_WORDS = {
-    "force": "force load f kraft last charge effort 荷重 試験力 力 fuerza carga forza carico"
-    " forca kracht siła сила усилие нагрузка 载荷 负荷 试验力 拉力 力值 하중",
-    "time": "time t seconds zeit temps duree 時間 tiempo tempo tijd tid czas время 时间 시간 x_value",
-    "clock": "timestamp date datum datetime uhrzeit heure clock 時刻 日時",
-    "date": "date datum fecha data 日付",
-    "name": "file filename picture image name bild bilddatei datei dateiname fichier photo ファイル 画像",
-    "row": "index no nr number point sample frame row nummer #",
-    "neutral": "axial axiale standard test tensile traction primary elapsed running measured actual applied cell"
-    " channel ch ai value signal d de essai der des gemessen",
-    "other": "max maximum maximal maximale peak min minimum break bruch rupture rate speed displacement extension"
-    " strain stress spannung contrainte position setpoint command demand target soll sollwert consigne error"
-    " temperature stiffness step line limit constant mode type unit drop",
-}
-"""The words of each kind, folded; of ``name`` and ``row`` they are the whole heading. ``other`` makes it none."""
-_ENDINGS = {
-    "force": ("kraft", "荷重", "試験力", "载荷", "负荷", "试验力"),
-    "time": ("zeit", "時間", "时间"),
-}
-_SECONDS = {
-    1.0: "s sec secs second seconds sek sekunde sekunden seconde secondes 秒",
-    1e-3: "ms msec millisecond milliseconds millisekunden",
-    1e-6: "us µs usec microsecond microseconds",
-    60.0: "min mins minute minutes minuten 分",
-    3600.0: "h hr hour hours std stunde stunden heure heures",
-}
-_ALIASES = {
-    "newton": "N", "newtons": "N", "kilonewton": "kN", "kilonewtons": "kN", "kip": "klbf", "kips": "klbf",
-}  # fmt: skip
-_BRACKETS = re.compile(r"(.*?)\s*[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]\s*")
-_BARE = re.compile(r"(.*?)(?:\s*[/,|]\s*|[\s_]+(?:in\s+)?)([^\s/,|_]+)")
-_LONGEST_UNIT = 8
 
 
 def _folded(text: str) -> str:

@@ -249,7 +249,12 @@ class _Run:
     def measure(self, measured: Iterable[Measurement], stream: Stream) -> float:
         """Publish what was recorded and all that is measured; returns the time that it took, s."""
         began = time.perf_counter()
-        _publish_recorded(self.source, stream)
+        # Publish the recorded events and load samples.
+        for event in self.source.events:
+            if event.kind is not EventKind.MEASURED:
+                stream.publish(event)
+        for sample in self.source.samples if stream.wants(LoadSample) else ():
+            stream.publish(sample)
         for m in measured:
             self.run_state.frame_counts.add(measured=m.burst.n)
             if stream.wants(Frame):
@@ -377,12 +382,3 @@ def _after(first: list[Work], rest: Iterator[Work]) -> Iterator[Work]:
     while first:
         yield first.pop()
     yield from rest
-
-
-def _publish_recorded(source: ReplaySource, stream: Stream) -> None:
-    """Publish the recorded events and load samples."""
-    for event in source.events:
-        if event.kind is not EventKind.MEASURED:
-            stream.publish(event)
-    for sample in source.samples if stream.wants(LoadSample) else ():
-        stream.publish(sample)

@@ -23,6 +23,11 @@ from acquire.load_sample import LoadSample
 from acquire.text import Message, counts
 from live.pipeline.measure import NewReference
 
+Work = Burst | NewReference
+
+Item = TypeVar("Item")
+_POLL_S = 0.1
+
 
 @dataclass(frozen=True, slots=True)
 class ReplayRequest:
@@ -60,9 +65,6 @@ class ReplayRequest:
     numbers: range | None = None
     parts: Sequence[Path] = ()
     final_folder: Path | None = None
-
-
-Work = Burst | NewReference
 
 
 class PictureCount:
@@ -183,10 +185,6 @@ class Window:
             raise DataError(
                 "no burst lies between --from and --to; the last one is at {last:.3f} s", last - self.origin
             )
-
-
-Item = TypeVar("Item")
-_POLL_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,6 +38,12 @@ MIN_STILL, MIN_LOADED = MIN_STILL_INSTANTS, 2
 Seconds = tuple[float, float]
 Array = NDArray[np.float64]
 
+NO_WINDOW: Seconds = (math.inf, -math.inf)
+"""The still window of a test without a still phase."""
+
+KEPT_SHARE = 0.95  # of the largest strain
+SIGNIFICANT = 3.0  # sigmas above which a strain is more than noise
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Windows:
@@ -51,10 +57,6 @@ class Windows:
 
     still: tuple[Burst, ...]
     loaded: tuple[Burst, ...]
-
-
-NO_WINDOW: Seconds = (math.inf, -math.inf)
-"""The still window of a test without a still phase."""
 
 
 def take_windows(source: ReplaySource, still: Seconds | None, loaded: Seconds | None) -> Windows:
@@ -135,10 +137,6 @@ def _loaded(source: ReplaySource) -> Seconds:
 def _spread(bursts: Sequence[Burst], most: int) -> tuple[Burst, ...]:
     """At most ``most`` of them, evenly."""
     return tuple(bursts[row] for row in evenly(len(bursts), most))
-
-
-KEPT_SHARE = 0.95  # of the largest strain
-SIGNIFICANT = 3.0  # sigmas above which a strain is more than noise
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,6 +38,8 @@ LOG = "errors.log"
 """In the folder of the run: the traceback of each burst that failed."""
 MAX_TRACEBACKS = 100
 
+_DIGITS = ("numba", "numpy", "machine", "processor", "vectors", "loops")
+
 
 def versions() -> dict[str, str]:
     """Versions of phasedic, Python and the libraries, what the last digits depend on, and the threading library."""
@@ -60,9 +62,6 @@ def installed_versions() -> dict[str, str]:
         except PackageNotFoundError:
             found[name] = Message("not installed")
     return found
-
-
-_DIGITS = ("numba", "numpy", "machine", "processor", "vectors", "loops")
 
 
 def differing_versions(then: Mapping[str, Any]) -> list[str]:

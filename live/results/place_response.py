@@ -1,10 +1,7 @@
 """The response of each place from the maps of a finished ``strain.h5``, which has the group for it.
 
-Its instants are read one by one: for where places leave their lines, then for the lines up to there.
-
-The response of the places in words, for summary, report, maps and exports.
-
-What the response of the places is over: a channel of a finished run, and the instants that count.
+It is over a channel of the run, at the instants that count. These are read one by one: for where places leave their
+lines, then for the lines up to there. Summary, report, maps and exports have it in words from here.
 """
 
 from __future__ import annotations
@@ -34,6 +31,12 @@ from live.results.reader import Strain
 from live.results.run_folder import STRAIN, RunFolder, open_run
 from live.results.stored_fields import window_of
 from live.results.stored_response import FATE, StoredResponse, fill_group, read_noise
+
+Floats = NDArray[np.float64]
+
+UP_TO = 0.9
+"""Of where a place leaves its line, its line ends: the last instants before that is seen may be off already."""
+_OF_STRAIN = ("strain", "lens", "blur", "film")  # causes in the budget of E that do not come with the stress
 
 
 def response_title(strain: Strain, name: str) -> str:
@@ -129,9 +132,6 @@ def _side(strain: Strain, found: StoredResponse) -> str:
     return Message("ZOI {size} px, VSG {vsg:.0f} px", strain.grid.size, found.vsg_px)
 
 
-Floats = NDArray[np.float64]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
     """What the strains of the places are held against.
@@ -200,11 +200,6 @@ def check_channel(config: Config, *, forces: bool) -> None:
     if name not in ("", *CHANNELS, *config.gauges):
         known = ", ".join((*CHANNELS, *config.gauges))
         raise ConfigError("--response {name}: there is no such gauge; give one of {known}", name, known)
-
-
-UP_TO = 0.9
-"""Of where a place leaves its line, its line ends: the last instants before that is seen may be off already."""
-_OF_STRAIN = ("strain", "lens", "blur", "film")  # causes in the budget of E that do not come with the stress
 
 
 def response_of(

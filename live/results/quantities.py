@@ -18,6 +18,21 @@ from live.config.figures import FIGURES
 
 UNITLESS = ""
 
+_GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
+_STRAINS = {*_GRADIENTS, *(one.plain for one in FIGURES if one.column and one.kind == "strain")}
+# One index y (of place or of displacement) changes the sign, two restore it.
+_TURNING = ("v", "exy", "du_dy", "dv_dx", "y")
+
+_GAUGE, _SHARE = "gauge_", "share_gauge_"
+
+MEANS = {
+    name: name.removesuffix(f"_{one.unit}")
+    for one in FIGURES
+    if one.column and one.unit
+    for name in one.columns
+}
+"""Column of ``Strain.values`` with the unit in its name -> quantity; other columns have the name of their quantity."""
+
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
@@ -51,11 +66,6 @@ class Quantity:
         """Changes its sign when the y axis is turned upwards."""
         return self.name in _TURNING
 
-
-_GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
-_STRAINS = {*_GRADIENTS, *(one.plain for one in FIGURES if one.column and one.kind == "strain")}
-# One index y (of place or of displacement) changes the sign, two restore it.
-_TURNING = ("v", "exy", "du_dy", "dv_dx", "y")
 
 _FIELDS = (
     Quantity("u", "px", "displacement along x since the reference", "displacement along x (right)"),
@@ -103,18 +113,9 @@ _PLACES = (
     Quantity("column", UNITLESS, "column of the ZOI in the grid, from 0"),
     Quantity("instant", UNITLESS, "number of the measurement in strain.h5, from 0"),
 )
-_GAUGE, _SHARE = "gauge_", "share_gauge_"
 KNOWN = {q.name: q for q in (*_FIELDS, *_RESPONSES, *_PLACES)} | {
     one.plain: Quantity(one.plain, one.unit, one.words) for one in FIGURES if one.column and one.words
 }
-
-MEANS = {
-    name: name.removesuffix(f"_{one.unit}")
-    for one in FIGURES
-    if one.column and one.unit
-    for name in one.columns
-}
-"""Column of ``Strain.values`` with the unit in its name -> quantity; other columns have the name of their quantity."""
 
 
 def quantity_of(name: str) -> Quantity:

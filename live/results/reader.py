@@ -15,35 +15,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire import hdf5
 from acquire.errors import ConfigError, DataError
-from acquire.hdf5 import (
-    DAMAGE,
-    JsonField,
-    as_text,
-    check_format,
-    check_links,
-    check_object,
-    check_size,
-    open_dataset,
-    open_datasets,
-    open_file,
-    open_group,
-    probe,
-    read_attributes,
-    read_object,
-    read_scalar,
-    read_superblock,
-    stored_rows,
-)
 from acquire.opening import Closing
-from acquire.text.message import Message, about, word
+from acquire.text.message import Message, word
 from analysis.field import ZoiGrid
 from live.results import layout
 from live.results.quantities import Display, mean_name, quantity_of
 from live.results.stored_response import StoredResponse, read_response
 
 _log = logging.getLogger(__name__)
-_LENGTH, _POSITION = JsonField(int, 1, layout.MAX_SIDE_PX), JsonField(int, 0, layout.MAX_SIDE_PX)
+_ROUNDING_S = 1e-6  # of times that were typed
+_LENGTH, _POSITION = hdf5.JsonField(int, 1, layout.MAX_SIDE_PX), hdf5.JsonField(int, 0, layout.MAX_SIDE_PX)
 
 
 class Strain(Closing):
@@ -75,19 +58,19 @@ class Strain(Closing):
 
     def __init__(self, path: Path, file: Any, *, unfinished: bool) -> None:
         self.path, self._file, self.unfinished = path, file, unfinished
-        root = read_attributes(file, layout.ROOT)
-        check_links(file)
-        entry = open_group(file, "entry")
-        strain, mean = open_group(entry, "strain"), open_group(entry, "mean")
-        self.start_utc = as_text(root["start_time"])
-        described = read_attributes(strain, layout.STRAIN)
-        self.strain_measure = as_text(described["strain_measure"])
+        root = hdf5.read_attributes(file, layout.ROOT)
+        hdf5.check_links(file)
+        entry = hdf5.open_group(file, "entry")
+        strain, mean = hdf5.open_group(entry, "strain"), hdf5.open_group(entry, "mean")
+        self.start_utc = hdf5.as_text(root["start_time"])
+        described = hdf5.read_attributes(strain, layout.STRAIN)
+        self.strain_measure = hdf5.as_text(described["strain_measure"])
         self.grid = _grid(strain, described["grid"], path)
         self.config, self.metadata, self.versions = (
-            read_object(item[()], f"{path}: {name}")
-            for name, item in open_datasets(entry, layout.TEXTS).items()
+            hdf5.read_object(item[()], f"{path}: {name}")
+            for name, item in hdf5.open_datasets(entry, layout.TEXTS).items()
         )
-        self._maps = open_datasets(strain, layout.maps(self.grid.shape))
+        self._maps = hdf5.open_datasets(strain, layout.maps(self.grid.shape))
         self.names = tuple(self._maps)
         self._references = _references(entry, self.grid.shape)
         self.response: StoredResponse | None = read_response(entry, self.grid.shape)
@@ -108,12 +91,12 @@ class Strain(Closing):
         """
         file, unfinished = _open(path, probed)
         try:
-            check_format(path, file, layout.ROOT, layout.FORMAT, layout.FORMAT_VERSION)
+            hdf5.check_format(path, file, layout.ROOT, layout.FORMAT, layout.FORMAT_VERSION)
             return cls(path, file, unfinished=unfinished)
         except DataError:
             file.close()
             raise
-        except DAMAGE as error:
+        except hdf5.DAMAGE as error:
             file.close()
             raise DataError(
                 "{path}: is damaged ({why}); make it again with phasedic replay", path, error
@@ -123,6 +106,38 @@ class Strain(Closing):
     def whole_names(self) -> tuple[str, ...]:
         """Maps of the whole test: those of ``response``."""
         return () if self.response is None else self.response.names
+
+    def check_measured(self) -> None:
+        """Raises DataError where there is no row."""
+        if not self.n:
+            raise DataError("{path}: holds no measurement", self.path)
+
+    def rows_between(self, start_s: float | None, end_s: float | None, options: str) -> tuple[int, ...]:
+        """The rows between two times, s since the start of the test, both included.
+
+        Parameters
+        ----------
+        start_s, end_s : float or None, s
+        options : str
+            Which give them, for the message.
+
+        Raises
+        ------
+        ConfigError
+            There is none.
+        DataError
+            The file holds no measurement.
+        """
+        self.check_measured()
+        t = self.time_s
+        low, high = -np.inf if start_s is None else start_s, np.inf if end_s is None else end_s
+        rows = np.flatnonzero((t >= low - _ROUNDING_S) & (t <= high + _ROUNDING_S))
+        if not rows.size:
+            raise ConfigError(
+                "{options}: no measurement between {low:g} and {high:g} s; the test has {first:.6g} to {last:.6g} s",
+                *(options, low, high, t[0], t[-1]),
+            )
+        return tuple(rows.tolist())
 
     def maps(self, name: str, row: int | slice = slice(None)) -> NDArray[Any]:
         """(T, R, C) maps of ``name`` (see ``names``), or the (R, C) map of one row.
@@ -138,12 +153,8 @@ class Strain(Closing):
                 "{path}: no map {name}; there are {known}", self.path, repr(name), ", ".join(names)
             )
         if isinstance(row, int) and not -self.n <= row < self.n:
-            there = (
-                Message("no row {row}; there are {n}", row, self.n)
-                if self.n
-                else Message("holds no measurement")
-            )
-            raise DataError(about(self.path, there))
+            self.check_measured()
+            raise DataError("{path}: no row {row}; there are {n}", self.path, row, self.n)
         rows = range(self.n)[row]
         try:
             if self.response is not None and name in self.response.names:
@@ -248,12 +259,12 @@ def _open(path: Path, probed: bool) -> tuple[Any, bool]:
         raise DataError("{path}: no such file; phasedic run and replay write a strain.h5 into --out", path)
     if not path.is_file() or not h5py.is_hdf5(path):
         raise DataError("{path}: is not an HDF5 file; give a strain.h5 of phasedic", path)
-    block = read_superblock(path)
-    check_size(path, block)
+    block = hdf5.read_superblock(path)
+    hdf5.check_size(path, block)
     if block.unfinished and not probed:
-        probe(path, "live.results")
+        hdf5.probe(path, "live.results")
     try:
-        file = open_file(path, swmr=block.unfinished)
+        file = hdf5.open_file(path, swmr=block.unfinished)
     except (OSError, RuntimeError) as error:
         raise DataError(
             "{path}: cannot be opened ({why}); make it again with phasedic replay", path, error
@@ -266,12 +277,12 @@ def _open(path: Path, probed: bool) -> tuple[Any, bool]:
 def _grid(strain: Any, text: Any, path: Path) -> ZoiGrid:
     """The grid; its description and the arrays in the file must agree."""
     where = f"{path}: the grid"
-    described = read_object(text, where)
-    check_object(described, {"roi": JsonField(dict), "size": _LENGTH, "step": _LENGTH}, where)
-    check_object(
+    described = hdf5.read_object(text, where)
+    hdf5.check_object(described, {"roi": hdf5.JsonField(dict), "size": _LENGTH, "step": _LENGTH}, where)
+    hdf5.check_object(
         described["roi"], {"x": _POSITION, "y": _POSITION, "width": _LENGTH, "height": _LENGTH}, where
     )
-    active = open_dataset(strain, "active", layout.GRID["active"])
+    active = hdf5.open_dataset(strain, "active", layout.GRID["active"])
     shape = tuple(
         (described["roi"][name] - described["size"]) // described["step"] + 1 for name in ("height", "width")
     )
@@ -280,9 +291,9 @@ def _grid(strain: Any, text: Any, path: Path) -> ZoiGrid:
             "{where} is described as {shape} ZOIs, but {found} are there; make it again",
             *(where, shape, active.shape),
         )
-    grid = ZoiGrid.from_dict(described, read_scalar(active, layout.GRID["active"]).astype(bool))
+    grid = ZoiGrid.from_dict(described, hdf5.read_scalar(active, layout.GRID["active"]).astype(bool))
     for name, places in (("x", grid.x), ("y", grid.y)):
-        if not np.array_equal(open_dataset(strain, name, layout.GRID[name])[()], places):
+        if not np.array_equal(hdf5.open_dataset(strain, name, layout.GRID[name])[()], places):
             raise DataError(
                 "{where} has other centres {name} than its description; make it again", where, name
             )
@@ -293,7 +304,7 @@ def _references(entry: Any, shape: tuple[int, int]) -> dict[str, Any]:
     """What is stored of each reference; nothing in files of earlier versions."""
     if layout.REFERENCES not in entry:
         return {}
-    return open_datasets(open_group(entry, layout.REFERENCES), layout.references(shape))
+    return hdf5.open_datasets(hdf5.open_group(entry, layout.REFERENCES), layout.references(shape))
 
 
 def _columns(mean: Any) -> dict[str, Any]:
@@ -301,12 +312,12 @@ def _columns(mean: Any) -> dict[str, Any]:
     declared = {*layout.REQUIRED, *(name for name in mean if name in layout.KNOWN)}
     known = {name: layout.column(name) for name in declared}
     present = (name for name in mean if not name.endswith(layout.ERRORS))
-    return open_datasets(mean, dict.fromkeys(present, layout.ANY_COLUMN) | known)
+    return hdf5.open_datasets(mean, dict.fromkeys(present, layout.ANY_COLUMN) | known)
 
 
 def _rows(path: Path, datasets: Sequence[Any], *, whole: bool) -> int:
     """Whole rows; a kill may fall between two datasets of one."""
-    lengths = {stored_rows(item) for item in datasets}
+    lengths = {hdf5.stored_rows(item) for item in datasets}
     if whole and lengths | {len(item) for item in datasets} != {min(lengths)}:
         raise DataError(
             "{path}: its maps and columns are not of one length; make it again with phasedic replay", path

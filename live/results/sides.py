@@ -1,10 +1,7 @@
-"""Front and back of one specimen: two runs put together, their folders and clocks, and channels while they run.
+"""Front and back of one specimen put together: mean and bending of each strain, and the figures of the mean.
 
-The folder of a test with several cameras, which holds one of each, and the clocks of two runs.
-
-Front and back of the specimen put together: mean and bending of each strain, and the figures of the mean.
-
-The two sides come from two finished runs of one test, or from a test that still runs.
+The two sides come from two finished runs of one test, or from a test that still runs (``JointChannels``). The folder of
+a test with several cameras holds one of each; the clocks of two runs are put on one.
 """
 
 from __future__ import annotations
@@ -46,6 +43,11 @@ from live.results.run_folder import SESSION, STRAIN, RunFolder
 
 LATE_S = 1.0
 """A side that is behind the other by more than this, and by more than a usual gap, gives no strains."""
+
+CLOCKS_AGREE_S = 2.0  # the clock of the day may have been set in between
+
+LONGEST_GAP = 5.0  # times the usual distance of the instants of the back
+_RECENT = 12  # time steps of each side that the newest instant of both is found in
 
 
 class JointChannels:
@@ -110,9 +112,6 @@ def _channels(name: str, one: JointStrain) -> dict[str, float]:
     return {f"mean_{name}": one.mean, f"bending_{name}": one.bending, f"sigma_mean_{name}": one.sigma}
 
 
-CLOCKS_AGREE_S = 2.0  # the clock of the day may have been set in between
-
-
 def cameras_in(folder: Path) -> tuple[str, ...]:
     """The names of the cameras, where ``folder`` is that of a test with several; else none."""
     return () if (folder / STRAIN).exists() else _with(folder, STRAIN)
@@ -157,10 +156,6 @@ def shift_s(front: RunFolder, back: RunFolder) -> float:
             abs(by_machine - by_day),
         )
     return by_machine
-
-
-LONGEST_GAP = 5.0  # times the usual distance of the instants of the back
-_RECENT = 12  # time steps of each side that the newest instant of both is found in
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -38,6 +38,8 @@ Item = TypeVar("Item")
 _GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
 _DU_DY, _DV_DX = 2, 4  # of u, du_dx, du_dy, v, dv_dx, dv_dy
 
+Image = NDArray[Any]
+
 
 class Readings:
     """Times (s) and forces (N).
@@ -216,9 +218,6 @@ def length_between(strain: Strain, axis: Literal["x", "y"], described: Mapping[s
             return math.nan
         ends, along = gauge.zois(strain.grid), gauge.along if isinstance(gauge, ExtensionGauge) else ""
     return distance(strain.grid, (along and facing(ends, along)) or ends)
-
-
-Image = NDArray[Any]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,27 +13,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire import hdf5
 from acquire.errors import DataError
-from acquire.hdf5 import (
-    Declared,
-    as_text,
-    new_datasets,
-    new_group,
-    open_datasets,
-    open_file,
-    open_group,
-    read_attributes,
-    reason,
-)
 from acquire.text.message import printable
 from live.pipeline.timed.course import leaves_name, slope_name
 from live.results.quantities import quantity_of
 
 GROUP, CURRENT, CORRELATION, FATE = "response", "current", "correlation", "fate"
 ATTRIBUTES = {
-    "channel": Declared("text"), "strain": Declared("text"), "instants": Declared("int", (), 0),
-    "first": Declared("f8"), "last": Declared("f8"), "common": Declared("f8", (), 0), "vsg_px": Declared("f8", (), 0),
+    "channel": hdf5.Declared("text"), "strain": hdf5.Declared("text"), "instants": hdf5.Declared("int", (), 0),
+    "first": hdf5.Declared("f8"), "last": hdf5.Declared("f8"), "common": hdf5.Declared("f8", (), 0),
+    "vsg_px": hdf5.Declared("f8", (), 0),
 }  # fmt: skip
+
+_NOISE = (CURRENT, CORRELATION)
 
 
 def map_names(channel: str) -> tuple[str, ...]:
@@ -43,22 +36,19 @@ def map_names(channel: str) -> tuple[str, ...]:
     return (*first, *((leaves,) if leaves else ()), FATE)
 
 
-_NOISE = (CURRENT, CORRELATION)
-
-
-def _items(names: Iterable[str], shape: tuple[int, int]) -> dict[str, Declared]:
+def _items(names: Iterable[str], shape: tuple[int, int]) -> dict[str, hdf5.Declared]:
     """Maps of these names, (R, C), and what the writer notes of noise."""
     shapes = {CURRENT: (None,), CORRELATION: (None, *shape)}
     about = {name: quantity_of(name) for name in names}
     return {
-        name: Declared(
+        name: hdf5.Declared(
             "f4", shapes.get(name, shape), unit=one.unit, long_name=one.words, missing=np.nan, rows=0
         )
         for name, one in about.items()
     }
 
 
-def items(channel: str, shape: tuple[int, int]) -> dict[str, Declared]:
+def items(channel: str, shape: tuple[int, int]) -> dict[str, hdf5.Declared]:
     """All datasets of a response over ``channel``."""
     return _items((*map_names(channel), *_NOISE), shape)
 
@@ -66,11 +56,11 @@ def items(channel: str, shape: tuple[int, int]) -> dict[str, Declared]:
 def add_group(entry: Any, channel: str, shape: tuple[int, int]) -> None:
     """Make the group, without values, after ``strain``."""
     title = f"Response of each place over {channel}"
-    group = new_group(
+    group = hdf5.new_group(
         entry, GROUP, "NXdata", signal=slope_name(channel), title=title, channel=channel, strain="eyy"
     )
     group.attrs.update(axes=["y", "x"], instants=0, first=np.nan, last=np.nan, common=0.0, vsg_px=0.0)
-    new_datasets(group, items(channel, shape), fixed=False)
+    hdf5.new_datasets(group, items(channel, shape), fixed=False)
     for name in ("x", "y"):
         group[name] = entry[f"strain/{name}"]
 
@@ -78,9 +68,9 @@ def add_group(entry: Any, channel: str, shape: tuple[int, int]) -> None:
 def read_noise(path: Path, n: int, shape: tuple[int, int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """What the writer noted: share of the variance of strains that is not of the reference at each instant, (n,), 1
     where it is not known, and correlation of the noises of exx and eyy against each reference, (J, R, C)."""
-    with open_file(path) as file:
+    with hdf5.open_file(path) as file:
         group = file["entry"][GROUP]
-        noise = open_datasets(group, _items(_NOISE, shape))
+        noise = hdf5.open_datasets(group, _items(_NOISE, shape))
         held, both = noise[CURRENT][:n].astype(np.float64), noise[CORRELATION][()].astype(np.float64)
     share = np.pad(held, (0, n - len(held)), constant_values=np.nan)
     return np.where((share > 0) & (share <= 1), share, 1.0), np.where(np.abs(both) < 1, both, 0.0)
@@ -95,7 +85,7 @@ def fill_group(path: Path, maps: Mapping[str, NDArray[Any]], about: Mapping[str,
         It cannot be written.
     """
     try:
-        with open_file(path, "r+", libver=("v110", "v110")) as file:
+        with hdf5.open_file(path, "r+", libver=("v110", "v110")) as file:
             group = file["entry"][GROUP]
             for name, values in maps.items():
                 group[name][...] = values
@@ -103,7 +93,7 @@ def fill_group(path: Path, maps: Mapping[str, NDArray[Any]], about: Mapping[str,
                 kept = group.attrs[name]
                 group.attrs.modify(name, np.asarray(value, kept.dtype))
     except (OSError, RuntimeError, KeyError) as error:
-        raise DataError("{path}: the response cannot be written ({why})", path, reason(error)) from error
+        raise DataError("{path}: the response cannot be written ({why})", path, hdf5.reason(error)) from error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,17 +142,17 @@ def read_response(entry: Any, shape: tuple[int, int]) -> StoredResponse | None:
     """
     if GROUP not in entry:
         return None
-    group = open_group(entry, GROUP)
-    channel, strain, instants, first, last, common, vsg_px = read_attributes(group, ATTRIBUTES).values()
-    if as_text(strain) not in ("exx", "eyy"):
+    group = hdf5.open_group(entry, GROUP)
+    channel, strain, instants, first, last, common, vsg_px = hdf5.read_attributes(group, ATTRIBUTES).values()
+    if hdf5.as_text(strain) not in ("exx", "eyy"):
         raise DataError(
             "{path}: {group}/@strain is {value}; make it again",
             entry.file.filename,
             GROUP,
-            repr(printable(as_text(strain))),
+            repr(printable(hdf5.as_text(strain))),
         )
-    channel = printable(as_text(channel))
-    maps = open_datasets(group, _items(map_names(channel), shape))
+    channel = printable(hdf5.as_text(channel))
+    maps = hdf5.open_datasets(group, _items(map_names(channel), shape))
     if not instants:
         return None
     return StoredResponse(

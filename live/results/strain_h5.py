@@ -17,21 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire import hdf5
 from acquire.clock import Clock
 from acquire.errors import DataError
-from acquire.hdf5 import (
-    FlushTimer,
-    GrowingDataset,
-    PictureStack,
-    RowTable,
-    abandon_file,
-    create_file,
-    new_datasets,
-    new_group,
-    reason,
-    set_attributes,
-    storable,
-)
 from acquire.text import Message
 from acquire.text.message import counted
 from analysis.evaluate import load_axis
@@ -78,16 +66,19 @@ class StrainWriter:
     ) -> None:
         self._path, self.failed, self._axis = path, False, info.axis
         self._flushed = 0  # rows
-        self._timer = FlushTimer(flush_s, now)
+        self._timer = hdf5.FlushTimer(flush_s, now)
         with self._guard():
-            self._file = create_file(path, lambda file: _declare(file, grid, info))
+            self._file = hdf5.create_file(path, lambda file: _declare(file, grid, info))
         entry = self._file["entry"]
-        self._maps = {n: PictureStack(entry["strain"][n]) for n in layout.maps(grid.shape)}
-        self._values = RowTable(entry["mean"], list(layout.mean(info.gauges, info.extras)))
+        self._maps = {n: hdf5.PictureStack(entry["strain"][n]) for n in layout.maps(grid.shape)}
+        self._values = hdf5.RowTable(entry["mean"], list(layout.mean(info.gauges, info.extras)))
         references = entry[layout.REFERENCES]
-        self._normal, self._first_row = PictureStack(references[layout.NORMAL]), references[layout.FIRST_ROW]
+        self._normal, self._first_row = (
+            hdf5.PictureStack(references[layout.NORMAL]),
+            references[layout.FIRST_ROW],
+        )
         of_response = (CURRENT, CORRELATION) if info.response else ()
-        self._noise = [GrowingDataset(entry[GROUP][name]) for name in of_response]
+        self._noise = [hdf5.GrowingDataset(entry[GROUP][name]) for name in of_response]
         self._grid = grid
         self._pattern: Sums | None = None
 
@@ -114,11 +105,13 @@ class StrainWriter:
     def close(self) -> None:
         """Close the file; after a failed write, leave it as it is on the disk."""
         if self.failed:
-            abandon_file(self._file)
+            hdf5.abandon_file(self._file)
         else:
             with self._guard():
                 self._flush()
-                self._write_default_slice()
+                # Viewers begin with the last instant; with the first, where the file was never closed.
+                shown = _slice_of(max(self._values.length - 1, 0))
+                self._file["entry/strain"].attrs.modify("default_slice", shown)
                 self._write_axis()
                 self._file.close()
 
@@ -126,7 +119,9 @@ class StrainWriter:
         values = self._values.row(row.values)
         if row.pattern is not None and row.pattern is not self._pattern:
             self._pattern = row.pattern
-            self._append_normal(normal_matrices(row.pattern, self._grid))
+            self._normal.append(normal_matrices(row.pattern, self._grid))
+            self._first_row.resize((self._normal.length,))
+            self._first_row[-1] = next(iter(self._maps.values())).length
             if row.noise is not None:
                 self._noise[1].append(row.noise[1][None].astype(np.float32))
         for name, stored in rounded(row.maps).items():
@@ -135,22 +130,12 @@ class StrainWriter:
             self._noise[0].append(np.array([row.noise[0]], np.float32))
         self._values.hold(values)
 
-    def _append_normal(self, normal: NDArray[np.float32]) -> None:
-        self._normal.append(normal)
-        self._first_row.resize((self._normal.length,))
-        self._first_row[-1] = next(iter(self._maps.values())).length
-
     def _flush(self) -> None:
         self._timer.began()
         self._values.write()
         self._file.flush()
         self._timer.done()
         self._flushed = self._values.length
-
-    def _write_default_slice(self) -> None:
-        """Viewers begin with the last instant; with the first, where the file was never closed."""
-        shown = _slice_of(max(self._values.length - 1, 0))
-        self._file["entry/strain"].attrs.modify("default_slice", shown)
 
     def _write_axis(self) -> None:
         """The axis of the load, and the angle from it to the largest strain, found from all means."""
@@ -175,7 +160,7 @@ class StrainWriter:
         return DataError(
             "{path}: cannot be written ({why}){kept}; make room on the disk or choose another --out",
             self._path,
-            reason(error),
+            hdf5.reason(error),
             kept,
         )
 
@@ -221,14 +206,14 @@ def _declare(file: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
         creator="phasedic",
         start_time=info.start_utc,
     )
-    entry = new_group(file, "entry", "NXentry", fixed=False, default="strain")
+    entry = hdf5.new_group(file, "entry", "NXentry", fixed=False, default="strain")
     notes = {name: json.dumps(getattr(info, name), default=str, indent=1) for name in layout.TEXTS}
-    title = storable(str(info.metadata.get("specimen", "") or "phasedic"))
+    title = hdf5.storable(str(info.metadata.get("specimen", "") or "phasedic"))
     begin = {"start_time": info.start_utc, "start_monotonic_s": info.start_monotonic, "title": title}
-    new_datasets(entry, layout.ENTRY, begin | notes, fixed=False)
+    hdf5.new_datasets(entry, layout.ENTRY, begin | notes, fixed=False)
     _add_strain(entry, grid, info)
-    references = new_group(entry, layout.REFERENCES, "NXcollection", fixed=False)
-    new_datasets(references, layout.references(grid.shape), fixed=False)
+    references = hdf5.new_group(entry, layout.REFERENCES, "NXcollection", fixed=False)
+    hdf5.new_datasets(references, layout.references(grid.shape), fixed=False)
     if info.response:
         add_group(entry, info.response, grid.shape)
     _add_mean(entry, info)
@@ -242,7 +227,7 @@ def _slice_of(row: int) -> Any:
 
 
 def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
-    strain = new_group(
+    strain = hdf5.new_group(
         entry, "strain", "NXdata", fixed=False, signal="eyy", axes=["time_s", "y", "x"],
         strain_measure=info.strain_measure,
         grid=json.dumps(grid.to_dict()),
@@ -258,19 +243,19 @@ def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
         "size": int(grid.size),
         "step": int(grid.step),
     }
-    new_datasets(strain, layout.maps(grid.shape) | layout.GRID, values, fixed=False)
+    hdf5.new_datasets(strain, layout.maps(grid.shape) | layout.GRID, values, fixed=False)
     for name in (*layout.PLAIN_MAPS, "blur"):
         strain[f"{name}{layout.ERRORS}"] = strain[f"sigma_{name}"]
 
 
 def _add_mean(entry: Any, info: ResultsInfo) -> None:
-    mean = new_group(
+    mean = hdf5.new_group(
         entry, "mean", "NXdata", fixed=False, signal="eyy", axes=["time_s"], title="Strains of the region",
         auxiliary_signals=["exx", "exy"],
         load_axis=np.array("x" if info.axis == "x" else "y", "S1"),
         load_angle_deg=np.float64(math.nan),
     )  # fmt: skip
-    new_datasets(mean, layout.mean(info.gauges, info.extras), fixed=False)
+    hdf5.new_datasets(mean, layout.mean(info.gauges, info.extras), fixed=False)
     for name in STRAINS:
         mean[f"{name}{layout.ERRORS}"] = mean[f"sigma_{name}"]
     for name in ("time_s", "force_N", "frame", "last_frame", "n_frames", "noise_GL", "lost"):
@@ -282,7 +267,7 @@ def _add_gauges(entry: Any, info: ResultsInfo) -> None:
     if not info.gauges:
         return
     first = next(iter(info.gauges))
-    group = new_group(
+    group = hdf5.new_group(
         entry, "gauges", "NXdata", fixed=False, signal=first, axes=["time_s"], title="Virtual gauges"
     )
     group["time_s"] = entry["mean/time_s"]
@@ -293,10 +278,12 @@ def _add_gauges(entry: Any, info: ResultsInfo) -> None:
 
 
 def _add_camera(entry: Any, info: ResultsInfo) -> None:
-    camera = new_group(entry, "camera", "NXdetector", fixed=False)
+    camera = hdf5.new_group(entry, "camera", "NXdetector", fixed=False)
     if info.camera is None:
         return
-    camera["description"] = storable(info.camera.name)
+    camera["description"] = hdf5.storable(info.camera.name)
     names = ("address", "width", "height", "bits", "fps", "exposure_s", "pixel_format", "clock")
     known = {name: value for name in names if (value := getattr(info.camera, name)) is not None}
-    set_attributes(camera, fixed=False, **known, controls=json.dumps(dict(info.camera.controls), default=str))
+    hdf5.set_attributes(
+        camera, fixed=False, **known, controls=json.dumps(dict(info.camera.controls), default=str)
+    )

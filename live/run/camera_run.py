@@ -54,7 +54,10 @@ class CameraRun(Subscriber):
     Attributes
     ----------
     outputs : Outputs
+    run_state : RunState
+        Events, counts, loads and history so far.
     source : CameraSource
+    measurer : Measurer
     folder : Path
         Of the files; at the end where it is then, if it has been renamed.
     """
@@ -71,7 +74,7 @@ class CameraRun(Subscriber):
         stream: Stream,
         consumers: Compose,
     ) -> None:
-        self.name, self._prepared, self._run_state = name, prepared, run_state
+        self.name, self._prepared, self.run_state = name, prepared, run_state
         self.folder = prepared.folder
         self._held = FolderWatch(self.folder)
         self._screen, self._stop, self._stream = screen, stop, stream
@@ -102,7 +105,7 @@ class CameraRun(Subscriber):
             lambda: self._recording.backlog if self._recording else 0.0,
             work=KernelWork(prepared.plan.grid.size, prepared.plan.grid.step, plan.burst),
         )
-        self._measurer = Measurer(prepared, run_state, self._incoming, latency, stream, stop, name)
+        self.measurer = Measurer(prepared, run_state, self._incoming, latency, stream, stop, name)
 
     def open_recording(self) -> None:
         """Open the recording, and pass the events so far, and those to come, to all who take them.
@@ -114,7 +117,7 @@ class CameraRun(Subscriber):
         """
         config = json.dumps(self._prepared.config.as_dict(), indent=1)
         (self.folder / "config.json").write_text(config, encoding="utf-8")
-        self.record_with(open_recording(self._prepared, self._run_state, self._screen, self._stop))
+        self.record_with(open_recording(self._prepared, self.run_state, self._screen, self._stop))
 
     def record_with(self, recording: PreTriggerBuffer | None) -> None:
         """Use ``recording``, None for none."""
@@ -123,10 +126,10 @@ class CameraRun(Subscriber):
             record = self._prepared.config.record
             mode, room = RecordMode.parse(record.mode), int(record.buffer_MB * 5e5)
             if mode.cycles:
-                self._chosen = CyclePictures(recording, mode, self._run_state, room)
+                self._chosen = CyclePictures(recording, mode, self.run_state, room)
             self._stream.add(self._chosen or recording, self.name)
         self._has_recorded = self.recording
-        self._run_state.event_log.add_listener(self._publish)
+        self.run_state.event_log.add_listener(self._publish)
 
     def _publish(self, event: Event) -> None:
         self._stream.publish(event, self.name)
@@ -160,14 +163,9 @@ class CameraRun(Subscriber):
         return self._prepared.rig
 
     @property
-    def run_state(self) -> RunState:
-        """Events, counts, loads and history so far."""
-        return self._run_state
-
-    @property
     def has_measured(self) -> bool:
         """Whether there is a result yet."""
-        return bool(self._run_state.history.time_steps)
+        return bool(self.run_state.history.time_steps)
 
     @property
     def state(self) -> str:
@@ -204,18 +202,18 @@ class CameraRun(Subscriber):
             )
         kind = EventKind.PAUSE if wanted else EventKind.RESUME
         self.emit(kind, Message("measuring is paused") if wanted else Message("measuring goes on"))
-        self._incoming.paused = self._run_state.health.paused = wanted
-        self._run_state.health.since_t = time.monotonic()
+        self._incoming.paused = self.run_state.health.paused = wanted
+        self.run_state.health.since_t = time.monotonic()
 
     def _silence(self) -> None:
-        names = self._run_state.alarms.silence() + self._run_state.faults.silence()
+        names = self.run_state.alarms.silence() + self.run_state.faults.silence()
         if not names:
             raise ControlRefused("no alarm is on")
         self.emit(EventKind.ALARM, Message("silenced: {listed}", ", ".join(names)))
 
     def emit(self, kind: EventKind, text: str) -> None:
         """An event of the operator."""
-        self._run_state.event_log.emit(kind, "operator", text)
+        self.run_state.event_log.emit(kind, "operator", text)
 
     # -- between two bursts -------------------------------------------------------------------
 
@@ -228,7 +226,7 @@ class CameraRun(Subscriber):
 
     def _idle(self, words: str) -> None:
         now = time.monotonic()
-        silent = not now - self._run_state.health.frame_t < _SILENT_S
+        silent = not now - self.run_state.health.frame_t < _SILENT_S
         if words or self.paused:
             self._show(words if silent or not self.has_measured else "")
         if words == TAKING:
@@ -240,7 +238,7 @@ class CameraRun(Subscriber):
 
     def _hint_once(self) -> None:
         """A reference needs frames without a gap: warn once where frames are lost again and again."""
-        n, counts = self._prepared.bursts[0], self._run_state.frame_counts
+        n, counts = self._prepared.bursts[0], self.run_state.frame_counts
         if self._hinted or self.has_measured or not counts.lost or counts.grabbed < _HINT_AFTER * n:
             return
         self._hinted = True
@@ -250,38 +248,26 @@ class CameraRun(Subscriber):
             n,
             counts.lost,
         )
-        self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "warning")
+        self.run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "warning")
 
     def _show(self, words: str = "") -> None:
-        self._run_state.health.state = self.state
+        self.run_state.health.state = self.state
         if self._screen.is_due:
-            self._screen.snapshot(self._run_state.snapshot(time.monotonic()), words)
+            self._screen.snapshot(self.run_state.snapshot(time.monotonic()), words)
 
     # -- the run ------------------------------------------------------------------------------
 
     def begin(self) -> None:
         """The test begins; camera and load cell have been entered."""
-        self._run_state.health.began_t = time.monotonic()
-        self._run_state.health.state = self.state
+        self.run_state.health.began_t = time.monotonic()
+        self.run_state.health.state = self.state
         waits = "" if self.recording or self._recording is None else _ARMED
-        self._run_state.event_log.emit(EventKind.START, "phasedic", Message("the test begins{waits}", waits))
+        self.run_state.event_log.emit(EventKind.START, "phasedic", Message("the test begins{waits}", waits))
         self._keeper.begin()
-
-    def start(self) -> None:
-        """Begin to take frames."""
-        self.source.start()
-
-    def start_measuring(self) -> None:
-        """Begin to measure; what came before waits."""
-        self._measurer.start()
-
-    def wait(self) -> None:
-        """Measure until the camera has ended; raises PhasedicError where the reference cannot be used."""
-        self._measurer.join()
 
     def stop_frames(self) -> None:
         """End the camera; no figure gets old by that. The samples of a load cell that is away are counted."""
-        self._run_state.health.ended = True
+        self.run_state.health.ended = True
         self.rig.camera.stop()
         self._keeper.end()
 
@@ -289,19 +275,19 @@ class CameraRun(Subscriber):
         """Wait for the end of source and measurement, and count what was not measured."""
         self._incoming.close()
         self.source.join()
-        self._measurer.end()
+        self.measurer.end()
         self._incoming.count_skipped()
 
     def close(self) -> None:
         """End consumers, then the recording, with all events."""
-        self._run_state.loads.close()
+        self.run_state.loads.close()
         self.rig.camera.close()
         self.outputs.end()
         if self._chosen is not None:
             self._chosen.end()
         own = TIME_IS_OVER if self._own_time_is_over or self.source.time_is_over else Message("camera ended")
         reason = self._stop.reason or own
-        self._run_state.event_log.emit(EventKind.STOP, "phasedic", Message("the test ends: {reason}", reason))
+        self.run_state.event_log.emit(EventKind.STOP, "phasedic", Message("the test ends: {reason}", reason))
         if self._recording is not None:
             self._recording.close({"stop_reason": reason})
         self.folder = self._held.end()
@@ -312,20 +298,20 @@ class CameraRun(Subscriber):
         error = self.source.error
         if error is not None:
             return exit_code_of(error)
-        if failure := self._keeper.load_failure or self._measurer.failure:
+        if failure := self._keeper.load_failure or self.measurer.failure:
             return failure
         if self._stop.reason == INTERRUPTED:
             return EXIT_INTERRUPTED
-        frame_counts = self._run_state.frame_counts
+        frame_counts = self.run_state.frame_counts
         unwritten = self._recording is not None and self._recording.failed is not None
         lossy = frame_counts.loss or self.outputs.failed or unwritten
-        lossy = lossy or self._run_state.health.without_force_s > OLD_S
-        lossy = lossy or not frame_counts.adds_up or not self._run_state.history.ends_with_values
+        lossy = lossy or self.run_state.health.without_force_s > OLD_S
+        lossy = lossy or not frame_counts.adds_up or not self.run_state.history.ends_with_values
         return LOSS if lossy else 0
 
     def outcome(self) -> Outcome:
         """The result, after it has ended."""
-        run, state, code = self._prepared, self._run_state, self.exit_code
+        run, state, code = self._prepared, self.run_state, self.exit_code
         reference_N = reference_force(state.event_log.events())
         test = finished(self.folder, run.config, state, code, reference_N, run.start.monotonic)
         return Outcome(self.folder, run.config, state, self.outputs, run.rig, run.plan.grid, code, test)

@@ -121,7 +121,9 @@ class IncomingBursts(Subscriber):
             elif self.paused or burst.first_index <= self._reference_end:
                 self._skip(burst)
             elif self._references.empty():
-                yield self._with_all_lost(burst)
+                # With all frames lost since the last measured burst, those of skipped bursts included.
+                lost, self._lost = burst.lost + self._lost, 0
+                yield replace(burst.burst(self._memory), lost=lost)
             else:
                 yield NewReference(self._reference_before(burst))
             self._wait_for("")
@@ -155,8 +157,3 @@ class IncomingBursts(Subscriber):
         self._frame_counts.add(skipped=burst.n)
         if burst.first_index > self._reference_end:
             self._lost += burst.lost
-
-    def _with_all_lost(self, summed: SummedBurst) -> Burst:
-        """The burst with all frames lost since the last measured burst, those of skipped bursts included."""
-        lost, self._lost = summed.lost + self._lost, 0
-        return replace(summed.burst(self._memory), lost=lost)

@@ -152,16 +152,16 @@ class LiveRun:
                 run.begin()
             self._load_source.start()
             for run in self.cameras.values():  # no camera gives frames before all are open
-                run.start()
+                run.source.start()
             opened.pop_all()
         return self
 
     def wait(self) -> None:
         """Measure until all cameras have ended; raises PhasedicError where the start has failed."""
         for run in self.cameras.values():
-            run.start_measuring()
+            run.measurer.start()  # what came before has waited
         for run in self.cameras.values():
-            run.wait()
+            run.measurer.join()
 
     def __exit__(self, *_: object) -> None:
         """End all threads and close the devices, whatever happened before: the load last, for the last forces."""

@@ -35,6 +35,8 @@ _SMALL = 512  # bytes counted for an event
 _TURN = 0.1  # of the range of the test so far
 _MOST_WAITING = 8  # peaks without a cycle: at rest noise turns
 
+Item = Frame | Burst | Event
+
 
 class RecordingSink(Protocol):
     """What the buffer uses of ``Recorder``; no method blocks."""
@@ -75,9 +77,6 @@ class PreTrigger:
     max_bytes: int
     above_N: float = math.inf
     bursts: bool = False
-
-
-Item = Frame | Burst | Event
 
 
 class PreTriggerBuffer(Subscriber):

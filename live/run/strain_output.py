@@ -218,7 +218,9 @@ class SerialOut(StrainOut):
         if not self._sent_heading and self._lines.heading:
             line = f"{self._lines.heading}\n{line}"
         if self._port is None and time.monotonic() - self._lost > REOPEN_S:
-            self._open_again()
+            self._lost = time.monotonic()
+            with contextlib.suppress(PhasedicError, DeviceError):
+                self._port = open_port(self._settings)
         if self._port is not None and self._written(line.encode() + b"\n"):
             self._sent_heading = True
             self._sent += 1
@@ -234,11 +236,6 @@ class SerialOut(StrainOut):
             self._lost = time.monotonic()
             return False
         return True
-
-    def _open_again(self) -> None:
-        self._lost = time.monotonic()
-        with contextlib.suppress(PhasedicError, DeviceError):
-            self._port = open_port(self._settings)
 
     def _close(self) -> None:
         if self._port is not None:

@@ -1,6 +1,6 @@
 """The lens of a configuration, as ``phasedic lens`` calibrated it, checked against the pictures that it corrects.
 
-Calibration of a lens: from pictures of a board by OpenCV, or from shifted pictures of the specimen.
+It is calibrated from pictures of a board by OpenCV, or from shifted pictures of the specimen.
 
 Z. Zhang, IEEE Trans. PAMI 22 (2000) 1330-1334, for the board. OpenCV gives standard deviations alone; the covariance
 of the parameters follows here from its derivatives, with the poses of the board eliminated.
@@ -31,6 +31,13 @@ if TYPE_CHECKING:
 
 SHOWN_SHIFT_PX = 10.0
 """Motion for which check and calibration give the strain that a lens makes."""
+
+Floats = NDArray[np.float64]
+MIN_BOARDS = 5
+MAX_FOCAL_ERROR = 0.5
+"""Standard uncertainty of the focal length over it; beyond, the boards do not show the lens."""
+
+_MORE = Message("tilt the board by 10 to 30 degrees in all directions, at all places of the picture")
 
 
 def lens_for(config: Config, width: int, height: int, grid: ZoiGrid) -> LensModel | None:
@@ -92,12 +99,6 @@ def lens_words(lens: LensModel, grid: ZoiGrid) -> str:
         "{sigma:.2g} µm/m",
         *(SHOWN_SHIFT_PX, strain * 1e6, sigma * 1e6),
     )
-
-
-Floats = NDArray[np.float64]
-MIN_BOARDS = 5
-MAX_FOCAL_ERROR = 0.5
-"""Standard uncertainty of the focal length over it; beyond, the boards do not show the lens."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -228,9 +229,6 @@ def lens_of_corners(found: Sequence[Corners], size: tuple[int, int], k3: bool = 
     if not (np.isfinite(parameters).all() and math.sqrt(covariance[0, 0]) < MAX_FOCAL_ERROR * parameters[0]):
         raise DataError("the pictures do not show the lens: its focal length stays unknown; {hint}", _MORE)
     return LensFit(LensModel(parameters, covariance), float(rms) / math.sqrt(2), 1.0)
-
-
-_MORE = Message("tilt the board by 10 to 30 degrees in all directions, at all places of the picture")
 
 
 def _inverse_normal(views: Sequence[Floats], free: int) -> Floats:

@@ -112,9 +112,9 @@ def from_width(
     )
 
 
-def false_strain(stand_off_mm: float, out_of_plane_mm: float = OUT_OF_PLANE_MM) -> float:
-    """False strain of a motion toward the camera: the image grows as the distance falls."""
-    return out_of_plane_mm / stand_off_mm
+def false_strain(stand_off_mm: float) -> float:
+    """False strain of a motion by ``OUT_OF_PLANE_MM`` toward the camera: the image grows as the distance falls."""
+    return OUT_OF_PLANE_MM / stand_off_mm
 
 
 # -- the width of the specimen ------------------------------------------------------------------
@@ -341,14 +341,12 @@ def _tilt(change: float, uneven: float, extent: float, stand_off_mm: float | Non
     degrees = math.degrees(math.acos(min(1 - uneven, 1.0)))
     if stand_off_mm is not None:
         degrees = math.degrees(math.asin(min(change / extent * stand_off_mm, 1.0)))
-    yield (
-        Message(
-            "the board is tilted by {degrees:.0f} degrees: the scale changes by {change:.1%} over it, by "
-            "{uneven:.1%} between directions; set the camera square to it",
-            degrees,
-            change,
-            uneven,
-        )
+    yield Message(
+        "the board is tilted by {degrees:.0f} degrees: the scale changes by {change:.1%} over it, by "
+        "{uneven:.1%} between directions; set the camera square to it",
+        degrees,
+        change,
+        uneven,
     )
 
 

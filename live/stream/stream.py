@@ -4,9 +4,8 @@ Nothing is queued here and no lock is held while records are passed on, so the r
 and the thread that takes frames from a camera waits for nobody. Who takes a record returns at once; one that has work
 to do has a queue of its own, with its policy and its counts.
 
-What goes through a test: frames, bursts, load samples, events and measurements, each a record of the stream.
-
-Keeps the state of a camera's run: loads, history, counts and health, from the records of the stream.
+Frames, bursts, load samples, events and measurements go through a test, each a record of the stream. ``StateKeeper``
+keeps the state of a camera's run from them: loads, history, counts and health.
 """
 
 from __future__ import annotations
@@ -34,6 +33,10 @@ Role = Literal["plain", "reference"]
 """Of a frame or a burst: decided once, before it is published, so that all who take it agree."""
 ALL = ""
 """In place of the name of a camera: the record is for every camera, as a load sample is."""
+
+SILENT_S, SILENT_PERIODS = 1.0, 10
+"""A load cell that has sent nothing for both is away."""
+_RATE_SHARE = 0.1  # of the newest interval in the rate of the frames
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,11 +147,6 @@ class Stream:
     def _takers_of(self, kind: type, camera: str) -> list[Subscriber]:
         takers = self._takers.get(kind, ())
         return [one for wanted, one in takers if ALL in (wanted, camera) or wanted == camera]
-
-
-SILENT_S, SILENT_PERIODS = 1.0, 10
-"""A load cell that has sent nothing for both is away."""
-_RATE_SHARE = 0.1  # of the newest interval in the rate of the frames
 
 
 class StateKeeper(Subscriber):

@@ -100,7 +100,7 @@ def test_those_of_another_package_are_listed_behind_ours(
     assert [scheme for scheme, _ in CAMERAS.settings()] == [*KINDS, "film"]
     assert main(["devices", "--settings"]) == 0
     told = capsys.readouterr().out
-    film = "  film:\n    gray: what is grey in a colour picture (one of luma, r, g, b; default luma)\n"
+    film = "  film:\n    gray: what is grey in a colour picture (one of luma, r, g, b)\n"
     film += "    fps: of the camera, where the film is played slower (a number from 1e-06 to 1e+06; 1/s)\n"
     film += "    first: number of the first picture; those before it are left out (a whole number from 1; default 1)\n"
     assert f"{film}load cells:\n  sim:\n" in told

@@ -46,7 +46,7 @@ def test_pictures_share_the_memory_of_their_coefficients(monkeypatch: pytest.Mon
     first, second = picture(u=0.3, v=-0.2), picture(u=6.4, du_dx=0.01)
     expected = [PhaseKernel(picture(), GRID).measure(image).parameters for image in (first, second)]
     kernel = PhaseKernel(picture(), GRID)
-    monkeypatch.setattr("analysis.picture.splines.room_for", None)
+    monkeypatch.setattr("analysis.picture.prefilter.room_for", None)
     for image, values in ((first, expected[0]), (second, expected[1]), (first, expected[0])):
         np.testing.assert_array_equal(kernel.measure(image).parameters, values)
 

@@ -145,13 +145,13 @@ def test_renderer_too_slow_for_the_rate_loses_frames() -> None:
     time = FakeTime()
     camera = timed(time, buffers=2)
     camera._ring = Ring(100)  # nothing is lost for want of room here
-    render = camera._scene.render
+    render = camera.scene.render
 
     def slow(t: float) -> np.ndarray:
         time.now += 0.05
         return render(t)
 
-    camera._scene.render = slow
+    camera.scene.render = slow
     with camera:
         camera._thread.join()
         frames = list(camera)
@@ -281,13 +281,13 @@ def test_a_frame_later_than_its_buffers_is_lost_and_no_other() -> None:
     time = FakeTime()
     camera = timed(time, buffers=4)
     camera._ring = Ring(100)
-    render = camera._scene.render
+    render = camera.scene.render
 
     def stalled(t: float) -> np.ndarray:
         time.now += 0.13 if t == 10 / 50 else 0.0
         return render(t)
 
-    camera._scene.render = stalled
+    camera.scene.render = stalled
     with camera:
         camera._thread.join()
         indices = [frame.index for frame in camera]

@@ -9,21 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from analysis.evaluate.gauges import geometry
 from analysis.evaluate.gauges.gauge import OFF_REGION, Gauge, Parameter
-from analysis.evaluate.gauges.geometry import (
-    Box,
-    Line,
-    Mask,
-    Point,
-    box_between,
-    circle,
-    closed,
-    corners_of,
-    ends_of,
-    near_px,
-    zois_inside,
-    zois_near,
-)
 from analysis.evaluate.gauges.readings import GaugeReading, distance
 from analysis.field import ZoiGrid
 
@@ -53,8 +40,8 @@ class LineGauge(Gauge):
     radius_px : float or None, px
     """
 
-    start: Point = field(metadata=START.metadata)
-    end: Point = field(metadata=END.metadata)
+    start: geometry.Point = field(metadata=START.metadata)
+    end: geometry.Point = field(metadata=END.metadata)
     radius_px: float | None = field(default=None, metadata=RADIUS.metadata)
     kind, label, default_name, gesture = "line", "Extensometer", "axial", "line"
     hint = "Drag from one end of the extensometer to the other."
@@ -65,29 +52,29 @@ class LineGauge(Gauge):
         if self.radius_px is not None and not self.radius_px > 0:
             raise ValueError(f"gauge {self.name}: the radius must be positive, got {self.radius_px}")
 
-    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+    def select(self, grid: ZoiGrid) -> tuple[geometry.Mask, ...]:
         reach = self.radius_px or grid.size / 2
-        return tuple(zois_near(grid, end, reach) for end in (self.start, self.end))
+        return tuple(geometry.zois_near(grid, end, reach) for end in (self.start, self.end))
 
     @property
     def reading(self) -> GaugeReading:
         return GaugeReading("ends")
 
-    def outline(self, zoi: float) -> tuple[Line, ...]:
+    def outline(self, zoi: float) -> tuple[geometry.Line, ...]:
         reach = self.radius_px or zoi / 2
-        return (self.start, self.end), circle(self.start, reach), circle(self.end, reach)
+        return (self.start, self.end), geometry.circle(self.start, reach), geometry.circle(self.end, reach)
 
     def share(self, grid: ZoiGrid) -> float:
         """Of its length, that between the ZOIs at its ends; 1 where that is nearly all."""
         found = distance(grid, self.zois(grid)) / math.dist(self.start, self.end)
         return found if found <= 1 - OFF_REGION else 1.0
 
-    def handles(self) -> tuple[Point, ...]:
+    def handles(self) -> tuple[geometry.Point, ...]:
         return self.start, self.end
 
     @classmethod
-    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
-        return {"start": near_px(handles[0]), "end": near_px(handles[-1])}
+    def from_handles(cls, handles: Sequence[geometry.Point]) -> dict[str, Any]:
+        return {"start": geometry.near_px(handles[0]), "end": geometry.near_px(handles[-1])}
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +91,7 @@ class TransverseGauge(Gauge):
         The direction whose extension is measured, across the load.
     """
 
-    box: Box = field(metadata=BOX.metadata)
+    box: geometry.Box = field(metadata=BOX.metadata)
     along: Literal["x", "y"] = field(default="x", metadata=_ALONG.metadata)
     kind, label, default_name, gesture = "transverse", "Transverse", "transverse", "box"
     hint = "Drag a rectangle: strain across the load."
@@ -115,22 +102,25 @@ class TransverseGauge(Gauge):
         if self.along not in ("x", "y"):
             raise ValueError(f"gauge {self.name}: along is x or y, got {self.along!r}")
 
-    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
-        return tuple(zois_inside(grid, corners_of(box)) for box in ends_of(self.box, self.along, 1 / 3))
+    def select(self, grid: ZoiGrid) -> tuple[geometry.Mask, ...]:
+        return tuple(
+            geometry.zois_inside(grid, geometry.corners_of(box))
+            for box in geometry.ends_of(self.box, self.along, 1 / 3)
+        )
 
     @property
     def reading(self) -> GaugeReading:
         return GaugeReading("ends")
 
-    def outline(self, zoi: float) -> tuple[Line, ...]:
-        return (closed(corners_of(self.box)),)
+    def outline(self, zoi: float) -> tuple[geometry.Line, ...]:
+        return (geometry.closed(geometry.corners_of(self.box)),)
 
-    def handles(self) -> tuple[Point, ...]:
-        return corners_of(self.box)[::2]
+    def handles(self) -> tuple[geometry.Point, ...]:
+        return geometry.corners_of(self.box)[::2]
 
     @classmethod
-    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
-        return {"box": box_between(handles[0], handles[-1])}
+    def from_handles(cls, handles: Sequence[geometry.Point]) -> dict[str, Any]:
+        return {"box": geometry.box_between(handles[0], handles[-1])}
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,16 +136,16 @@ class ExtensionGauge(TransverseGauge):
     kind, label, default_name, gesture = "extension", "Extension", "extension", "box"
     hint = "Drag a rectangle: extension between its two ends."
 
-    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+    def select(self, grid: ZoiGrid) -> tuple[geometry.Mask, ...]:
         side = self.box[2 if self.along == "x" else 3]
-        ends = ends_of(self.box, self.along, max(_STRIP, grid.step / side))
-        return tuple(zois_inside(grid, corners_of(box)) for box in ends)
+        ends = geometry.ends_of(self.box, self.along, max(_STRIP, grid.step / side))
+        return tuple(geometry.zois_inside(grid, geometry.corners_of(box)) for box in ends)
 
     @property
     def length(self) -> float:
         """From the middle of one strip to that of the other, px."""
         k = 0 if self.along == "x" else 1
-        first, last = (box[k] + box[k + 2] / 2 for box in ends_of(self.box, self.along, _STRIP))
+        first, last = (box[k] + box[k + 2] / 2 for box in geometry.ends_of(self.box, self.along, _STRIP))
         return last - first
 
     @property
@@ -177,7 +167,7 @@ class RegionStrips:
     def reading(self) -> GaugeReading:
         return GaugeReading("ends", along=self.along)
 
-    def zois(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+    def zois(self, grid: ZoiGrid) -> tuple[geometry.Mask, ...]:
         """The two strips, (R, C) bool each."""
         rows, columns = (np.flatnonzero(grid.active.any(axis=axis)) for axis in (1, 0))
         if not rows.size:

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from analysis.evaluate.gauges import geometry
 from analysis.evaluate.gauges.extensometers import (
     BOX,
     END,
@@ -20,19 +21,6 @@ from analysis.evaluate.gauges.extensometers import (
     TransverseGauge,
 )
 from analysis.evaluate.gauges.gauge import Gauge, Parameter
-from analysis.evaluate.gauges.geometry import (
-    Box,
-    Line,
-    Mask,
-    Point,
-    box_between,
-    circle,
-    closed,
-    corners_of,
-    near_px,
-    zois_inside,
-    zois_near,
-)
 from analysis.evaluate.gauges.readings import GaugeReading, Statistic, check_value
 from analysis.field import ZoiGrid
 
@@ -63,7 +51,7 @@ class ZoiGauge(Gauge):
         One of ``analysis.field.VALUES``.
     """
 
-    at: Point = field(metadata=_AT.metadata)
+    at: geometry.Point = field(metadata=_AT.metadata)
     value: str = field(default="eyy", metadata=_VALUE.metadata)
     kind, label, default_name, gesture = "zoi", "Point", "point", "click"
     hint = "Click a place."
@@ -71,8 +59,8 @@ class ZoiGauge(Gauge):
     def __post_init__(self) -> None:
         check_value(self.name, self.value)
 
-    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
-        return (zois_near(grid, self.at, 0),)
+    def select(self, grid: ZoiGrid) -> tuple[geometry.Mask, ...]:
+        return (geometry.zois_near(grid, self.at, 0),)
 
     def share(self, grid: ZoiGrid) -> float:
         return 1.0
@@ -81,16 +69,16 @@ class ZoiGauge(Gauge):
     def reading(self) -> GaugeReading:
         return GaugeReading("largest", self.value)
 
-    def outline(self, zoi: float) -> tuple[Line, ...]:
+    def outline(self, zoi: float) -> tuple[geometry.Line, ...]:
         x, y = self.at
-        return (closed(corners_of((x - zoi / 2, y - zoi / 2, zoi, zoi))),)
+        return (geometry.closed(geometry.corners_of((x - zoi / 2, y - zoi / 2, zoi, zoi))),)
 
-    def handles(self) -> tuple[Point, ...]:
+    def handles(self) -> tuple[geometry.Point, ...]:
         return (self.at,)
 
     @classmethod
-    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
-        return {"at": near_px(handles[0])}
+    def from_handles(cls, handles: Sequence[geometry.Point]) -> dict[str, Any]:
+        return {"at": geometry.near_px(handles[0])}
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +100,8 @@ class AreaGauge(Gauge):
         By ``AreaStrain``; else of the values of the ZOIs, by sign, not by magnitude.
     """
 
-    box: Box | None = field(default=None, metadata=BOX.metadata)
-    corners: tuple[Point, ...] | None = field(default=None, metadata=_CORNERS.metadata)
+    box: geometry.Box | None = field(default=None, metadata=BOX.metadata)
+    corners: tuple[geometry.Point, ...] | None = field(default=None, metadata=_CORNERS.metadata)
     value: str = field(default="eyy", metadata=_VALUE.metadata)
     statistic: Statistic = field(default="affine", metadata=_STATISTIC.metadata)
     kind, label, default_name, gesture = "area", "Area", "area", "box"
@@ -129,27 +117,27 @@ class AreaGauge(Gauge):
             known = ", ".join(_STATISTIC.choices)
             raise ValueError(f"gauge {self.name}: unknown statistic {self.statistic!r}; known: {known}")
 
-    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
-        return (zois_inside(grid, self._polygon()),)
+    def select(self, grid: ZoiGrid) -> tuple[geometry.Mask, ...]:
+        return (geometry.zois_inside(grid, self._polygon()),)
 
     @property
     def reading(self) -> GaugeReading:
         return GaugeReading(self.statistic, self.value)
 
-    def outline(self, zoi: float) -> tuple[Line, ...]:
-        return (closed(self._polygon()),)
+    def outline(self, zoi: float) -> tuple[geometry.Line, ...]:
+        return (geometry.closed(self._polygon()),)
 
-    def handles(self) -> tuple[Point, ...]:
+    def handles(self) -> tuple[geometry.Point, ...]:
         return self.corners or self._polygon()[::2]
 
     @classmethod
-    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
+    def from_handles(cls, handles: Sequence[geometry.Point]) -> dict[str, Any]:
         if len(handles) == 2:
-            return {"box": box_between(*handles)}
-        return {"corners": tuple(near_px(place) for place in handles)}
+            return {"box": geometry.box_between(*handles)}
+        return {"corners": tuple(geometry.near_px(place) for place in handles)}
 
-    def _polygon(self) -> Line:
-        return self.corners or corners_of(self.box or (0, 0, 0, 0))
+    def _polygon(self) -> geometry.Line:
+        return self.corners or geometry.corners_of(self.box or (0, 0, 0, 0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +152,7 @@ class CircleGauge(Gauge):
         One of ``analysis.field.VALUES``.
     """
 
-    centre: Point = field(metadata=_CENTRE.metadata)
+    centre: geometry.Point = field(metadata=_CENTRE.metadata)
     radius_px: float = field(metadata=RADIUS.metadata)
     value: str = field(default="eyy", metadata=_VALUE.metadata)
     kind, label, default_name, gesture = "circle", "Circle", "circle", "line"
@@ -175,23 +163,23 @@ class CircleGauge(Gauge):
         if not self.radius_px > 0:
             raise ValueError(f"gauge {self.name}: the radius must be positive, got {self.radius_px}")
 
-    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
-        return (zois_near(grid, self.centre, self.radius_px),)
+    def select(self, grid: ZoiGrid) -> tuple[geometry.Mask, ...]:
+        return (geometry.zois_near(grid, self.centre, self.radius_px),)
 
     @property
     def reading(self) -> GaugeReading:
         return GaugeReading("affine", self.value)
 
-    def outline(self, zoi: float) -> tuple[Line, ...]:
-        return (circle(self.centre, self.radius_px),)
+    def outline(self, zoi: float) -> tuple[geometry.Line, ...]:
+        return (geometry.circle(self.centre, self.radius_px),)
 
-    def handles(self) -> tuple[Point, ...]:
+    def handles(self) -> tuple[geometry.Point, ...]:
         return self.centre, (self.centre[0] + self.radius_px, self.centre[1])
 
     @classmethod
-    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
+    def from_handles(cls, handles: Sequence[geometry.Point]) -> dict[str, Any]:
         radius = max(round(math.dist(handles[0], handles[-1]), 1), 0.1)
-        return {"centre": near_px(handles[0]), "radius_px": radius}
+        return {"centre": geometry.near_px(handles[0]), "radius_px": radius}
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,8 +195,8 @@ class StripGauge(Gauge):
         One of ``analysis.field.VALUES``.
     """
 
-    start: Point = field(metadata=START.metadata)
-    end: Point = field(metadata=END.metadata)
+    start: geometry.Point = field(metadata=START.metadata)
+    end: geometry.Point = field(metadata=END.metadata)
     width_px: float | None = field(default=None, metadata=_WIDTH.metadata)
     value: str = field(default="eyy", metadata=_VALUE.metadata)
     kind, label, default_name, gesture = "strip", "Strip", "strip", "line"
@@ -221,24 +209,24 @@ class StripGauge(Gauge):
         if self.width_px is not None and not self.width_px > 0:
             raise ValueError(f"gauge {self.name}: the width must be positive, got {self.width_px}")
 
-    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
-        return (zois_inside(grid, self._corners(grid.size)),)
+    def select(self, grid: ZoiGrid) -> tuple[geometry.Mask, ...]:
+        return (geometry.zois_inside(grid, self._corners(grid.size)),)
 
     @property
     def reading(self) -> GaugeReading:
         return GaugeReading("affine", self.value)
 
-    def outline(self, zoi: float) -> tuple[Line, ...]:
-        return (closed(self._corners(zoi)),)
+    def outline(self, zoi: float) -> tuple[geometry.Line, ...]:
+        return (geometry.closed(self._corners(zoi)),)
 
-    def handles(self) -> tuple[Point, ...]:
+    def handles(self) -> tuple[geometry.Point, ...]:
         return self.start, self.end
 
     @classmethod
-    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
-        return {"start": near_px(handles[0]), "end": near_px(handles[-1])}
+    def from_handles(cls, handles: Sequence[geometry.Point]) -> dict[str, Any]:
+        return {"start": geometry.near_px(handles[0]), "end": geometry.near_px(handles[-1])}
 
-    def _corners(self, zoi: float) -> Line:
+    def _corners(self, zoi: float) -> geometry.Line:
         (x0, y0), (x1, y1) = self.start, self.end
         half = (self.width_px or zoi) / 2 / math.dist(self.start, self.end)
         across, down = (y0 - y1) * half, (x1 - x0) * half

@@ -31,6 +31,8 @@ from live.replay.batch.worker import Pool, WorkerProcesses
 from live.replay.pictures import reference_file
 from live.setup.compiling import compile_ahead
 
+_POLL_S = 0.1
+
 
 def write_summary(rows: Sequence[BatchRow], out: Path) -> list[Path]:
     """Write the table, in place of that of an earlier call; Parquet only where pyarrow is installed.
@@ -75,9 +77,6 @@ def as_parquet(rows: Sequence[BatchRow]) -> bytes | None:
 def _cell(value: Value) -> Any:
     """The value as a cell that no spreadsheet reads as a formula."""
     return value.lstrip("=+-@\t ") if isinstance(value, str) else "" if value is None else value
-
-
-_POLL_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)

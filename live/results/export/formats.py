@@ -8,7 +8,7 @@ from pathlib import Path
 
 from acquire.errors import ConfigError
 from live.pipeline.consumer import Screen
-from live.results.export.job import USUAL, ExportJob, ExportOptions, chosen_fields, chosen_rows
+from live.results.export.job import USUAL, ExportJob, ExportOptions, chosen_fields
 from live.results.export.maps import write_gif, write_mp4, write_png, write_tiff, write_vtk
 from live.results.export.tables import write_csv, write_mat, write_npz, write_r3xa
 from live.results.quantities import Display
@@ -93,7 +93,7 @@ def export(run: RunFolder, request: ExportRequest, screen: Screen) -> Path:
         raise ConfigError("--to {format} takes one map at a time; give one with --fields", request.format)
     if not fields:
         raise ConfigError("{path}: holds none of the usual maps; name some with --fields", run.strain.path)
-    rows = chosen_rows(run.strain, request.start_s, request.end_s)
+    rows = run.strain.rows_between(request.start_s, request.end_s, "--from, --until")
     if {*fields} <= {*run.strain.whole_names}:
         rows = rows[-1:]  # they are the same at each instant
     job = ExportJob(run, fields, rows, request.display, screen, request.options)

@@ -7,11 +7,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from acquire.clock import Clock
-from acquire.errors import ConfigError, DataError
+from acquire.errors import ConfigError
 from acquire.text import Message
 from analysis.field import Status
 from live.pipeline.consumer import Screen
@@ -22,7 +21,6 @@ from live.results.run_folder import RunFolder
 from live.results.stored_response import GROUP
 
 USUAL = ("u", "v", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy", "status")
-_ROUNDING_S = 1e-6  # of times that were typed
 QUIET_S = 2.0  # a shorter export shows no progress
 
 _MEASURES = {
@@ -147,29 +145,3 @@ def chosen_fields(strain: Strain, requested: str | None, usual: Sequence[str] = 
                 "--fields {name}: there is no such map; there are {known}", name, ", ".join(known)
             )
     return names
-
-
-def chosen_rows(strain: Strain, start_s: float | None, end_s: float | None) -> tuple[int, ...]:
-    """The instants between two times, seconds since the start of the test, both included.
-
-    Raises
-    ------
-    ConfigError
-        There is none.
-    DataError
-        The run holds no measurement.
-    """
-    t = strain.time_s
-    low, high = -np.inf if start_s is None else start_s, np.inf if end_s is None else end_s
-    rows = tuple(int(row) for row in np.flatnonzero((t >= low - _ROUNDING_S) & (t <= high + _ROUNDING_S)))
-    if rows:
-        return rows
-    if not len(t):
-        raise DataError("{path}: holds no measurement, there is nothing to export", strain.path)
-    raise ConfigError(
-        "--from, --until: no measurement between {low:g} and {high:g} s; the test has {first:.6g} to {last:.6g} s",
-        low,
-        high,
-        t[0],
-        t[-1],
-    )

@@ -50,6 +50,10 @@ _MIN_GIF_PX = 120  # smaller pictures show nothing
 
 _MAX_BYTES = 2**32 - 2**20
 
+_TYPES = {"f4": "Float32", "f8": "Float64", "u1": "UInt8", "i8": "Int64"}
+_ORDER = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
+_HEAD = '<?xml version="1.0"?>\n<VTKFile type="{}" version="1.0" byte_order="{}" header_type="UInt64">\n'
+
 
 def write_png(job: ExportJob, path: Path) -> None:
     """A folder with one picture an instant."""
@@ -225,11 +229,6 @@ def _labels(job: ExportJob) -> list[str]:
         f"{job.strain.time_s[row]:.4f} s" + (f", {forces[row]:.2f} N" if np.isfinite(forces[row]) else "")
         for row in job.rows
     ]
-
-
-_TYPES = {"f4": "Float32", "f8": "Float64", "u1": "UInt8", "i8": "Int64"}
-_ORDER = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
-_HEAD = '<?xml version="1.0"?>\n<VTKFile type="{}" version="1.0" byte_order="{}" header_type="UInt64">\n'
 
 
 def write_vtk(job: ExportJob, path: Path) -> None:

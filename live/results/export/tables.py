@@ -47,7 +47,13 @@ def write_csv(job: ExportJob, path: Path) -> None:
         if job.options.layout == "means":
             means(job, file)
         else:
-            _long(job, file)
+            heads = ["instant", *_OF_AN_INSTANT, *_POSITION, *job.fields]
+            _comment(file, [*job.notes(), *(job.display.definition(name) for name in heads)])
+            _line(file, [job.display.column(name) for name in heads])
+            places = _positions(job)
+            for _, number in job.steps():
+                same = [np.full(len(places[0]), value) for value in (number, *_time_step(job, number))]
+                _rows(file, [*same, *places, *_values(job, number)])
 
 
 def means(job: ExportJob, file: TextIO, notes: bool = True) -> None:
@@ -89,16 +95,6 @@ def load_table(run: RunFolder, file: TextIO) -> None:
     _line(file, ["time_s", "force_N"])
     for piece in run.readings.pieces():
         _rows(file, [piece.t, piece.values])
-
-
-def _long(job: ExportJob, file: TextIO) -> None:
-    heads = ["instant", *_OF_AN_INSTANT, *_POSITION, *job.fields]
-    _comment(file, [*job.notes(), *(job.display.definition(name) for name in heads)])
-    _line(file, [job.display.column(name) for name in heads])
-    places = _positions(job)
-    for _, number in job.steps():
-        same = [np.full(len(places[0]), value) for value in (number, *_time_step(job, number))]
-        _rows(file, [*same, *places, *_values(job, number)])
 
 
 def _positions(job: ExportJob) -> list[NDArray[Any]]:

@@ -1,6 +1,6 @@
 """The cycles of a finished test: ``cycles.csv``, and what summary, page, report and figures.json say of them.
 
-What summary, page, report and figures.json say of the creep of a finished test.
+What they say of the creep of a finished test is here too.
 """
 
 from __future__ import annotations

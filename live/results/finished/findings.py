@@ -39,6 +39,8 @@ _OFF_AXIS = math.radians(10)
 _STEP = 0.001  # of the highest force: half of what it changes by from one value to the next
 _PRELOAD = 0.002  # of the highest force, below which a force at the reference is the zero of a load cell
 
+_WITHOUT_FORCE = ("alignment", "leaps of the strain")
+
 
 @dataclass(frozen=True, slots=True)
 class DataCheck:
@@ -355,7 +357,6 @@ _CHECKS: dict[str, Callable[[FinishedTest], str | None]] = {
     "out of plane": _out_of_plane,
     "reference under load": _reference_load,
 }
-_WITHOUT_FORCE = ("alignment", "leaps of the strain")
 
 
 def _both_known(test: FinishedTest) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

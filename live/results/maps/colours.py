@@ -22,6 +22,11 @@ LINES_ON_DARK = ("#6db3f2", "#f59453", "#3cc6a8", "#e28cc2", "#d6b64a", "#a4aeb8
 _COLD, _HOT, _BEND = (59, 76, 192), (180, 4, 38), 88.0
 _NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
 
+_RGB_TO_XYZ = np.array(
+    [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+)
+_WHITE = _RGB_TO_XYZ.sum(axis=1)
+
 
 @dataclass(frozen=True, slots=True)
 class Unit:
@@ -80,12 +85,6 @@ def _spin(colour: tuple[float, float, float], magnitude: float) -> float:
     m, s, h = colour
     turn = s * math.sqrt(max(magnitude**2 - m**2, 0.0)) / (m * math.sin(s))
     return h + turn if h > -math.pi / 3 else h - turn
-
-
-_RGB_TO_XYZ = np.array(
-    [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
-)
-_WHITE = _RGB_TO_XYZ.sum(axis=1)
 
 
 def _msh(rgb: tuple[int, int, int]) -> tuple[float, float, float]:

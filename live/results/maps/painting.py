@@ -1,6 +1,6 @@
 """Maps painted over pictures by OpenCV: each ZOI at its place at that instant, with title, colour bar or legend.
 
-The maps of a field in colours during a test: strains, principal strains, displacements, sigma, status.
+During a test and after it the same maps are painted: strains, principal strains, displacements, sigma, status.
 """
 
 from __future__ import annotations
@@ -36,6 +36,14 @@ _PRINCIPAL = ("e1", "e2")
 _STRAINS = ("exx", "eyy", "exy", *_PRINCIPAL)
 FIELD_MAPS = (*_STRAINS, "u", "v", "sigma", "residual", "status")
 """e1 and e2 are the principal strains, sigma is that of the strain along the load, residual is chi squared."""
+
+Image = NDArray[np.uint8]
+_SUB = 4  # bits of subpixel places in OpenCV's polygons
+_LONGEST, _SHORTEST = 1280, 560  # of a painted picture's longer side, px
+_PAPER, _INK, _LINE, _PLAIN = 255, (40, 35, 30), (120, 115, 110), 150
+_MIN_WIDTH, _MIN_HEIGHT = 480, 240
+_MARGIN, _TITLE, _BAR, _TICK = 14, 28, 18, 5  # px: around, a line of the title, the bar, a tick
+_AXIS = 66, 48  # px for ticks and labels, on the left and below
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,15 +130,6 @@ class FieldMaps:
         span = self._ranges.setdefault(name, self._range(name)).update(values, noise)
         scale = ColourScale.of(name, span)
         return Painted(scale.colours(values, self._alpha), scale, values=values, sigmas=own)
-
-
-Image = NDArray[np.uint8]
-_SUB = 4  # bits of subpixel places in OpenCV's polygons
-_LONGEST, _SHORTEST = 1280, 560  # of a painted picture's longer side, px
-_PAPER, _INK, _LINE, _PLAIN = 255, (40, 35, 30), (120, 115, 110), 150
-_MIN_WIDTH, _MIN_HEIGHT = 480, 240
-_MARGIN, _TITLE, _BAR, _TICK = 14, 28, 18, 5  # px: around, a line of the title, the bar, a tick
-_AXIS = 66, 48  # px for ticks and labels, on the left and below
 
 
 @dataclass(frozen=True, slots=True)

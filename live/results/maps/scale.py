@@ -39,6 +39,19 @@ _SHOWN = {
 }  # fmt: skip
 _FROM_ZERO = ("residual", "chi2", "blur", "instants", "fate")
 
+_STATUSES = {
+    Status.OK: (42, 157, 75),
+    Status.NO_PATTERN: (127, 127, 127),
+    Status.CLIPPED: (242, 200, 15),
+    Status.OUTSIDE: (148, 103, 189),
+    Status.LOST: (214, 39, 40),
+    Status.NOT_CONVERGED: (255, 127, 14),
+    Status.POOR_MATCH: (31, 119, 180),
+    Status.UNEVEN: (140, 86, 75),
+    Status.AMBIGUOUS: (227, 119, 194),
+}
+_UNKNOWN = (60, 60, 60)
+
 
 def shown_unit(name: str) -> tuple[str, float]:
     """The unit of a map of the whole test for a person, and what its values are multiplied with."""
@@ -205,20 +218,6 @@ class ColourScale:
     @property
     def _table(self) -> Image:
         return diverging_table() if self.is_diverging else sequential_table()
-
-
-_STATUSES = {
-    Status.OK: (42, 157, 75),
-    Status.NO_PATTERN: (127, 127, 127),
-    Status.CLIPPED: (242, 200, 15),
-    Status.OUTSIDE: (148, 103, 189),
-    Status.LOST: (214, 39, 40),
-    Status.NOT_CONVERGED: (255, 127, 14),
-    Status.POOR_MATCH: (31, 119, 180),
-    Status.UNEVEN: (140, 86, 75),
-    Status.AMBIGUOUS: (227, 119, 194),
-}
-_UNKNOWN = (60, 60, 60)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,4 @@
-"""The plots of a report.
-
-The sections of cyclic tests, figures of cycles against the logarithm of their number, and of a creep.
-"""
+"""The plots of a report: those of every test, of cycles against the logarithm of their number, and of a creep."""
 
 from __future__ import annotations
 
@@ -11,7 +8,7 @@ import numpy as np
 
 from acquire.text import Amount, Message, joined
 from acquire.text.quantity import unit_of
-from analysis.evaluate import AT_LEAST, true_curve
+from analysis.evaluate import true_curve
 from analysis.evaluate.programme import Creep
 from live.config.figures import FIGURES
 from live.config.gauges import gauge_colours
@@ -27,6 +24,12 @@ from live.results.run_folder import RunFolder
 _NAMES = ("exx", "eyy", "exy")
 TIME = Message("time, s")
 _ROUNDING = 1e-9  # of a figure: changes below are none
+
+_ROWS = 12  # of the table
+_HEADS = (
+    Message("cycle"), Message("peak, valley of the force"), Message("range of the strain"), Message("secant modulus"),
+    Message("loop area"), Message("phase"),
+)  # fmt: skip
 
 
 def load_unit(curve: EvaluatedCurve) -> Unit:
@@ -99,11 +102,11 @@ def true_stress_strain(curve: EvaluatedCurve) -> Plot | None:
 
 def _highest(curve: EvaluatedCurve, e: Unit, load: Unit) -> Mark:
     """The point of the highest stress or force."""
-    top, name = curve.figures.Rm.value * load.factor, "Rm" if curve.is_stress else "Fm"
+    highest, name = curve.figures.Rm, "Rm" if curve.is_stress else "Fm"
+    top = highest.value * load.factor
     strain = curve.axial[int(np.nanargmax(np.where(np.isfinite(curve.axial), curve.load, np.nan)))]
-    text = Message("{top:.4g} {unit}", top, load.name)
     return Mark(
-        strain * e.factor, top, name, joined(" ", (AT_LEAST, text)) if curve.figures.Rm.is_bound else text
+        strain * e.factor, top, name, Message("{top:.4g} {unit}", top, load.name), is_bound=highest.is_bound
     )
 
 
@@ -221,13 +224,6 @@ def plots(figures: tuple[Plot, ...]) -> Html:
         for figure in figures
     ]
     return element("div", joined_html(found), class_="plots")
-
-
-_ROWS = 12  # of the table
-_HEADS = (
-    Message("cycle"), Message("peak, valley of the force"), Message("range of the strain"), Message("secant modulus"),
-    Message("loop area"), Message("phase"),
-)  # fmt: skip
 
 
 def long_sections(test: FinishedTest) -> Html:

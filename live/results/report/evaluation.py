@@ -1,6 +1,6 @@
 """The evaluation of a finished run: its curve with the tensile figures, the lag of the load, the instants to show.
 
-The still phase of a finished test and the noise floor measured in it, for report, comparison and batch.
+Report, comparison and batch have the still phase at its start from here, with the noise floor measured in it.
 """
 
 from __future__ import annotations
@@ -32,6 +32,9 @@ MAX_INSTANTS = 64
 
 _MEANS = ("exx", "eyy", "exy")
 _DISPLACEMENTS = ("u", "v")
+
+Array = NDArray[np.float64]
+_BROKEN = 0.02  # of the highest force: below it there is no specimen any more
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +73,6 @@ def _maps(
     for row in rows:
         values, sigma = (np.asarray(strain.maps(map_, row), np.float64) for map_ in (name, f"sigma_{name}"))
         yield values, sigma
-
-
-Array = NDArray[np.float64]
-_BROKEN = 0.02  # of the highest force: below it there is no specimen any more
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -69,6 +69,9 @@ figure,.tile,.band,tr{break-inside:avoid}.plots,.pairs{grid-template-columns:1fr
 """
 )
 
+Shown = str | tuple[Printed, str]
+"""A text, or the parts of a quantity with a remark."""
+
 
 class Html(str):
     """Markup that needs no escaping."""
@@ -134,10 +137,6 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]], numbers: Seque
     head = "".join(cell("th", k, words) for k, words in enumerate(heads))
     body = "".join(f"<tr>{''.join(cell('td', k, w) for k, w in enumerate(row))}</tr>\n" for row in rows)
     return Html(f'<div class="wide"><table><tr>{head}</tr>\n{body}</table></div>')
-
-
-Shown = str | tuple[Printed, str]
-"""A text, or the parts of a quantity with a remark."""
 
 
 def tiles(pairs: Mapping[str, Shown]) -> Html:

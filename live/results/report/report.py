@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquire.errors import DataError
 from acquire.hdf5 import storable
 from acquire.text import Amount, Message, counts
 from acquire.text.message import joined as joined_texts
@@ -113,8 +112,7 @@ def make_report(run: RunFolder, wanted: ReportRequest, screen: Screen) -> Report
     DataError
         Its files cannot be read, or hold no measurement, or not this map.
     """
-    if not run.strain.n:
-        raise DataError("{path}: holds no measurement, there is nothing to report", run.strain.path)
+    run.strain.check_measured()
     content = _content(run, wanted, screen)
     for side in _SIDES:
         text = storable(page(Message("{title}: phasedic report", run.title), _parts(content, wanted, side)))

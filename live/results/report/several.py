@@ -9,7 +9,7 @@ from typing import TextIO
 
 import numpy as np
 
-from acquire.errors import ConfigError, DataError
+from acquire.errors import ConfigError
 from acquire.text import Message, word
 from analysis.evaluate import CONFIDENCE, TensileFigures
 from live.config.cameras import BACK, FRONT
@@ -188,8 +188,7 @@ def tests_of(runs: Sequence[RunFolder]) -> list[ComparedTest]:
     if len(runs) < _MIN_RUNS:
         raise ConfigError("--compare needs at least two runs")
     for run in runs:
-        if not run.strain.n:
-            raise DataError("{path}: holds no measurement, there is nothing to compare", run.strain.path)
+        run.strain.check_measured()
     found = [ComparedTest(run.title, str(run.path), EvaluatedCurve.of(run)) for run in runs]
     if len({test.curve.is_stress for test in found}) > 1:
         without = ", ".join(test.path for test in found if not test.curve.is_stress)
@@ -215,7 +214,17 @@ def summary(values: Sequence[float]) -> tuple[float, float, int]:
 
 def compare(tests: Sequence[ComparedTest]) -> Report:
     """The report: the curves in one plot, and the table."""
-    figures = (_together(tests),)
+    e = strain_unit(*(test.curve.axial for test in tests))
+    load = load_unit(max((test.curve for test in tests), key=lambda c: np.nanmax(c.load, initial=0.0)))
+    names = [test.title for test in tests]
+    if sum(len(name) for name in names) > _MAX_LABELS:
+        names = [str(k + 1) for k in range(len(tests))]
+    lines = tuple(
+        PlotLine(names[k], test.curve.axial * e.factor, test.curve.load * load.factor, colour=k)
+        for k, test in enumerate(tests)
+    )
+    title, up = load_labels(load.name, stresses=tests[0].curve.is_stress)
+    figures = (Plot("comparison", title, axial_label(e), up, lines),)
     words = Message(
         "E, nu and the strengths of each test, as in its own report, with half of the interval ({CONFIDENCE:.0%}); "
         "mean and standard deviation are over the tests.",
@@ -253,20 +262,6 @@ def _quoted(words: str) -> str:
     """A field of a CSV that no spreadsheet reads as a formula."""
     plain = words.lstrip("=+-@\t ") or "-"
     return '"' + plain.replace('"', '""') + '"'
-
-
-def _together(tests: Sequence[ComparedTest]) -> Plot:
-    e = strain_unit(*(test.curve.axial for test in tests))
-    load = load_unit(max((test.curve for test in tests), key=lambda c: np.nanmax(c.load, initial=0.0)))
-    names = [test.title for test in tests]
-    if sum(len(name) for name in names) > _MAX_LABELS:
-        names = [str(k + 1) for k in range(len(tests))]
-    lines = tuple(
-        PlotLine(names[k], test.curve.axial * e.factor, test.curve.load * load.factor, colour=k)
-        for k, test in enumerate(tests)
-    )
-    title, up = load_labels(load.name, stresses=tests[0].curve.is_stress)
-    return Plot("comparison", title, axial_label(e), up, lines)
 
 
 def _table(tests: Sequence[ComparedTest]) -> Html:

@@ -76,6 +76,7 @@ class Mark:
     y: float
     name: str
     value: str
+    is_bound: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -244,7 +245,7 @@ def _thinned(x: Array, y: Array) -> NDArray[np.intp]:
 def _mark(mark: Mark, axes: _Axes) -> str:
     x, y = axes.across(mark.x), axes.down(mark.y)
     left = x > WIDTH - 150
-    name = Message("{name} = {value}", mark.name, mark.value)
+    name = Message("{name} {sign} {value}", mark.name, "≥" if mark.is_bound else "=", mark.value)
     words = _word(x + (-8 if left else 8), y + 18, name, "end" if left else "start", "word ink")
     return f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="5"/>{words}'
 

@@ -1,6 +1,6 @@
 """The check, repeated several times a second while lens, light and exposure are adjusted.
 
-How much less sharp the picture is than the sharpest one so far, while lens and distance are adjusted.
+Meanwhile it says how much less sharp the picture is than the sharpest one so far.
 """
 
 from __future__ import annotations
@@ -33,6 +33,14 @@ if TYPE_CHECKING:
 NOT_KNOWN = Blur(math.nan, math.nan)
 SHARPER = 3.0
 """Sigmas by which a picture is sharper than the reference and takes its place."""
+
+QUICK_FRAMES = 8
+"""Frames of one quick check."""
+RENEW_EVERY = 8
+"""Quick checks after which noise and motion are measured again, and a specimen not yet found is searched."""
+SEARCH_EVERY = 16
+"""Quick checks after which a found specimen is searched again."""
+SAME_REGION = 0.02  # share of a region by which a new one may differ without replacing it
 
 
 class SharpestPicture:
@@ -72,15 +80,6 @@ class SharpestPicture:
             self._peak = sharpness
             self._kernel, _ = prepare(burst, self._kernel.grid, sample.settings, sample.noise)
         return found
-
-
-QUICK_FRAMES = 8
-"""Frames of one quick check."""
-RENEW_EVERY = 8
-"""Quick checks after which noise and motion are measured again, and a specimen not yet found is searched."""
-SEARCH_EVERY = 16
-"""Quick checks after which a found specimen is searched again."""
-SAME_REGION = 0.02  # share of a region by which a new one may differ without replacing it
 
 
 class RollingFrames:

@@ -26,6 +26,8 @@ FORMAT = 1
 DPI = 80
 _BAR = 24  # letters
 
+LIBRARIES = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless")
+
 
 @dataclass(frozen=True, slots=True)
 class ResultTable:
@@ -193,9 +195,6 @@ class ProgressBar:
     def _write(self, text: str) -> None:
         if self._screen is not None:
             print(text, end="", file=self._screen, flush=True)
-
-
-LIBRARIES = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless")
 
 
 def machine() -> str:

@@ -44,6 +44,14 @@ noise and rounding, and the kernel measures it. **This truth shares its interpol
 independent truth for a picture whose scene is not known, so the bias is a lower bound.** Noise and spatial
 resolution are valid."""
 
+_UNITS = {
+    "size": "ZOI px", "n": "frames averaged", "bias_u": "largest bias of u px", "sigma_u": "std of u px",
+    "sigma_strain": "std of exx", "predicted_u": "predicted sigma of u px",
+    "predicted_strain": "predicted sigma of exx",
+    "limit_strain": "noise limit of exx", "strain_error": "relative error of 1e-3 strain", "length": "l_10% px",
+    "refused": "share of ZOIs refused", "zois": "ZOIs",
+}  # fmt: skip
+
 
 def characterise_pattern(arguments: argparse.Namespace, folder: Path) -> int:
     """The command; returns the exit code.
@@ -148,15 +156,6 @@ def _pairs(report: PatternReport) -> tuple[tuple[float, float], ...]:
     return tuple(
         (float(r), float(p)) for r, p in zip(report.spectrum_radius, report.spectrum_power, strict=True)
     )
-
-
-_UNITS = {
-    "size": "ZOI px", "n": "frames averaged", "bias_u": "largest bias of u px", "sigma_u": "std of u px",
-    "sigma_strain": "std of exx", "predicted_u": "predicted sigma of u px",
-    "predicted_strain": "predicted sigma of exx",
-    "limit_strain": "noise limit of exx", "strain_error": "relative error of 1e-3 strain", "length": "l_10% px",
-    "refused": "share of ZOIs refused", "zois": "ZOIs",
-}  # fmt: skip
 
 
 def _column(name: str) -> str:

@@ -13,17 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from live.pipeline.queues import Thinned
 from live.pipeline.snapshot import Snapshot
-from live.ui.rerun.messages import (
-    Row,
-    ViewSetup,
-    ViewTarget,
-    events_message,
-    field_message,
-    figures_message,
-    picture_message,
-    rows_message,
-    setup_message,
-)
+from live.ui.rerun import messages
 from live.ui.rerun.wire import Kind, Parcel
 
 if TYPE_CHECKING:
@@ -62,7 +52,7 @@ class Pending:
     """
 
     def __init__(self) -> None:
-        self.rows: dict[Kind, deque[Row]] = {kind: deque() for kind in HISTORY_ROWS}
+        self.rows: dict[Kind, deque[messages.Row]] = {kind: deque() for kind in HISTORY_ROWS}
         self.events: deque[Event] = deque()
         self.field: tuple[float, StrainField] | None = None
         self.picture: Frame | None = None
@@ -71,7 +61,7 @@ class Pending:
         self.whole: Mapping[str, Floats] = {}
         self.dropped = 0
 
-    def row(self, kind: Kind, row: Row) -> None:
+    def row(self, kind: Kind, row: messages.Row) -> None:
         """Keep a row; the oldest is dropped where too many wait."""
         self._keep(self.rows[kind], row, MAX_ROWS)
 
@@ -103,7 +93,9 @@ class PastMessages:
     """
 
     def __init__(self) -> None:
-        self.rows: dict[Kind, Thinned[Row]] = {kind: Thinned(limit) for kind, limit in HISTORY_ROWS.items()}
+        self.rows: dict[Kind, Thinned[messages.Row]] = {
+            kind: Thinned(limit) for kind, limit in HISTORY_ROWS.items()
+        }
         self.events: deque[Event] = deque(maxlen=MAX_EVENTS)
         self.status: str | None = None
         self.whole: Mapping[str, Floats] = {}
@@ -125,7 +117,9 @@ class Outbox:
         Numbers of fields and pictures sent.
     """
 
-    def __init__(self, setup: ViewSetup, pending: Pending, playback: MessageSource = lambda: ()) -> None:
+    def __init__(
+        self, setup: messages.ViewSetup, pending: Pending, playback: MessageSource = lambda: ()
+    ) -> None:
         self._setup, self._pending, self._past = setup, pending, PastMessages()
         self._playback = playback
         self._first: Iterator[Parcel] = iter(())
@@ -133,7 +127,7 @@ class Outbox:
         self._ending = False
         self.sent = dict.fromkeys(self._due_t, 0)
 
-    def begin(self, target: ViewTarget) -> None:
+    def begin(self, target: messages.ViewTarget) -> None:
         """A process was started: send everything."""
         self._first = self._all(target)
 
@@ -141,11 +135,11 @@ class Outbox:
         """Send END after what waits."""
         self._ending = True
 
-    def _all(self, target: ViewTarget) -> Iterator[Parcel]:
-        yield setup_message(self._setup, target)
+    def _all(self, target: messages.ViewTarget) -> Iterator[Parcel]:
+        yield messages.setup_message(self._setup, target)
         for kind, rows in self._past.rows.items():
-            yield rows_message(kind, rows.items())
-        yield events_message(list(self._past.events))
+            yield messages.rows_message(kind, rows.items())
+        yield messages.events_message(list(self._past.events))
         if self._past.status is not None:
             yield Parcel(Kind.STATUS, {"markdown": self._past.status})
         if self._past.whole:
@@ -163,11 +157,11 @@ class Outbox:
                 rows = drained(waiting)
                 for row in rows:
                     past.rows[kind].append(row)
-                return rows_message(kind, rows)
+                return messages.rows_message(kind, rows)
         if pending.events:
             events = drained(pending.events)
             past.events.extend(events)
-            return events_message(events)
+            return messages.events_message(events)
         if pending.status is not None:
             past.status, pending.status = pending.status, None
             return Parcel(Kind.STATUS, {"markdown": past.status})
@@ -176,17 +170,17 @@ class Outbox:
             return Parcel(Kind.WHOLE, {}, {**past.whole})
         if pending.figures is not None:
             figures, pending.figures = pending.figures, None
-            return figures_message(figures)
+            return messages.figures_message(figures)
         return None
 
     def _large(self, now: float) -> Parcel | None:
         pending = self._pending
         if pending.field is not None and self._is_due(Kind.FIELD, now):
             (t, field), pending.field = pending.field, None
-            return self._paced(field_message(t, field), now, FIELD_HZ)
+            return self._paced(messages.field_message(t, field), now, FIELD_HZ)
         if pending.picture is not None and self._is_due(Kind.PICTURE, now):
             frame, pending.picture = pending.picture, None
-            return self._paced(picture_message(frame), now, self._setup.picture_hz)
+            return self._paced(messages.picture_message(frame), now, self._setup.picture_hz)
         return None
 
     def _is_due(self, kind: Kind, now: float) -> bool:

@@ -63,9 +63,12 @@ class RenderProcess:
     """
 
     def __init__(self) -> None:
+        # The allocator of rerun returns freed memory at once: a tenth less memory in a long test. Its file has no
+        # footer (``sinks.write``), of which it would warn.
+        own = {"MIMALLOC_PURGE_DELAY": "0", "RUST_LOG": "warn,re_log_encoding::rrd::file_sink=error"}
         with blocked_signals(signal.SIGINT, *HANGUP):
             # The process unblocks them once it ignores them.
-            self._process, ours = start_with_socket(python_command(_MODULE), _environment())
+            self._process, ours = start_with_socket(python_command(_MODULE), own | python_environment())
         with contextlib.suppress(OSError):
             ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BYTES)
         self._socket, self._pipe = ours, MessagePipe(ours)
@@ -113,16 +116,6 @@ class RenderProcess:
         with contextlib.suppress(subprocess.TimeoutExpired):
             return self._process.wait(_KILLED_S)
         return KILLED
-
-
-def _environment() -> dict[str, str]:
-    """The environment of the process.
-
-    The allocator of rerun returns freed memory at once: a tenth less memory in a long test. Its file has no footer
-    (``sinks.write``), of which it would warn.
-    """
-    own = {"MIMALLOC_PURGE_DELAY": "0", "RUST_LOG": "warn,re_log_encoding::rrd::file_sink=error"}
-    return own | python_environment()
 
 
 class Stuck(OSError):
@@ -235,18 +228,15 @@ class Supervisor:
         self._cause, self._started_t = "", now
         self._renderer = RenderProcess()
         self.pid = self._renderer.pid
-        self._outbox.begin(self._next_target())
-        return self._renderer
-
-    def _next_target(self) -> ViewTarget:
-        """The same port as before, and a new file: view.rrd, view-2.rrd ..."""
+        # The same port as before, and a new file: view.rrd, view-2.rrd ...
         target = self._target
         if self.served.port is not None:
             target = replace(target, port=self.served.port)
         if target.rrd is not None and self.starts > 1:
             path = Path(target.rrd)
             target = replace(target, rrd=str(path.with_stem(f"{path.stem}-{self.starts}")))
-        return target
+        self._outbox.begin(target)
+        return self._renderer
 
     @contextmanager
     def _guarded(self) -> Iterator[None]:

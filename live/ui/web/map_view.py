@@ -1,6 +1,6 @@
 """The map over the picture of a running test: its range, its histogram, and the value at a place.
 
-Small pictures for the page: grey levels, saturated pixels, and the noise of ZOIs in colours.
+The page's other small pictures are made here too: grey levels, saturated pixels, and the noise of ZOIs in colours.
 """
 
 from __future__ import annotations
@@ -31,6 +31,12 @@ QUALITY = 80
 RED = (40, 40, 255)  # blue, green, red
 
 Bytes = NDArray[np.uint8]
+
+RANGES = ("automatic", "symmetric", "fixed")
+BARS = 24
+"""Of the histogram, over the range of the colours."""
+_RAMP = 11  # colours of the bar, between which the page shades
+OUTSIDE = Message("no ZOI is here")
 
 
 def grey_levels(image: NDArray[Any], bits: int, max_side_px: int = MAX_SIDE_PX) -> tuple[Bytes, float]:
@@ -97,13 +103,6 @@ def traffic_light(values: NDArray[Any], good: float, bad: float) -> Bytes:
         share < 0.5, green + 2 * share * (yellow - green), yellow + (2 * share - 1) * (red - yellow)
     )
     return np.concatenate([rgb, np.full((*values.shape, 1), 110.0)], axis=-1).astype(np.uint8)
-
-
-RANGES = ("automatic", "symmetric", "fixed")
-BARS = 24
-"""Of the histogram, over the range of the colours."""
-_RAMP = 11  # colours of the bar, between which the page shades
-OUTSIDE = Message("no ZOI is here")
 
 
 @dataclass(frozen=True, slots=True)

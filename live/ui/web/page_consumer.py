@@ -150,10 +150,7 @@ class PageConsumer(Consumer):
         self._limits.add(i.t, {FORCE: i.force, STRESS: stress, AXIAL: axial})
         if self._channels is not None:
             self._rate = self._channels.read(measurement)["strain_rate"]
-        self._keep_peak(measurement)
-
-    def _keep_peak(self, measurement: Measurement) -> None:
-        """The measurement at the force of largest magnitude; without a force the last one."""
+        # The measurement at the force of largest magnitude; without a force the last one.
         force = measurement.time_step.force
         self._peak_N = peak_force(self._peak_N, force)
         if self._peak is None or math.isnan(self._peak_N) or self._peak_N == force:

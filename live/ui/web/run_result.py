@@ -153,4 +153,5 @@ def _lines(
         yield {"points": [(float(x), float(y)) for x, y in points]}
     for mark in plot.marks:
         value = mark.y / unit.factor
-        yield {"points": [(mark.x / e.factor, value)], "words": {"name": mark.name, "value": value}}
+        words = {"name": mark.name, "value": value, "bound": mark.is_bound}
+        yield {"points": [(mark.x / e.factor, value)], "words": words}

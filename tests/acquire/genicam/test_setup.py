@@ -24,7 +24,7 @@ class MadeUpCamera:
             "ExposureAuto": "Continuous", "GammaEnable": "true",
         } | more  # fmt: skip
         self.makes: dict[str, Any] = {}
-        self.is_gige = "GevSCPSPacketSize" in more
+        self.is_gige, self.identity = "GevSCPSPacketSize" in more, "made up"
 
     def has(self, feature: str) -> bool:
         return feature in self.values
@@ -82,10 +82,11 @@ def asked(query: str, camera: MadeUpCamera) -> GenicamSetup:
 
 def test_what_is_in_force_is_read_back() -> None:
     found, camera = made("exposure_us=8000&gain=6&fps=30&x=16&y=3&width=320&height=200&format=Mono12p")
-    assert (found.x, found.y, found.width, found.height) == (16, 3, 320, 200)
-    assert (found.exposure_s, found.gain, found.fps, found.bits) == (pytest.approx(8e-3), 6, 30, 12)
+    assert (found.x, found.y, found.info.width, found.info.height) == (16, 3, 320, 200)
+    assert (found.info.exposure_s, found.gain) == (pytest.approx(8e-3), 6)
+    assert (found.info.fps, found.info.bits) == (30, 12)
     assert (camera.values["ExposureAuto"], camera.values["GammaEnable"]) == ("Off", "false")
-    exposure, gain = found.settings
+    exposure, gain = found.info.settings
     assert (exposure.low, exposure.high) == (10, pytest.approx(1e6 / 30))
     assert (gain.low, gain.high) == (0, 24)
 
@@ -106,7 +107,7 @@ def test_what_was_asked_is_asked_again_after_the_camera_was_away() -> None:
         ("exposure_us=5", "from 10 to"),
         ("format=Mono8&bits=9", "bits=9 is not possible with Mono8"),
         ("format=Mono12p&bits=8", "bits=8 is not possible with Mono12p"),
-        ("format=Mono16", "the camera offers Mono12p, Mono8"),
+        ("format=Mono16", "format=Mono16 is not possible; allowed: Mono12p, Mono8"),
         ("packet_size=8000", "is for GigE cameras"),
     ],
 )
@@ -122,7 +123,7 @@ def test_what_is_not_possible_is_refused_with_what_is(query: str, words: str) ->
         ("gain=6", {"gain": 6.1}, "gain=6: the camera makes it 6.1"),
         ("fps=30", {"frame_rate": 29.0}, "fps=30: the camera makes it 29"),
         ("width=320", {"Width": 336}, "width=320: the camera makes it 336"),
-        ("format=Mono8", {"PixelFormat": "Mono12p"}, "asked for format=Mono8, the camera gives Mono12p"),
+        ("format=Mono8", {"PixelFormat": "Mono12p"}, "format=Mono8: the camera makes it Mono12p"),
     ],
 )
 def test_another_value_than_asked_is_refused_beyond_one_percent(
@@ -150,7 +151,7 @@ def test_another_value_than_asked_is_refused_beyond_one_percent(
 def test_the_white_level_is_that_of_the_camera_below_the_top_of_its_bits(
     query: str, own: int, white: int | None
 ) -> None:
-    assert made(f"format=Mono12p{query}", PixelDynamicRangeMax=own)[0].white == white
+    assert made(f"format=Mono12p{query}", PixelDynamicRangeMax=own)[0].info.white_level == white
 
 
 @pytest.mark.parametrize(
@@ -163,8 +164,8 @@ def test_the_white_level_is_that_of_the_camera_below_the_top_of_its_bits(
 )
 def test_the_rate_is_the_one_that_results(query: str, more: dict[str, Any], fps: float | None) -> None:
     found, _ = made(query, **more)
-    assert found.fps == fps
-    assert [text for text in found.warnings if "frames a second" in text] == (
+    assert found.info.fps == fps
+    assert [text for text in found.info.warnings if "frames a second" in text] == (
         ["the camera gives 33.3 frames a second, not 40: exposure, size or line limit it"]
         if fps == 33.3
         else []
@@ -174,8 +175,8 @@ def test_the_rate_is_the_one_that_results(query: str, more: dict[str, Any], fps:
 def test_what_changes_by_itself_or_bends_the_light_is_warned_of() -> None:
     camera = MadeUpCamera(Gamma=0.45, GevSCPSPacketSize=1400)
     camera.makes = {"ExposureAuto": "Continuous"}
-    texts = asked("", camera).warnings
+    texts = asked("", camera).info.warnings
     assert texts[0].startswith("the camera goes on changing by itself: ExposureAuto;")
     assert texts[1].startswith("Gamma is 0.45: grey levels are not proportional to light")
     assert texts[2].startswith("packets of 1400 bytes: it cannot try larger ones by itself")
-    assert made("packet_size=1500", GevSCPSPacketSize=1400, Gamma=1.0)[0].warnings == ()
+    assert made("packet_size=1500", GevSCPSPacketSize=1400, Gamma=1.0)[0].info.warnings == ()

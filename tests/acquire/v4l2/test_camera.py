@@ -288,7 +288,7 @@ def test_what_is_no_camera(caps: int, words: str) -> None:
 @pytest.mark.parametrize(
     ("query", "words"),
     [
-        ("format=Y16", "format=Y16 is not possible; the camera offers YUYV, GREY, Y12, MJPG"),
+        ("format=Y16", "format=Y16 is not possible; allowed: YUYV, GREY, Y12, MJPG"),
         ("width=640&height=480", "asked for 640x480, the driver gives 16x8; Y12 is offered in 8x4, 16x8"),
         ("fps=25", "asked for fps=25, the driver gives 20; Y12 8x4 is offered at 20, 10 1/s"),
         ("input=3", r"input=3 is not there; the camera has: 0 \(Camera 1\)"),

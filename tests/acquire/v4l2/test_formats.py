@@ -26,9 +26,8 @@ from acquire.v4l2.controls import (
     list_controls,
     still_automatic,
 )
-from acquire.v4l2.faults import fault_in_words, why_not_open
 from acquire.v4l2.formats import FORMATS, PLANES, Plane, decode, picture_size, preferred, warning_of
-from acquire.v4l2.listing import list_cameras
+from acquire.v4l2.listing import fault_in_words, list_cameras, why_not_open
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
 from tests.acquire.v4l2.test_setup import AUTO, EXPOSURE, GAIN, device_with, in_force
 

@@ -9,14 +9,14 @@ import pytest
 
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError
+from acquire.frame import CameraInfo
 from acquire.settings import read_settings
 from acquire.v4l2 import api
-from acquire.v4l2.camera import Setup, set_up
+from acquire.v4l2.camera import set_up
 from acquire.v4l2.controls import V4L2Settings, changeable, exposure_s, list_controls
 from acquire.v4l2.device import Identity, SizeRange, V4L2Device
-from acquire.v4l2.faults import find_again
 from acquire.v4l2.formats import preferred
-from acquire.v4l2.listing import _modes
+from acquire.v4l2.listing import _modes, find_again
 from tests.acquire.v4l2 import fake_kernel
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
 
@@ -29,7 +29,7 @@ def device_with(*controls: FakeControl, **more: object) -> V4L2Device:
     return V4L2Device("/dev/video0", FakeKernel(camera))
 
 
-def in_force(device: V4L2Device, query: str) -> Setup:
+def in_force(device: V4L2Device, query: str) -> CameraInfo:
     address = f"/dev/video0?{query}"
     return set_up(device, read_settings(V4L2Settings, parse_address(address)), address)
 
@@ -73,7 +73,7 @@ def test_what_cannot_be_written_has_no_slider(flags: int) -> None:
 def test_a_rate_is_in_force_within_a_hundredth(asked: str, taken: bool) -> None:
     device = device_with(rates=(20,))
     if taken:
-        assert in_force(device, f"fps={asked}").mode.fps == 20
+        assert in_force(device, f"fps={asked}").fps == 20
     else:
         with pytest.raises(ConfigError, match=f"asked for fps={asked}, the driver gives 20"):
             in_force(device, f"fps={asked}")

@@ -84,7 +84,7 @@ def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[st
     for taken in ("rig.toml", "rig.png", "rig-mask.png"):
         (tmp_path / taken).write_text("mine")
         assert main(["init", str(tmp_path / "rig.toml"), "--camera", SIM, "--fixed"]) == 2
-        assert f"{taken} exists; nothing is overwritten" in capsys.readouterr().err
+        assert f"{taken} exists already and is not overwritten" in capsys.readouterr().err
         assert [p.name for p in tmp_path.iterdir()] == [taken]
         (tmp_path / taken).unlink()
 

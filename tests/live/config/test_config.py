@@ -274,7 +274,7 @@ def test_a_file_that_is_no_configuration_is_refused(rig: Path, text: str) -> Non
 
 
 def test_a_new_rig_overwrites_nothing(rig: Path, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="nothing is overwritten"):
+    with pytest.raises(ConfigError, match="is not overwritten"):
         new_rig(rig, TEXT)
     with pytest.raises(ConfigError, match="cannot be written"):
         new_rig(tmp_path / "no" / "folder.toml", TEXT)

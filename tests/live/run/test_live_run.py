@@ -142,7 +142,7 @@ def test_the_exit_code_says_what_was_lost(what: str, code: int) -> None:
     errors = {"DataError": DataError("x"), "DeviceError": DeviceError("x"), "a defect": ValueError("x")}
     bench.one.source.error = errors.get(what)
     bench.one._keeper.load_failure = 3 if what == "load" else 0
-    bench.one._measurer.failure = int(what == "measuring")
+    bench.one.measurer.failure = int(what == "measuring")
     bench.stop.request(INTERRUPTED if what == "interrupted" else "the time is over")
     counts = {"lost": {"lost": 1}, "load_lost": {"load_lost": 1}, "not counted": {"grabbed": 1},
               "unrecorded": {"unrecorded": 1, "grabbed": 1, "measured": 1},
@@ -255,7 +255,7 @@ def test_all_that_measure_have_ended_before_the_outputs_are_closed() -> None:
     """The reference of one camera is refused while another still measures."""
     bench, order = run(), list[str]()
     measurer: Any = SimpleNamespace(end=lambda: order.append("measured"))
-    bench.one._measurer = measurer
+    bench.one.measurer = measurer
     bench.one.outputs = SimpleNamespace(end=lambda: order.append("outputs"))
     bench.one.drain()
     bench.one.close()

@@ -69,7 +69,7 @@ def test_a_rig_file_is_made_of_what_is_plugged_in(
 @pytest.mark.parametrize(
     ("query", "words"),
     [
-        ("format=MJPG", "format=MJPG is not possible; the camera offers YUYV, UYVY, GREY"),
+        ("format=MJPG", "format=MJPG is not possible; allowed: YUYV, UYVY, GREY"),
         ("width=111&height=99", "asked for 111x99, the driver gives 320x180"),
         ("width=640&height=360&fps=1234", "asked for fps=1234, the driver gives"),
         ("input=7", r"input=7 is not there; the camera has: 0 \(Webcam 0\), 1 \(HDMI 0\)"),

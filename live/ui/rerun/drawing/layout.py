@@ -45,6 +45,33 @@ _INKS = {
 }  # fmt: skip
 """Of a tone; other states are green."""
 
+BAR_GAP, BAR_WIDTH, BAR_LABEL, BAR_END = 0.03, 0.035, 0.16, 0.275
+"""Colour bar, right of the picture: its left edge, width, middle and right end of its labels.
+
+In ``bar_unit``s, like everything that depends on the size of letters.
+"""
+
+BAR_TOP, BAR_HEIGHT = 0.12, 0.84
+"""Its top edge (the unit stands above) and height, in heights of the picture."""
+
+LETTER = 0.028
+"""About half the height of a line of text, in ``bar_unit``s."""
+
+CURVE_WIDTH = 1.6
+"""Width of the curve's rectangle; its height is 1."""
+
+_CAMERA = Message("Camera")
+_TITLES = {"e1": Message("e1 (largest)"), "e2": Message("e2 (smallest)")}
+
+_WIDE = 2.2
+"""Pictures wider than so many heights are placed one above the other."""
+
+ROWS = [2.4, 5.6, 3.8]
+"""Shares of the height: the large figures, the pictures, plots and texts."""
+
+VALUES = "/specimen/values"
+"""Entity with the values of every ZOI, shown where one is pointed at or clicked."""
+
 
 @dataclass(frozen=True, slots=True)
 class Axis:
@@ -211,34 +238,6 @@ def _write(
     if wide > width:
         scale, thick = scale * width / wide, 1 if is_thin else max(2, int(thick * width / wide))
     cv2.putText(picture, text, at, font, scale, colour, thick, cv2.LINE_AA)
-
-
-BAR_GAP, BAR_WIDTH, BAR_LABEL, BAR_END = 0.03, 0.035, 0.16, 0.275
-"""Colour bar, right of the picture: its left edge, width, middle and right end of its labels.
-
-In ``bar_unit``s, like everything that depends on the size of letters.
-"""
-
-BAR_TOP, BAR_HEIGHT = 0.12, 0.84
-"""Its top edge (the unit stands above) and height, in heights of the picture."""
-
-LETTER = 0.028
-"""About half the height of a line of text, in ``bar_unit``s."""
-
-CURVE_WIDTH = 1.6
-"""Width of the curve's rectangle; its height is 1."""
-
-_CAMERA = Message("Camera")
-_TITLES = {"e1": Message("e1 (largest)"), "e2": Message("e2 (smallest)")}
-
-_WIDE = 2.2
-"""Pictures wider than so many heights are placed one above the other."""
-
-ROWS = [2.4, 5.6, 3.8]
-"""Shares of the height: the large figures, the pictures, plots and texts."""
-
-VALUES = "/specimen/values"
-"""Entity with the values of every ZOI, shown where one is pointed at or clicked."""
 
 
 def gauge_path(name: str) -> str:

@@ -15,18 +15,9 @@ from typing import Any
 
 from acquire.system import inherited_socket, kill_this_process, lowest_priority, memory_MiB, wait_until_closed
 from acquire.text import Message
+from live.ui.rerun import messages
 from live.ui.rerun.drawing.scene import ViewScene
 from live.ui.rerun.drawing.sinks import FINISHED_MIB, RerunSink, serve, write
-from live.ui.rerun.messages import (
-    ViewSetup,
-    ViewTarget,
-    events_of,
-    field_of,
-    figures_of,
-    picture_of,
-    rows_of,
-    setup_of,
-)
 from live.ui.rerun.wire import Kind, MessagePipe, Parcel
 
 log = logging.getLogger(__name__)
@@ -41,16 +32,16 @@ _POLL_S = 2.0
 
 
 SHOW: dict[Kind, Callable[[ViewScene, Parcel], object]] = {
-    Kind.MEANS: lambda scene, message: scene.means(rows_of(message)),
-    Kind.FIELD: lambda scene, message: scene.field(*field_of(message)),
-    Kind.PICTURE: lambda scene, message: scene.picture(picture_of(message)),
-    Kind.LOADS: lambda scene, message: scene.loads(rows_of(message)),
-    Kind.POINTS: lambda scene, message: scene.points(rows_of(message)),
-    Kind.GAUGE: lambda scene, message: scene.gauge(message.meta["name"], rows_of(message)),
-    Kind.EVENTS: lambda scene, message: scene.events(events_of(message)),
+    Kind.MEANS: lambda scene, message: scene.means(messages.rows_of(message)),
+    Kind.FIELD: lambda scene, message: scene.field(*messages.field_of(message)),
+    Kind.PICTURE: lambda scene, message: scene.picture(messages.picture_of(message)),
+    Kind.LOADS: lambda scene, message: scene.loads(messages.rows_of(message)),
+    Kind.POINTS: lambda scene, message: scene.points(messages.rows_of(message)),
+    Kind.GAUGE: lambda scene, message: scene.gauge(message.meta["name"], messages.rows_of(message)),
+    Kind.EVENTS: lambda scene, message: scene.events(messages.events_of(message)),
     Kind.STATUS: lambda scene, message: scene.status(message.meta["markdown"]),
     Kind.WHOLE: lambda scene, message: scene.whole(message.arrays),
-    Kind.FIGURES: lambda scene, message: scene.figures(figures_of(message)),
+    Kind.FIGURES: lambda scene, message: scene.figures(messages.figures_of(message)),
 }
 
 
@@ -78,7 +69,7 @@ def main() -> int:
     channel = ReplyChannel(pipe)
     end_with(parent)
     try:
-        setup, target = setup_of(pipe.next())
+        setup, target = messages.setup_of(pipe.next())
         sinks = _open(setup, target, channel)
         if not sinks:
             return 3
@@ -94,7 +85,7 @@ def main() -> int:
     return 0
 
 
-def _open(setup: ViewSetup, target: ViewTarget, channel: ReplyChannel) -> list[RerunSink]:
+def _open(setup: messages.ViewSetup, target: messages.ViewTarget, channel: ReplyChannel) -> list[RerunSink]:
     sinks, port, rrd, troubles = [], None, None, []
     try:
         if target.port is not None:

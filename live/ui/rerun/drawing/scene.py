@@ -16,34 +16,7 @@ from live.pipeline.queues import Thinned
 from live.results.maps.colours import LINES, LINES_ON_DARK, number
 from live.results.maps.painting import FieldMaps, Painted
 from live.results.maps.scale import AutoRange, ColourScale, range_kind
-from live.ui.rerun.drawing.layout import (
-    BAR_GAP,
-    BAR_HEIGHT,
-    BAR_LABEL,
-    BAR_TOP,
-    BAR_WIDTH,
-    LETTER,
-    MAX_POINTS,
-    VALUES,
-    CurveDrawing,
-    bar_unit,
-    gauge_path,
-    paint,
-)
-from live.ui.rerun.drawing.shapes import (
-    CYAN,
-    DIM,
-    YELLOW,
-    ArrowScale,
-    mean_motion,
-    reduced,
-    region_edges,
-    sample_boxes,
-    text_labels,
-    thinned,
-    value_dots,
-    with_heads,
-)
+from live.ui.rerun.drawing import layout, shapes
 from live.ui.rerun.drawing.sinks import RerunSink
 from live.ui.rerun.messages import MAPS, STRAINS, LargeFigures, PictureMessage, Row, ViewSetup
 
@@ -79,9 +52,9 @@ class ViewScene:
         is_symmetric = setup.scale == "symmetric"
         self._maps = FieldMaps(setup.axis, setup.strain_range, is_symmetric=is_symmetric, alpha=_ALPHA)
         self._drawn: dict[str, object] = {}
-        self._curve: Thinned[Row] = Thinned(MAX_POINTS)
-        self._drawn_curve = CurveDrawing(setup)
-        self._arrows = ArrowScale()
+        self._curve: Thinned[Row] = Thinned(layout.MAX_POINTS)
+        self._drawn_curve = layout.CurveDrawing(setup)
+        self._arrows = shapes.ArrowScale()
         self._strains: Thinned[Row] = Thinned(_MAX_STRAINS)
         self._forces: Thinned[Row] = Thinned(_MAX_FORCES)
         self._newest: LargeFigures | None = None
@@ -97,8 +70,8 @@ class ViewScene:
         for k, name in enumerate(self._setup.gauges):
             colour = ON_DARK[self._setup.colours.get(name, k) % len(ON_DARK)]
             style = rr.Measurements.from_fields(names=name, colors=colour, widths=2.0)
-            self._log(gauge_path(name), style, static=True)
-        self._log("load/force", rr.SeriesLines(colors=YELLOW, names="load", widths=2.0), static=True)
+            self._log(layout.gauge_path(name), style, static=True)
+        self._log("load/force", rr.SeriesLines(colors=shapes.YELLOW, names="load", widths=2.0), static=True)
         self._outlines(self._setup.grid)
         self._region(self._setup.grid)
 
@@ -121,7 +94,7 @@ class ViewScene:
         if not self._due:
             return
         light = self._setup.light
-        image, factor = reduced(picture.image, picture.bits, LIGHT_MAX_PX if light else MAX_PX)
+        image, factor = shapes.reduced(picture.image, picture.bits, LIGHT_MAX_PX if light else MAX_PX)
         data = encoded(".jpg", image, LIGHT_QUALITY if light else QUALITY)
         self._at(picture.t)
         self._log_due(
@@ -185,15 +158,15 @@ class ViewScene:
             each = [c for c, gauge in zip(colours, lines, strict=True) for _ in gauge]
             gauges = rr.LineStrips2D(strips, colors=each, radii=rr.Radius.ui_points(2.0), draw_order=50)
             self._log("specimen/gauges", gauges, static=True)
-            names = text_labels([gauge[0][0] for gauge in lines], list(self._setup.outlines), WHITE)
+            names = shapes.text_labels([gauge[0][0] for gauge in lines], list(self._setup.outlines), WHITE)
             self._log("specimen/gauges/names", names, static=True)
-        boxes = sample_boxes(grid)
+        boxes = shapes.sample_boxes(grid)
         self._log(
             "specimen/zoi/boxes",
             rr.Boxes2D(
                 centers=boxes,
                 half_sizes=np.full_like(boxes, grid.size / 2),
-                colors=(*YELLOW, 200),
+                colors=(*shapes.YELLOW, 200),
                 radii=rr.Radius.ui_points(0.75),
                 draw_order=20,
             ),
@@ -205,32 +178,38 @@ class ViewScene:
         import rerun as rr
 
         edge = rr.LineStrips2D(
-            region_edges(grid), colors=(*CYAN, 255), radii=rr.Radius.ui_points(1.0), draw_order=18
+            shapes.region_edges(grid),
+            colors=(*shapes.CYAN, 255),
+            radii=rr.Radius.ui_points(1.0),
+            draw_order=18,
         )
         self._log("specimen/zoi/region", edge, static=True)
 
     def _specimen(self, field: StrainField) -> None:
         import rerun as rr
 
-        matrix, shift = mean_motion(field)
+        matrix, shift = shapes.mean_motion(field)
         self._log_due("specimen", rr.Transform3D(mat3x3=matrix, translation=shift))
         origins, vectors, factor = self._arrows.arrows(field)
         arrows = rr.LineStrips2D(
-            with_heads(origins, vectors), colors=CYAN, radii=rr.Radius.ui_points(1.0), draw_order=30
+            shapes.with_heads(origins, vectors),
+            colors=shapes.CYAN,
+            radii=rr.Radius.ui_points(1.0),
+            draw_order=30,
         )
         self._log_due("zoi/displacement", arrows)
-        total, outlined = field.grid.n_active, len(sample_boxes(field.grid))
+        total, outlined = field.grid.n_active, len(shapes.sample_boxes(field.grid))
         count = f"{outlined} of {number(total)}" if outlined < total else f"all {total}"
         text = f"displacement ×{number(factor)} · {count} ZOIs outlined"
         if self._changed("words", text):
-            above = [[0.5 * self._setup.width, -0.08 * bar_unit(self._setup)]]
-            self._log("zoi/words", text_labels(above, [text], CYAN))
+            above = [[0.5 * self._setup.width, -0.08 * layout.bar_unit(self._setup)]]
+            self._log("zoi/words", shapes.text_labels(above, [text], shapes.CYAN))
         plain = field.status == Status.NO_PATTERN  # background: not rejected
         for name, selected, colour in (
-            ("plain", plain, DIM),
+            ("plain", plain, shapes.DIM),
             ("rejected", ~plain & np.isnan(field.exx), RED),
         ):
-            dots = thinned(field.grid, selected & field.grid.active)
+            dots = shapes.thinned(field.grid, selected & field.grid.active)
             if self._changed(name, dots.tobytes()):
                 points = rr.Points2D(dots, colors=colour, radii=rr.Radius.ui_points(1.5), draw_order=25)
                 self._log(f"specimen/zoi/{name}", points)
@@ -255,8 +234,8 @@ class ViewScene:
 
     def _values(self, field: StrainField) -> None:
         """Draw a dot in each ZOI, which shows its values where a person clicks."""
-        for archetype in value_dots(field):
-            self._log_due(VALUES, archetype)
+        for archetype in shapes.value_dots(field):
+            self._log_due(layout.VALUES, archetype)
 
     def _bar(self, name: str, painted: Painted, *, is_static: bool = False) -> None:
         """Draw the colours of a map with their values, or the legend of statuses."""
@@ -272,23 +251,25 @@ class ViewScene:
         picture = rr.EncodedImage(contents=data, media_type="image/png")
         self._log(f"bar/{name}/ramp", picture, static=is_static)
         w, h = self._setup.width, self._setup.height
-        unit = bar_unit(self._setup)
-        scale = (BAR_WIDTH * unit / _RAMP[0], BAR_HEIGHT * h / _RAMP[1], 1.0)
-        placement = rr.Transform3D(translation=(w + BAR_GAP * unit, BAR_TOP * h, 0.0), scale=scale)
+        unit = layout.bar_unit(self._setup)
+        scale = (layout.BAR_WIDTH * unit / _RAMP[0], layout.BAR_HEIGHT * h / _RAMP[1], 1.0)
+        placement = rr.Transform3D(
+            translation=(w + layout.BAR_GAP * unit, layout.BAR_TOP * h, 0.0), scale=scale
+        )
         self._log(f"bar/{name}/ramp", placement, static=is_static)
 
     def _ticks(self, painted: Painted) -> Any:
-        length, height = bar_unit(self._setup), self._setup.height
-        x, top = self._setup.width + BAR_LABEL * length, BAR_TOP * height
+        length, height = layout.bar_unit(self._setup), self._setup.height
+        x, top = self._setup.width + layout.BAR_LABEL * length, layout.BAR_TOP * height
         if painted.scale is None:
             positions = [[x, top + 0.1 * k * length] for k in range(len(painted.legend))]
             texts = [f"{one.name} {one.count}" for one in painted.legend]
-            return text_labels(positions, texts, [one.rgb for one in painted.legend])
+            return shapes.text_labels(positions, texts, [one.rgb for one in painted.legend])
         scale, share = painted.scale, np.array([1.0, 0.75, 0.5, 0.25, 0.0])
-        y = (BAR_TOP + BAR_HEIGHT * (1 - share)) * height - LETTER * length
+        y = (layout.BAR_TOP + layout.BAR_HEIGHT * (1 - share)) * height - layout.LETTER * length
         points = [*([x, yk] for yk in y), [x - 0.04 * length, top - 0.09 * length]]
         values = scale.low + share * (scale.high - scale.low)
-        return text_labels(points, [*(scale.mark(float(f"{v:.6g}")) for v in values), scale.unit])
+        return shapes.text_labels(points, [*(scale.mark(float(f"{v:.6g}")) for v in values), scale.unit])
 
     # -- curves -------------------------------------------------------------------------------
 
@@ -307,7 +288,7 @@ class ViewScene:
     def gauge(self, name: str, rows: Iterable[Row]) -> None:
         """Add rows of a gauge: time (s), strain and sigma."""
         for t, *values in rows:
-            self._add(t, gauge_path(name), (self._since_start(t), *values))
+            self._add(t, layout.gauge_path(name), (self._since_start(t), *values))
 
     def means(self, rows: Iterable[Row]) -> None:
         """Add rows of means: time (s), then mean and sigma of each strain."""
@@ -315,12 +296,9 @@ class ViewScene:
             if any(math.isfinite(value) for value in values[::2]):
                 row = (self._since_start(t), *values)
                 self._strains.append(row)
-                self._add_strains(t, row)
+                for k, name in enumerate(STRAINS):
+                    self._add(t, f"strain/{name}", (row[0], *row[2 * k + 1 : 2 * k + 3]))
         self._send_again()
-
-    def _add_strains(self, t: float, row: Row) -> None:
-        for k, name in enumerate(STRAINS):
-            self._add(t, f"strain/{name}", (row[0], *row[2 * k + 1 : 2 * k + 3]))
 
     def _add(self, t: float, path: str, row: Row) -> None:
         for sink in self._sinks:
@@ -363,7 +341,7 @@ class ViewScene:
 
         self._due = due
         if due:
-            data = encoded(".jpg", paint(shown), FIGURES_QUALITY)
+            data = encoded(".jpg", layout.paint(shown), FIGURES_QUALITY)
             self._at(shown.t)
             self._log_due("figures", rr.EncodedImage(contents=data, media_type="image/jpeg"))
 

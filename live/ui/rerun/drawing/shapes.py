@@ -139,14 +139,11 @@ class ArrowScale:
         valid = np.isfinite(shown).all(axis=-1)
         origins, vectors = centres(field.grid)[pick][valid], shown[valid]
         spacing = field.grid.step * (pick[0].step or 1)
-        self._adapt(vectors, 1.6 * spacing)
-        return origins, vectors * self._factor, self._factor
-
-    def _adapt(self, vectors: Points, max_length: float) -> None:
         longest = float(np.percentile(np.hypot(*vectors.T), 95)) if len(vectors) else 0.0
-        fits = max_length / max(longest, 1e-3)
+        fits = (1.6 * spacing) / max(longest, 1e-3)
         if not fits / 5 < self._factor <= fits:
             self._factor = _round_below(min(fits, 1000.0))
+        return origins, vectors * self._factor, self._factor
 
 
 def with_heads(origins: Points, vectors: Points) -> NDArray[np.float32]:

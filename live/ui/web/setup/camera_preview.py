@@ -109,6 +109,13 @@ class CameraPreview:
             self._draft.change_all({"camera.address": before})
             raise error
 
+    @property
+    def known(self) -> CameraInfo:
+        """What is known of the camera; raises DataError before it is open."""
+        if self.info is None:
+            raise DataError("the camera has given no picture yet")
+        return self.info
+
     def recent(self, least: int = RECENT) -> list[Frame]:
         """The last frames of this camera, ``least`` to ``RECENT``, or all of a shorter recording; else none."""
         with self._lock:
@@ -116,11 +123,9 @@ class CameraPreview:
 
     def collect(self) -> None:
         """Keep the next frames, as many as a whole check needs; the first ones of a recording."""
-        info = self.info
-        if info is None:
-            raise DataError("the camera has given no picture yet")
+        needed = self._viewer.frames_needed(self.known)
         with self._lock:
-            self._collected = deque(maxlen=max(self._viewer.frames_needed(info), 1))
+            self._collected = deque(maxlen=max(needed, 1))
             if self._whole:
                 self._collect_first()
 
@@ -174,19 +179,16 @@ class CameraPreview:
             raise DataError("no camera is chosen: choose one under Camera")
         with camera_of(config.address, self._on_event, crop=config.crop) as camera:
             try:
-                self._camera_opened(camera)
+                with self._lock:
+                    self._camera, self.info = camera, camera.info
+                    self._recent.clear()
+                    self._first, self._whole, self._collected = [], False, None
+                self._viewer.opened(camera.info)
                 asked.put(None)
                 with camera:
                     self._drain(camera)
             finally:
                 self._camera = None
-
-    def _camera_opened(self, camera: Camera) -> None:
-        with self._lock:
-            self._camera, self.info = camera, camera.info
-            self._recent.clear()
-            self._first, self._whole, self._collected = [], False, None
-        self._viewer.opened(camera.info)
 
     @property
     def _over(self) -> bool:

@@ -1,6 +1,6 @@
 """Set-up before a test: camera, load cell, region, gauges and check of one rig, joined for the page.
 
-The set-up of all cameras of a test, which are checked, saved and started together.
+Several cameras of a test are checked, saved and started together.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ class SetupSession:
 
     def find(self) -> None:
         """Find the specimen in the last frames; raises DataError where there is no picture or no specimen."""
-        self.region.find(self._camera(), self._recent())
+        self.region.find(self.preview.known, self._recent())
 
     def scale_from(self, board: Board) -> Scale:
         """The scale from a board in the last frames; raises DataError where there is none."""
@@ -171,12 +171,6 @@ class SetupSession:
         }
 
     # -- the camera ---------------------------------------------------------------------------
-
-    def _camera(self) -> CameraInfo:
-        info = self.preview.info
-        if info is None:
-            raise DataError("the camera has given no picture yet")
-        return info
 
     def _recent(self) -> NDArray[np.float32]:
         """(N, H, W), the last frames; a slow camera has given few."""

@@ -1,6 +1,6 @@
 """The check of the still specimen during set-up: a thread judges the newest frames; the whole check on request.
 
-The check of the still specimen as the page shows it: plain values and colours.
+What the page gets of it are plain values and colours.
 """
 
 from __future__ import annotations
@@ -38,6 +38,11 @@ from live.ui.web.setup.specimen_region import SpecimenRegion
 
 GOOD, BAD = 50e-6, 1000e-6
 """Strain noise of a ZOI that is shown green, and that is shown red."""
+
+log = logging.getLogger(__name__)
+
+EVALUATE_S = 0.4
+_NO_VERDICT: dict[str, Any] = {"table": None, "go": None, "lines": []}
 
 
 def frame_stack(frames: Sequence[Frame], info: CameraInfo) -> FrameStack:
@@ -108,12 +113,6 @@ def figure_values(figures: CheckFigures) -> dict[str, Any]:
         "sigma": float(np.median(sigma)) if sigma.size else None,
         "zois": figures.zois.grid.n_active,
     }
-
-
-log = logging.getLogger(__name__)
-
-EVALUATE_S = 0.4
-_NO_VERDICT: dict[str, Any] = {"table": None, "go": None, "lines": []}
 
 
 def recent_stack(frames: list[Frame]) -> NDArray[np.float32]:
@@ -225,21 +224,18 @@ class SpecimenCheck(Screen):
         if collected is not None:
             self._check(collected, info)
         else:
-            self._quick_check(frames, info)
+            # Update the figures that change while lens and light are adjusted.
+            now = (self._region.edition, self._draft.config, info)
+            if self._checked_for != now:
+                self._checked_for = now
+                self._checker = QuickChecker(self._region.config(self._folder))
+            self._keep_figures(self._checker.check(frame_stack(frames, info)).figures)
 
     def _compile(self, info: CameraInfo) -> None:
         """Compile in separate processes: the test that follows must load the kernel from its cache."""
         phase = self._draft.config.measure.estimator == "phase"
         compile_ahead(picture_kinds(info), phase=phase, screen=self, stopping=self._closing)
         self.values["busy"] = ""
-
-    def _quick_check(self, frames: list[Frame], info: CameraInfo) -> None:
-        """Update the figures that change while lens and light are adjusted."""
-        now = (self._region.edition, self._draft.config, info)
-        if self._checked_for != now:
-            self._checked_for = now
-            self._checker = QuickChecker(self._region.config(self._folder))
-        self._keep_figures(self._checker.check(frame_stack(frames, info)).figures)
 
     def _keep_figures(self, figures: CheckFigures) -> None:
         sharpness = figures.sharpness

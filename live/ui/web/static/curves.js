@@ -276,7 +276,7 @@ export function finishCurve(lines) {
 
 function drawAfter(curve) {
   const unit = strainUnit().factor, load = loadFactor();
-  const lines = (data.lines ?? []).map(({ points, words }) => ({ points: points.map(([x, y]) => [x * unit, y * load]), words: words && `${words.name} = ${fixed(words.value * load, 1)} ${loadUnit()}` }));
+  const lines = (data.lines ?? []).map(({ points, words }) => ({ points: points.map(([x, y]) => [x * unit, y * load]), words: words && `${words.name} ${words.bound ? "≥" : "="} ${fixed(words.value * load, 1)} ${loadUnit()}` }));
   const aids = lines.filter(({ points }) => points.length > 1), ends = aids.flatMap(({ points }) => points);
   whole.straight = lines.filter(({ points }) => points.length === 1);
   elastic.place.parentElement.hidden = !ends.length;

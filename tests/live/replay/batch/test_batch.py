@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 
+from acquire import hdf5
 from acquire.hdf5 import FlushTimer
 from live.cli import main
 from live.replay.batch.campaign import CampaignRequest, run_campaign
@@ -105,7 +106,7 @@ def test_rows_of_a_task_are_flushed_seldom(
     """Nobody would have them from a broken one; those of a replay can be followed."""
     session, paces = str(runs / "hole-1" / "session.h5"), []
     monkeypatch.setattr(
-        strain_h5, "FlushTimer", lambda every_s, now: paces.append(every_s) or FlushTimer(every_s, now)
+        hdf5, "FlushTimer", lambda every_s, now: paces.append(every_s) or FlushTimer(every_s, now)
     )
     settings = {"measure.zoi": 48, "measure.step": 12}
     row = perform(Task("task", str(tmp_path), session, overrides=settings))

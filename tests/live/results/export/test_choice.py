@@ -12,7 +12,7 @@ import pytest
 from acquire.errors import ConfigError, DataError
 from live.pipeline.consumer import Screen
 from live.results.export.formats import ExportRequest, export
-from live.results.export.job import ExportJob, ExportOptions, chosen_fields, chosen_rows
+from live.results.export.job import ExportJob, ExportOptions, chosen_fields
 from live.results.quantities import Display
 from live.results.run_folder import RunFolder, open_run
 from tests.live.made_run import CONFIG, GAUGES, make_run
@@ -28,7 +28,7 @@ SHOWN = Display(mm_per_px=0.05, y_up=True, percent=True)
 def test_instants_between_two_times(
     run: RunFolder, start: float | None, end: float | None, rows: Any
 ) -> None:
-    assert chosen_rows(run.strain, start, end) == tuple(rows)
+    assert run.strain.rows_between(start, end, "--from, --until") == tuple(rows)
 
 
 def test_the_maps_that_are_chosen(run: RunFolder) -> None:

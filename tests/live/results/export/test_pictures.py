@@ -16,7 +16,7 @@ from live.cli import main
 from live.config.new_files import new_file
 from live.results.export import maps
 from live.results.export.formats import FORMATS, ExportRequest, export
-from live.results.export.job import ExportJob, ExportOptions, chosen_rows
+from live.results.export.job import ExportJob, ExportOptions
 from live.results.maps.painting import Levels, Painter
 from live.results.maps.scale import ColourScale
 from live.results.quantities import Display
@@ -209,7 +209,7 @@ def test_progress_is_told_after_two_seconds(run_dir: Path, capsys: pytest.Captur
     ticks = itertools.count(0, 10)
     screen = TerminalScreen(now=lambda: next(ticks))
     with open_run(run_dir) as run:
-        rows = chosen_rows(run.strain, None, None)
+        rows = run.strain.rows_between(None, None, "--from, --until")
         job = ExportJob(run, ("eyy",), rows, Display(), screen, ExportOptions())
         assert [row for _, row in job.steps(now)] == list(rows)
     lines = capsys.readouterr().out.splitlines()

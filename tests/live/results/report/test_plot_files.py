@@ -28,8 +28,8 @@ def test_a_line_is_drawn_from_left_to_right_and_upwards() -> None:
     line = PlotLine(
         "a", np.array([0.0, 5.0, 10.0]), np.array([0.0, 10.0, 20.0]), np.array([1.0, 2.0, 1.0]), 2
     )
-    svg = draw(Plot("f", "t", "x", "y", (line,), (Mark(5.0, 10.0, "a", "1 N"), Mark(9.5, 20.0, "b", "2 N")),
-                    (0.0, 10.0), (0.0, 20.0)))  # fmt: skip
+    svg = draw(Plot("f", "t", "x", "y", (line,), (Mark(5.0, 10.0, "a", "1 N"),
+                    Mark(9.5, 20.0, "b", "2 N", is_bound=True)), (0.0, 10.0), (0.0, 20.0)))  # fmt: skip
     path = re.search(r'class="curve c3 d3" d="(M64[^"]+)"', svg)
     assert path is not None and numbers(path[1]) == [64, 268, 313, 156, 562, 44]
     band = re.search(r'class="band f3" points="([^"]+)"', svg)
@@ -41,7 +41,7 @@ def test_a_line_is_drawn_from_left_to_right_and_upwards() -> None:
     circles = re.findall(r'<circle class="dot" cx="([\d.]+)" cy="([\d.]+)"', svg)
     assert circles == [("313.0", "156.0"), ("537.1", "44.0")]
     assert '<text class="word ink" x="321.0" y="174.0" text-anchor="start">a = 1 N<' in svg
-    assert '<text class="word ink" x="529.1" y="62.0" text-anchor="end">b = 2 N<' in svg
+    assert '<text class="word ink" x="529.1" y="62.0" text-anchor="end">b ≥ 2 N<' in svg
     assert '<text class="word" x="188.5" y="284.0" text-anchor="middle">2.5<' in svg
     assert '<text class="word" x="58.0" y="160.0" text-anchor="end">10<' in svg
     assert '<text class="word ink" x="4.0" y="14.0" text-anchor="start">y<' in svg, "never turned"

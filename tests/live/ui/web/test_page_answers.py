@@ -268,8 +268,8 @@ def test_two_cameras_are_put_together_at_the_end(
         assert not named["with_report"], "there is one report, of all cameras"
         screen.print("a summary")
 
-    monkeypatch.setattr("live.commands.finishing.put_together", put)
-    monkeypatch.setattr("live.commands.finishing.print_summary", summary)
+    monkeypatch.setattr("live.commands.consumers.put_together", put)
+    monkeypatch.setattr("live.commands.consumers.print_summary", summary)
     monkeypatch.setattr("live.commands.run.trouble_lines", lambda *_, **named: [])
     monkeypatch.setattr(
         "live.commands.report.write_report", lambda folder, screen: screen.print(f"report {folder}")

@@ -16,7 +16,7 @@ from acquire.errors import PhasedicError
 from acquire.text import Message
 from acquire.text.message import about
 from acquire.text.quantity import Amount
-from acquire.v4l2.faults import why_not_open
+from acquire.v4l2.listing import why_not_open
 from live.words.language import said
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeKernel
 from tests.live.ui.web.browser import Page, Program

@@ -1,12 +1,18 @@
-"""The readout time of a rolling shutter: from the bands of a flickering lamp, or from a specimen that was moved.
+"""Motion while a picture or a burst is taken: what it adds to the strain.
 
-A lamp on mains of 50 or 60 Hz flickers at F = 100 or 120 Hz: a picture whose lines are read over T shows F T bands.
-A specimen that moves along the lines' normal at v shows the strain v T / (H - 1), and along the lines a shear.
-
-A rolling shutter: lines are read one after the other, so that motion at v px/s shows v T / H as strain along them.
-
+A rolling shutter reads lines one after the other, so that motion at v px/s shows v T / H as strain along their normal.
 The picture is stamped at its middle line. The velocity is that of the mean displacement since the burst before, so it
 holds for rigid motion, not for the strain rate within the picture.
+
+The readout time T is found from the bands of a flickering lamp: on mains of 50 or 60 Hz it flickers at F = 100 or
+120 Hz, and a picture whose lines are read over T shows F T bands. Or it is found from a specimen that is moved: along
+the lines' normal at v it shows the strain v T / (H - 1), and along the lines a shear.
+
+The mean of the frames of a burst is the picture at its time only at a steady rate. The mean of a burst during T, in
+which the strain rate changes by r at s after its middle, is off by ``r (T/2 - |s|)^2 / (2 T)``, at most ``r T / 8``.
+From the bursts before, its strain is then off by as much or more: that is the bound which is taken as its standard
+uncertainty, where noise does not explain it. At a steady rate nothing is added: blur that is alike on both sides does
+not shift a picture.
 """
 
 from __future__ import annotations
@@ -86,6 +92,49 @@ def _rate(now: tuple[float, float], before: tuple[float, float], seconds: float)
 
 
 Floats = NDArray[np.float64]
+CERTAIN = 3.0
+"""A change of the strain rate is one beyond so many of its standard uncertainties."""
+STRAINS = ("exx", "eyy", "exy")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    t: float
+    field: StrainField
+    means: dict[str, tuple[float, float]]
+
+
+class BurstMotion:
+    """Adds to each field, in the order of time, what an uneven motion during its burst can do to it."""
+
+    def __init__(self) -> None:
+        self._before: list[_Seen] = []
+
+    def apply(self, field: StrainField, t: float, duration: float) -> StrainField:
+        """``field`` of a burst at ``t`` with this error, common to its ZOIs; as it is without a ``duration`` (s)."""
+        here = _Seen(t, field, {name: field.mean(name) for name in STRAINS})
+        before, self._before = self._before, [*self._before[-1:], here]
+        if duration <= 0 or len(before) < 2 or not before[0].t < before[1].t < here.t:
+            return field
+        ahead = (here.t - before[1].t) / (before[1].t - before[0].t)
+        shares = (ahead, -1 - ahead, 1.0)  # of the three: how far the last is off a straight line
+        unexplained = 0.0
+        for name in STRAINS:
+            off, noise = 0.0, 0.0
+            for share, seen in zip(shares, (*before, here), strict=True):
+                off += share * seen.means[name][0]
+                noise += (share * seen.means[name][1]) ** 2
+            if abs(off) > CERTAIN * math.sqrt(noise):  # NaN: never
+                unexplained = max(unexplained, 1 - CERTAIN**2 * noise / off**2)
+        if not unexplained:
+            return field
+        affine = (
+            affine_values(seen.field) * share for share, seen in zip(shares, (*before, here), strict=True)
+        )
+        error = CommonError(np.nan_to_num(sum(affine))[None], np.array([[unexplained]]))
+        return replace(field, common=error.beside(field.common))
+
+
 LAMP_SIGMA = 5e-4
 """Relative standard uncertainty of the frequency of the mains."""
 MIN_PICTURES, MAX_ERROR = 16, 0.1
