@@ -6,14 +6,16 @@ import argparse
 from pathlib import Path
 
 from acquire.text import Message
-from live.commands.options import add_options
+from live.commands.options import add_options, whole
 from live.ui.terminal.screen import TerminalScreen
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic average``."""
     parser.add_argument("--camera", required=True, metavar="ADDRESS", help="address of the camera")
-    parser.add_argument("--frames", type=int, default=64, metavar="N", help="frames to average (default 64)")
+    parser.add_argument(
+        "--frames", type=whole(1, 10000), default=64, metavar="N", help="frames to average (default 64)"
+    )
     add_options(parser, "picture", "crop")
     parser.add_argument("--out", required=True, metavar="FILE", help="new TIFF file")
 

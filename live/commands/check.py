@@ -208,7 +208,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     options.add_options(parser, "devices", "camera", "back", "beside", "crop", "dark", "flat", "load")
     options.add_options(parser, "recording of the test", "record", "no-record", "seconds", "out")
     parser.add_argument(
-        "--target", type=float, metavar="UM_M", help="largest strain noise of one ZOI for the test, um/m"
+        "--target",
+        type=options.POSITIVE,
+        metavar="UM_M",
+        help="largest strain noise of one ZOI for the test, um/m",
     )
     parser.add_argument(
         "--snapshot",

@@ -26,7 +26,7 @@ from acquire.text import Amount, Message, word
 from analysis import PICTURE_KINDS
 from analysis.evaluate import AreaStrain
 from analysis.field import Status, StrainField, Sums
-from live.commands.options import add_measure, add_options, configured
+from live.commands.options import add_measure, add_options, configured, number
 from live.commands.run import finish, run_attended
 from live.config.loading import Config
 from live.config.values import AUTO
@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     words = "simulated specimen (default woven)"
     parser.add_argument("--specimen", choices=SPECIMENS, default="woven", help=words)
     words = "frame rate of the simulated camera (default: as fast as this machine renders, at most 30)"
-    parser.add_argument("--fps", type=float, help=words)
+    parser.add_argument("--fps", type=number(0.1, 1000), help=words)
     add_options(parser, "time", "seconds")
     add_measure(parser)
 

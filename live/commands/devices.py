@@ -31,6 +31,7 @@ from acquire.serial_line import identify
 from acquire.serial_line.ports import list_serial_ports
 from acquire.text.message import Message, brief, printable, word
 from live import VERSION
+from live.commands.options import number
 from live.setup.devices import open_load
 from live.setup.pictures import camera_of
 from live.ui.terminal.screen import print_line
@@ -157,7 +158,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     words = "with --report: only this load cell; may be repeated"
     parser.add_argument("--load", action="append", default=[], metavar="ADDRESS", help=words)
     words = "with --report: how long each is watched (default 5)"
-    parser.add_argument("--seconds", type=float, default=5.0, metavar="S", help=words)
+    parser.add_argument("--seconds", type=number(0.1, 3600), default=5.0, metavar="S", help=words)
 
 
 def command(arguments: argparse.Namespace) -> int:

@@ -31,8 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " and stacks the axial strain)"
     )
     parser.add_argument("--fields", metavar="NAMES", help=words)
-    parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin at this time, s")
-    parser.add_argument("--until", dest="end_s", type=float, metavar="S", help="end at this time, s")
+    parser.add_argument("--from", dest="start_s", type=number(), metavar="S", help="begin at this time, s")
+    parser.add_argument("--until", dest="end_s", type=number(), metavar="S", help="end at this time, s")
     words = "csv: long (default): a line per ZOI and instant; wide: a file per map; means: only these"
     parser.add_argument("--layout", choices=("long", "wide", "means"), help=words)
     add_gauge_option(parser)
@@ -51,7 +51,7 @@ def add_display(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--mm", action="store_true", help="lengths in mm, with --scale or the scale of the test"
     )
-    group.add_argument("--scale", type=float, metavar="MM/PX", help="size of one pixel, mm")
+    group.add_argument("--scale", type=number(), metavar="MM/PX", help="size of one pixel, mm")
     group.add_argument("--y-up", action="store_true", help="y axis upwards: v and exy change sign")
     group.add_argument("--percent", action="store_true", help="strains in percent")
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from acquire.errors import ConfigError, DataError
 from acquire.text import Message
+from live.commands.options import whole
 from live.config.values import numbers_of
 from live.ui.terminal.screen import print_line
 
@@ -23,11 +24,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("session", help="session.h5, or the folder of its run")
     parser.add_argument("--zoi", required=True, metavar="R,C", help="row and column of the ZOI in the grid")
     parser.add_argument(
-        "--frame", type=int, required=True, metavar="N", help="number of the frame (or burst), from 0"
+        "--frame", type=whole(0), required=True, metavar="N", help="number of the frame (or burst), from 0"
     )
-    parser.add_argument("--reference", type=int, default=0, metavar="N", help="reference frame (default 0)")
-    parser.add_argument("--size", type=int, metavar="PX", help="side of a ZOI (default: as recorded)")
-    parser.add_argument("--step", type=int, metavar="PX", help="distance of ZOIs (default: as recorded)")
+    parser.add_argument(
+        "--reference", type=whole(0), default=0, metavar="N", help="reference frame (default 0)"
+    )
+    parser.add_argument("--size", type=whole(1), metavar="PX", help="side of a ZOI (default: as recorded)")
+    parser.add_argument("--step", type=whole(1), metavar="PX", help="distance of ZOIs (default: as recorded)")
     parser.add_argument("--out", default="zoi.png", metavar="FILE", help="the figure (default zoi.png)")
 
 

@@ -12,6 +12,7 @@ from acquire.errors import NOT_READY, ConfigError, DataError
 from acquire.load_cell import calibration, check, stillness
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.text import Message, about, word
+from live.commands.options import POSITIVE, number
 from live.setup.devices import open_load
 from live.ui.terminal.screen import print_line
 from live.words.language import told
@@ -26,15 +27,19 @@ MAX_TRIES = 3  # for each point
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic load-calibrate``."""
     parser.add_argument("--load", required=True, metavar="ADDRESS", help="address of the load cell")
-    parser.add_argument("--mass", type=float, metavar="KG", help="the known load as a mass")
+    parser.add_argument("--mass", type=POSITIVE, metavar="KG", help="the known load as a mass")
     parser.add_argument(
-        "--force", type=float, metavar="N", help="the known load as a force, N; negative in compression"
+        "--force", type=number(), metavar="N", help="the known load as a force, N; negative in compression"
     )
     parser.add_argument("--out", required=True, metavar="FILE", help="file for the calibration")
     words = "ask nothing: take the three readings at once and accept the result (a program moves the load)"
     parser.add_argument("--yes", action="store_true", help=words)
     parser.add_argument(
-        "--seconds", type=float, default=3.0, metavar="S", help="duration of each reading (default 3)"
+        "--seconds",
+        type=number(0.1, 3600),
+        default=3.0,
+        metavar="S",
+        help="duration of each reading (default 3)",
     )
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from acquire.errors import NOT_READY
 from acquire.load_cell import check
 from acquire.text import Message, about, word
+from live.commands.options import number
 from live.setup.devices import open_load
 from live.ui.terminal.screen import print_line
 
@@ -18,7 +19,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic load-check``."""
     parser.add_argument("--load", required=True, metavar="ADDRESS", help="address of the load cell")
     parser.add_argument(
-        "--seconds", type=float, default=10.0, metavar="S", help="duration of the check (default 10)"
+        "--seconds",
+        type=number(0.1, 3600),
+        default=10.0,
+        metavar="S",
+        help="duration of the check (default 10)",
     )
 
 

@@ -23,6 +23,7 @@ from acquire.text import Message
 from acquire.text.message import printable
 from analysis.evaluate import deconvolved, effect
 from analysis.field import ZoiGrid
+from live.commands.options import number, whole
 from live.config.new_files import new_file
 from live.results.maps.painting import Image, Painter
 from live.results.maps.scale import AutoRange, ColourScale, range_kind
@@ -228,19 +229,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="u, v, exx, eyy, exy, sigma_eyy, residual, status, a map of replay --response ... (default eyy)",
     )
     parser.add_argument(
-        "--row", type=int, default=-1, help="number of the instant, from 0 (default: the last)"
+        "--row", type=whole(), default=-1, help="number of the instant, from 0 (default: the last)"
     )
     parser.add_argument("--over", metavar="FILE", help="picture under the map")
-    parser.add_argument("--limit", type=float, help="colour range -LIMIT to LIMIT (default: automatic)")
+    parser.add_argument("--limit", type=number(), help="colour range -LIMIT to LIMIT (default: automatic)")
     parser.add_argument("--title", help="title (default: map, time and ZOI)")
     words = "median filter of N x N ZOIs, for display only"
-    parser.add_argument("--median", type=int, default=1, metavar="N", help=words)
+    parser.add_argument("--median", type=whole(), default=1, metavar="N", help=words)
     words = "standard deviation of a Gaussian filter, for display only"
-    parser.add_argument("--low-pass", type=float, default=0.0, metavar="PX", help=words)
+    parser.add_argument("--low-pass", type=number(), default=0.0, metavar="PX", help=words)
     words = "reduce the blur by the ZOI, for display only (order 1): 3 or 7 steps, noted in the title"
-    parser.add_argument("--deconvolve", type=int, default=0, metavar="STEPS", help=words)
+    parser.add_argument("--deconvolve", type=whole(), default=0, metavar="STEPS", help=words)
     words = "with --deconvolve: make its response end N times more abruptly: less noise, longer ringing beside an edge"
-    parser.add_argument("--sharpen", type=int, default=0, metavar="N", help=words)
+    parser.add_argument("--sharpen", type=whole(), default=0, metavar="N", help=words)
 
 
 def command(arguments: argparse.Namespace) -> int:

@@ -13,7 +13,7 @@ from acquire.text import Message
 from acquire.text.message import brief
 from live.commands.attended import page_opened
 from live.commands.init import find_devices
-from live.commands.options import OUTPUT, add_measure, add_options, overrides
+from live.commands.options import OUTPUT, add_measure, add_options, overrides, whole
 from live.commands.process import signals
 from live.commands.report import write_report
 from live.commands.run import OTHER_PROGRAMS, RECORDING, run_with_page
@@ -34,7 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, "other programs", *OTHER_PROGRAMS)
     add_measure(parser, *(name for name in OUTPUT if name != "report"))
     port_help = f"port of the page on 127.0.0.1, or the next free one (default {DEFAULT_PORT})"
-    parser.add_argument("--page-port", type=int, default=DEFAULT_PORT, metavar="N", help=port_help)
+    parser.add_argument(
+        "--page-port", type=whole(0, 65535), default=DEFAULT_PORT, metavar="N", help=port_help
+    )
 
 
 def command(arguments: argparse.Namespace) -> int:

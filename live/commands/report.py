@@ -9,7 +9,7 @@ from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
 from acquire.text import Message, about
-from live.commands.options import add_gauge_option, add_gauges
+from live.commands.options import add_gauge_option, add_gauges, number
 from live.config.new_files import check_free, free_name, new_file
 from live.pipeline.consumer import Screen
 from live.results.finished.figures_file import FILE, FiguresFile
@@ -33,12 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     words = "instant of the maps, s; may be repeated (default: first, elastic, yield, highest, last)"
     parser.add_argument(
-        "--at", dest="times", action="append", type=float, default=[], metavar="S", help=words
+        "--at", dest="times", action="append", type=number(), default=[], metavar="S", help=words
     )
     words = "map to show; may be repeated (default: the strain along the load)"
     parser.add_argument("--field", dest="fields", action="append", default=[], metavar="NAME", help=words)
     parser.add_argument(
-        "--scale", type=float, metavar="MM/PX", help="size of one pixel, mm (default: as configured)"
+        "--scale", type=number(), metavar="MM/PX", help="size of one pixel, mm (default: as configured)"
     )
     words = "compare several tests in one page: curves, mean and scatter, and a CSV beside it"
     add_gauge_option(parser)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from acquire.errors import ConfigError
 from acquire.text import Message
 from live.config.cameras import BACK, FRONT
 from live.pipeline.consumer import Screen
@@ -51,6 +52,8 @@ def put_together(front: Path, back: Path, out: Path, screen: Screen) -> None:
     from live.results.run_folder import open_run
     from live.results.sides import SidesOfTest, write_sides
 
+    if front.resolve() == back.resolve():
+        raise ConfigError("{front} is given as front and as back; give the run of each", front)
     with open_run(front) as one, open_run(back) as other:
         sides, stresses = SidesOfTest.of_folders(one, other), one.specimen.area_m2 is not None
     with new_file(out) as part, part.open("x", encoding="utf-8", newline="") as file:

@@ -18,7 +18,7 @@ from hw_mocks.specimen import KINDS
 from live import cli
 from live.cli import main
 from live.commands import arguments as arguments_module
-from live.commands.arguments import COMMANDS
+from live.commands.arguments import COMMANDS, full_parser, subparsers
 from live.commands.demo import SPECIMENS
 from live.commands.process import ended_by_sigterm, interrupts
 from live.results.report import saving
@@ -480,3 +480,16 @@ def test_an_option_with_two_values_is_refused(capsys: pytest.CaptureFixture[str]
         capsys, "run", "--camera", "sim:unifrom", "--camera=sim:unifrom", "--meta", "a=1", "--meta", "b=2"
     )
     assert code == 2 and "given twice" not in said
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_number_on_the_command_line_has_bounds(name: str) -> None:
+    """What float and int take alone: nan, inf, and a rate of 0 that something is divided by."""
+    parser = subparsers(full_parser([name])).choices[name]
+    free = [one.option_strings for one in parser._actions if one.type in (int, float) and not one.choices]
+    assert free == []
+
+
+def test_one_run_has_no_two_sides(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, said = refused(capsys, "sides", str(tmp_path), f"{tmp_path}/../{tmp_path.name}")
+    assert code == 2 and "as front and as back" in said

@@ -157,7 +157,8 @@ def test_nothing_is_overwritten(
 def test_arguments(
     run_dir: Path, capsys: pytest.CaptureFixture[str], code: int, message: str, arguments: list[str]
 ) -> None:
-    assert code_of(["export", str(run_dir), "--to", "csv", *arguments]) == code
+    kind = [] if "--to" in arguments else ["--to", "csv"]
+    assert code_of(["export", str(run_dir), *kind, *arguments]) == code
     assert message in capsys.readouterr().err
 
 
