@@ -16,7 +16,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper
+from analysis.compiled.loops import helper, part, shared
+from analysis.compiled.shares import in_shares, part_of
 from analysis.field import Window, ZoiGrid, combination, profile, variance_of_sum
 from analysis.fit.moments import CHANNELS
 from analysis.fit.sensitivity import columns, parameter_scale
@@ -182,16 +183,26 @@ def squares_of_rows(image: Any, out: Any) -> None:
         out[y] = total
 
 
-@helper
+@shared
 def scatter(
     images: Any, samples: int, pitch: int, origins: Any, weights: Any, line: Any, along: Any, corner: Any, out: Any
 ) -> None:  # fmt: skip
     """Add what each ZOI takes of each pixel to ``out``, whose first pixel is ``corner`` (row, column)."""
+    in_shares(_scatter_share, (images, samples, pitch, origins, weights, line, along, corner, out))
+
+
+@part
+def _scatter_share(
+    images: Any, samples: int, pitch: int, origins: Any, weights: Any, line: Any, along: Any, corner: Any, out: Any,
+    share: int,
+) -> None:  # fmt: skip
+    """The same of some rows of ``out``, to which all ZOIs add in their order."""
     # Unsigned places: with others numba looks for negative ones, pixel by pixel, and no vectors are made.
     size, image, down = len(line), np.uintp(samples), np.uintp(pitch)
+    first, end = part_of(len(out), share)
     for z in range(len(origins)):
-        a = weights[z]
-        for y in range(size):
+        a, begin = weights[z], corner[0] - origins[z, 0]
+        for y in range(max(first + begin, 0), min(end + begin, size)):
             eta = along[y]
             top, left = origins[z, 0] + y, origins[z, 1]
             at = np.uintp(top * pitch + left)
