@@ -16,7 +16,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper
+from analysis.compiled.loops import helper, part, shared
+from analysis.compiled.shares import in_shares, part_of
 from analysis.field import Window, ZoiGrid, combination, profile, variance_of_sum
 from analysis.fit.moments import CHANNELS
 from analysis.fit.sensitivity import columns, parameter_scale
@@ -131,13 +132,15 @@ class MeanNoise:
         """Variance of the sum of ``shares`` (B, 6) of the parameters of the ZOIs ``which``, for noise of 1 GL."""
         size, origins = self.grid.size, np.ascontiguousarray(self.origins[which])
         corner = origins.min(axis=0)
-        out = np.zeros(origins.max(axis=0) - corner + size)
+        height, width = (origins.max(axis=0) - corner + size).tolist()
+        rows = np.empty(height)
         line = profile(self.window, size)
         along = (np.arange(size) - (size - 1) / 2) / (size / 2)
         pitch, samples = self.images.shape[2], self.images[0].size
         flat = self.images.reshape(-1)
-        scatter(flat, samples, pitch, origins, self._weights(shares, which), line, along, corner, out)
-        return sum_of_squares(out)
+        weights = self._weights(shares, which)
+        squares(flat, samples, pitch, origins, weights, line, along, corner, width, rows)
+        return float(np.cumsum(rows)[-1])  # in their order: the same bits wherever they are in memory
 
     def _weights(self, shares: Floats, which: NDArray[np.intp]) -> Floats:
         """The rows of the inverse that make these sums, by channel and monomial, (B, 7, 6)."""
@@ -147,13 +150,6 @@ class MeanNoise:
         for j, (channel, x, y) in enumerate(columns(self.order)):
             out[:, channel, MONOMIALS.index((int(x), int(y)))] = row[:, j]
         return out
-
-
-def sum_of_squares(image: Floats) -> float:
-    """The sum of the squares of an image (H, W), row by row in their order: the same bits wherever it is in memory."""
-    rows = np.empty(len(image))
-    squares_of_rows(image, rows)
-    return float(np.cumsum(rows)[-1])
 
 
 def unit_variance(name: str, covariance: NDArray[np.float32]) -> Floats:
@@ -172,17 +168,34 @@ def blurred(f: Any, i: Any, pitch: Any, along_x: Any, along_y: Any, across: Any)
     return out + across * corners / 4
 
 
-@helper
-def squares_of_rows(image: Any, out: Any) -> None:
-    """The sum of the squares of each row of an image (H, W), written to ``out`` (H,)."""
-    for y in range(len(image)):
-        row, total = image[y], 0.0
+@shared
+def squares(
+    images: Any, samples: int, pitch: int, origins: Any, weights: Any, line: Any, along: Any, corner: Any, width: int,
+    out: Any,
+) -> None:  # fmt: skip
+    """The sum of the squares of each row of what all ZOIs take of the pixels from ``corner`` (row, column) on.
+
+    A picture of it would be new memory, most of the time at 12 MP: it is made some rows at a time.
+    """
+    in_shares(_squares, (images, samples, pitch, origins, weights, line, along, corner, width, out))
+
+
+@part
+def _squares(
+    images: Any, samples: int, pitch: int, origins: Any, weights: Any, line: Any, along: Any, corner: Any, width: int,
+    out: Any, share: int,
+) -> None:  # fmt: skip
+    first, end = part_of(len(out), share)
+    taken = np.zeros((end - first, width))
+    scatter(images, samples, pitch, origins, weights, line, along, (corner[0] + first, corner[1]), taken)
+    for y in range(len(taken)):
+        row, total = taken[y], 0.0
         for x in range(len(row)):
             total += row[x] * row[x]
-        out[y] = total
+        out[first + y] = total
 
 
-@helper
+@part
 def scatter(
     images: Any, samples: int, pitch: int, origins: Any, weights: Any, line: Any, along: Any, corner: Any, out: Any
 ) -> None:  # fmt: skip
@@ -190,8 +203,8 @@ def scatter(
     # Unsigned places: with others numba looks for negative ones, pixel by pixel, and no vectors are made.
     size, image, down = len(line), np.uintp(samples), np.uintp(pitch)
     for z in range(len(origins)):
-        a = weights[z]
-        for y in range(size):
+        a, begin = weights[z], corner[0] - origins[z, 0]
+        for y in range(max(begin, 0), min(begin + len(out), size)):
             eta = along[y]
             top, left = origins[z, 0] + y, origins[z, 1]
             at = np.uintp(top * pitch + left)

@@ -9,11 +9,12 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.compiled.pool import THREADS, each
 from analysis.field import Roi
 
 Floats = NDArray[np.float64]
@@ -117,9 +118,13 @@ def side_peaks(
     near: dict[tuple[int, int], NDArray[np.bool_]] = {}
     side = min(TILE, region.width, region.height)
     middle = (side - 1) / 2
-    for top in _firsts(region.y, region.height, side):
-        for left in _firsts(region.x, region.width, side):
-            peaks = _peaks(image[top : top + side, left : left + side])
+    tops, lefts = _firsts(region.y, region.height, side), _firsts(region.x, region.width, side)
+
+    def in_row(top: int) -> list[list[tuple[int, int]]]:
+        return _peaks(np.stack([image[top : top + side, left : left + side] for left in lefts]))
+
+    for top, row in zip(tops, each(in_row, tops), strict=True):
+        for left, peaks in zip(lefts, row, strict=True):
             if not peaks:
                 continue
             around = np.maximum(abs(x - left - middle), abs(y - top - middle)) <= NEAR * side
@@ -145,8 +150,10 @@ def _far_peaks(image: Image, region: Roi, reach: int) -> list[tuple[int, int]]:
     rows, columns = max(region.height // times, 1), max(region.width // times, 1)
     part = np.zeros_like(small)
     part[top : top + rows, left : left + columns] = small[top : top + rows, left : left + columns]
-    found = irfft2(spectrum * np.conj(rfft2(part)), small.shape) / max(float(np.vdot(part, part)), 1e-12)
-    y, x = _tops(found, FAR_PEAK * MIN_OVERLAP)
+    found = irfft2(spectrum * np.conj(rfft2(part, workers=THREADS)), small.shape, workers=THREADS) / max(
+        float(np.vdot(part, part)), 1e-12
+    )
+    y, x = _tops(found, found > FAR_PEAK * MIN_OVERLAP, 2, "wrap")
     scores: dict[tuple[int, int], float] = {}
     for down in (y, y - height):
         for across in (x, x - width):
@@ -162,13 +169,15 @@ def _far_peaks(image: Image, region: Roi, reach: int) -> list[tuple[int, int]]:
     return sorted(best, key=lambda p: math.hypot(*p))
 
 
-def _tops(image: Image, least: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Pixels above ``least`` that are the largest within 2 px, where the picture goes on at the opposite edge."""
-    y, x = np.nonzero(image > least)  # hardly any, as a rule
-    height, width = image.shape
-    for down in range(-2, 3):
-        for across in range(-2, 3):
-            beside = image[(y + down) % height, (x + across) % width]
+def _tops(
+    image: Image, among: Bools, near: int, beyond: Literal["wrap", "clip"]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pixels ``among`` (H, W) that are the largest within ``near`` px, by what is taken for ``beyond`` an edge."""
+    y, x = np.nonzero(among)  # hardly any, as a rule
+    flat = image.ravel()
+    for down in range(-near, near + 1):
+        for across in range(-near, near + 1):
+            beside = flat[np.ravel_multi_index((y + down, x + across), image.shape, beyond)]
             top = image[y, x] >= beside
             y, x = y[top], x[top]
     return y, x
@@ -179,9 +188,9 @@ def _without_slow(image: Image, slowest: float) -> tuple[Image, NDArray[np.compl
     from scipy.fft import fftfreq, irfft2, rfft2, rfftfreq
 
     height, width = image.shape
-    spectrum, some = rfft2(image), int(width / slowest) + 1
+    spectrum, some = rfft2(image, workers=THREADS), int(width / slowest) + 1
     spectrum[:, :some] *= np.hypot(fftfreq(height)[:, None], rfftfreq(width)[None, :some]) * slowest > 1
-    return np.asarray(irfft2(spectrum, image.shape), np.float32), spectrum
+    return np.asarray(irfft2(spectrum, image.shape, workers=THREADS), np.float32), spectrum
 
 
 def _shared(moved: NDArray[np.intp], first: int, length: int, whole: int) -> Floats:
@@ -222,35 +231,31 @@ def _tile(side: int) -> _Tile:
     reach = int(REACH * side)
     down, across = np.meshgrid(np.arange(reach + 1), np.arange(-reach, reach + 1), indexing="ij")
     far = (np.hypot(down, across) >= SHORTEST_PX) & ((down > 0) | (across > 0))
-    return _Tile(window, window.sum(), _correlation(window), far)
+    return _Tile(window, window.sum(), _correlation(window[None])[0], far)
 
 
-def _correlation(tile: Image) -> Image:
-    """Of a tile with itself, (reach + 1, 2 reach + 1): down from 0 and across from -reach."""
+def _correlation(tiles: Image) -> Image:
+    """Of tiles with themselves, (N, reach + 1, 2 reach + 1): down from 0 and across from -reach."""
     from scipy.fft import ifft, irfft, rfft2
 
-    side = len(tile)
+    side = tiles.shape[2]
     reach = int(REACH * side)
-    spectrum = rfft2(tile)
+    spectrum = rfft2(tiles)
     power = (spectrum.real**2 + spectrum.imag**2).astype(np.complex64)
-    down = ifft(power, axis=0, norm="forward", overwrite_x=True)[: reach + 1]
+    down = ifft(power, axis=1, norm="forward", overwrite_x=True)[:, : reach + 1]
     product = irfft(down, n=side, norm="forward") * np.float32(1 / np.longdouble(side * side))
-    return np.concatenate([product[:, side - reach :], product[:, : reach + 1]], axis=1)
+    return np.concatenate([product[:, :, side - reach :], product[:, :, : reach + 1]], axis=2)
 
 
-def _peaks(image: Image) -> list[tuple[int, int]]:
-    """The nearest side peaks (x, y) of the autocorrelation of a tile under a Hann window, over that of the window."""
-    from scipy.ndimage import maximum_filter
-
-    of = _tile(len(image))
-    level = (image - np.multiply(image, of.window).sum() / of.weight) * of.window
-    share = _correlation(level) / of.overlap
-    reach = len(share) - 1
-    share /= max(float(share[0, reach]), 1e-12)
-    found = (share > PEAK) & of.far
-    if not found.any():  # most patterns do not repeat
-        return []
-    y, x = np.nonzero(found & (share >= maximum_filter(share, 3)))
-    return sorted(zip((x - reach).tolist(), y.tolist(), strict=True), key=lambda p: math.hypot(*p))[
-        :MAX_PEAKS
-    ]
+def _peaks(tiles: Image) -> list[list[tuple[int, int]]]:
+    """The nearest side peaks (x, y) of the autocorrelation of tiles under a Hann window, over that of the window."""
+    of = _tile(tiles.shape[2])
+    means = np.multiply(tiles, of.window).reshape(len(tiles), -1).sum(axis=1) / of.weight
+    shares = _correlation((tiles - means[:, None, None]) * of.window) / of.overlap
+    reach, out = of.overlap.shape[0] - 1, []
+    shares /= np.maximum(shares[:, :1, reach, None], np.float32(1e-12))
+    for share in shares:
+        y, x = _tops(share, (share > PEAK) & of.far, 1, "clip")  # most patterns do not repeat
+        peaks = zip((x - reach).tolist(), y.tolist(), strict=True)
+        out.append(sorted(peaks, key=lambda p: math.hypot(*p))[:MAX_PEAKS])
+    return out

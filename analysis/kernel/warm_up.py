@@ -53,7 +53,7 @@ def _loops(phase: bool) -> list[Any]:
         sensitivity.prepare, iteration.track, shared.share_warps, search.match, hill_climb.climb,
         prediction.advance, verdict.judge, coherence.stand_out, coherence.label,
         assembly.expect, assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.row_medians,
-        pooling.interpolate, assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
+        pooling.interpolate, assembly.scale, assembly.clipped_shares, sums.squares, iteration.warp_zois,
         sparse_sums.row_sums, sparse_sums.overlapping,
     ]  # fmt: skip
     return loops + [iteration.compose_all, iteration.within_image] * phase
@@ -132,6 +132,7 @@ def _everything(kinds: Sequence[str], phase: bool) -> None:
 
     _gauges()
     interpolate(np.ones(1), np.arange(2.0), np.ones(2), np.ones(1))  # not reached with so few ZOIs
+    _iteration()  # of it ``warp_zois``
     image, grid = _small()
     ways = [KernelSettings(), KernelSettings(order=2)]
     clipped = image > np.percentile(image, 99)

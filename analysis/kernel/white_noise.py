@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.compiled.pool import each
 from analysis.field import Status
 from analysis.fit.kernel_args import NUISANCES
 from analysis.kernel.prepared import PreparedReference
@@ -41,7 +42,8 @@ def white_cubic(ready: PreparedReference, size: int, order: int, unit: Floats) -
     if len(sample) == 0:
         return np.ones(2)
     some = max(1, BATCH_PX // size**2)
-    found = [_of_zois(ready, sample[k : k + some], size, order) for k in range(0, len(sample), some)]
+    parts = (sample[k : k + some] for k in range(0, len(sample), some))
+    found = [*each(lambda which: _of_zois(ready, which, size, order), parts)]
     return np.asarray(np.median(np.concatenate(found) / unit[sample], axis=0))
 
 

@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from analysis.compiled.pool import THREADS, do, each
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -93,7 +95,7 @@ def filtered_pattern(
     of_noise = _of_noise(response, along_x, width, work)
     grad_x, grad_y, level = out or (np.empty(image.shape, np.float32) for _ in range(3))
     for to, along in ((grad_x, along_x), (grad_y, along_y)):
-        np.multiply(spectrum, along, out=work)
+        _multiply(spectrum, along, work)
         _back(work, width, to)
     _back(spectrum, width, level)
     return Pattern(level, grad_x, grad_y, mean, float(np.sqrt(variance)), *of_noise)
@@ -125,16 +127,20 @@ def _filtered_spectrum(
 
     (height, width), kept = (len(place) for place in places), spectrum.shape[1]
     ky, kx = np.fft.fftfreq(height)[:, None], np.fft.rfftfreq(width)[None, :kept]
-    for rows in _some_rows(height):
-        padded = (image[places[0][rows]] - mean).take(places[1], axis=1)
-        spectrum[rows] = fft.rfft(padded, workers=2)[:, :kept]
-    fft.fft(spectrum, axis=0, overwrite_x=True, workers=2)
     response = np.zeros(spectrum.shape, np.float32)
-    for rows in _some_rows(_passed(gain, height)):
+
+    def along_rows(rows: slice) -> None:
+        padded = (image[places[0][rows]] - mean).take(places[1], axis=1)
+        spectrum[rows] = fft.rfft(padded)[:, :kept]
+
+    def passed(rows: slice) -> None:
         response[rows] = np.interp(np.hypot(ky[rows], kx), *gain)
+
+    do(along_rows, _some_rows(height))
+    fft.fft(spectrum, axis=0, overwrite_x=True, workers=THREADS)
+    do(passed, _some_rows(_passed(gain, height)))
     response[height // 2 + 1 :] = response[1 : (height + 1) // 2][::-1]  # of the frequencies below zero
-    for rows in _some_rows(height):
-        spectrum[rows] *= response[rows]
+    _multiply(spectrum, response, spectrum)
     return response
 
 
@@ -152,16 +158,19 @@ def _of_noise(
     kept = response.shape[1]
     share = kept / (width // 2 + 1)
     floats = room.view(np.float32).reshape(-1)[: response.size].reshape(response.shape)
-    for rows in _some_rows(len(response)):
+
+    def squares(rows: slice) -> None:
         floats[rows] = np.abs(response[rows] * along_x) ** 2
+
+    do(squares, _some_rows(len(response)))
     left = float(np.mean(floats))
     doubles = room.view(np.float64)
     kx, ky = np.fft.rfftfreq(width)[None, :kept], np.fft.fftfreq(len(response))[:, None]
     own = [np.mean(response)]
     for k in (kx, ky):
-        np.multiply(response, 2 * np.cos(2 * np.pi * k) - 2, out=doubles)
+        _multiply(response, 2 * np.cos(2 * np.pi * k) - 2, doubles)
         own.append(np.mean(doubles))
-    np.multiply(response, response, out=floats)
+    _multiply(response, response, floats)
     level = float(np.mean(floats, dtype=np.float64))
     return share * left, share * np.array(own, np.float64), share * level
 
@@ -170,12 +179,20 @@ def _back(spectrum: NDArray[np.complex64], width: int, out: Image) -> None:
     """The image of a spectrum of the padded one, of ``width`` columns, without its rim; ``spectrum`` is overwritten."""
     from scipy import fft
 
-    fft.ifft(spectrum, axis=0, norm="forward", overwrite_x=True, workers=2)
+    fft.ifft(spectrum, axis=0, norm="forward", overwrite_x=True, workers=THREADS)
     scale = np.float32(1 / np.longdouble(len(spectrum) * width))
-    for rows in _some_rows(len(out)):
+
+    def along_rows(rows: slice) -> None:
         inside = slice(rows.start + _MARGIN, rows.stop + _MARGIN)
-        some = fft.irfft(spectrum[inside], n=width, norm="forward", workers=2)
+        some = fft.irfft(spectrum[inside], n=width, norm="forward")
         np.multiply(some[:, _MARGIN : _MARGIN + out.shape[1]], scale, out=out[rows])
+
+    do(along_rows, _some_rows(len(out)))
+
+
+def _multiply(image: NDArray[Any], factor: NDArray[Any], out: NDArray[Any]) -> None:
+    factor = np.broadcast_to(factor, out.shape)
+    do(lambda rows: np.multiply(image[rows], factor[rows], out=out[rows]), _some_rows(len(out)))
 
 
 def _some_rows(count: int) -> Iterator[slice]:
@@ -195,17 +212,26 @@ def _radial_spectrum(image: Image, mean: np.float32, room: NDArray[np.complex64]
 
     (height, width), rings = image.shape, _rings(image.shape)
     weighted = room.view(np.float32)[: image.size].reshape(image.shape)
-    for rows in _some_rows(height):
+
+    def weigh(rows: slice) -> None:
         np.multiply(image[rows] - mean, rings.taper(rows) ** 2, out=weighted[rows])
+
+    do(weigh, _some_rows(height))
     offset = weighted.sum() / rings.weight
     spectrum = room[: height * (width // 2 + 1)].reshape(height, -1)
-    for rows in _some_rows(height):
-        spectrum[rows] = fft.rfft(((image[rows] - mean) - offset) * rings.taper(rows), workers=2)
-    fft.fft(spectrum, axis=0, overwrite_x=True, workers=2)
+
+    def along_rows(rows: slice) -> None:
+        spectrum[rows] = fft.rfft(((image[rows] - mean) - offset) * rings.taper(rows))
+
+    def power(rows: slice) -> tuple[NDArray[np.intp], Floats]:
+        found = np.abs(spectrum[rows]) ** 2 / image.size
+        return rings.ring[rows].ravel().astype(np.intp), found.ravel().astype(np.float64)
+
+    do(along_rows, _some_rows(height))
+    fft.fft(spectrum, axis=0, overwrite_x=True, workers=THREADS)
     sums = np.zeros(len(rings.count))
-    for rows in _some_rows(height):
-        power = np.abs(spectrum[rows]) ** 2 / image.size
-        np.add.at(sums, rings.ring[rows].ravel().astype(np.intp), power.ravel().astype(np.float64))
+    for ring, found in each(power, _some_rows(height)):
+        np.add.at(sums, ring, found)
     seen = rings.count > 0
     return rings.radius[seen] / rings.count[seen], sums[seen] / rings.count[seen]
 
@@ -244,9 +270,12 @@ def _outer(lines: tuple[Floats, Floats], rows: slice) -> Image:
     return np.multiply(lines[0][rows, None], lines[1]).astype(np.float32)
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=4)
 def _rings(shape: tuple[int, int]) -> _Rings:
-    """Of the pictures of a camera they are always the same; made before a test, in the dry run."""
+    """Of the pictures of a camera they are always the same; made before a test, in the dry run.
+
+    Kept for those of a second camera, and of the self-test, which runs between dry run and test, too.
+    """
     lines = np.hanning(shape[0] + 2)[1:-1], np.hanning(shape[1] + 2)[1:-1]
     squares = np.empty(shape, np.float32)
     for rows in _some_rows(shape[0]):
@@ -277,6 +306,7 @@ def wiener_gain(
     return np.asarray(gain * fade)
 
 
+@lru_cache(maxsize=8)
 def _gradient_response(degree: int, length: int) -> NDArray[np.complex64]:
     from analysis.picture.splines import gradient_filter
 

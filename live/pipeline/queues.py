@@ -87,6 +87,13 @@ class LatestQueue(_Queue[Item]):
         self._takes: deque[tuple[float, float, int, int]] = deque()
         """Time, idle time so far, items that waited, items that had come: of the last ``SLOW_S``."""
         self._skipped: list[Item] = []
+        self._woken = False
+
+    def wake(self) -> None:
+        """Let a reader that waits, or the next one, go on without an item."""
+        with self._change:
+            self._woken = True
+            self._change.notify_all()
 
     def begin(self) -> None:
         """The reader is ready and begins to catch up."""
@@ -107,12 +114,13 @@ class LatestQueue(_Queue[Item]):
             self._change.notify_all()
 
     def get(self, timeout_s: float | None = None) -> Item | None:
-        """Take an item, waiting up to ``timeout_s``; None where there is none, or when closed and empty."""
+        """Take an item, waiting up to ``timeout_s``; None where there is none, woken, or when closed and empty."""
         with self._change:
             began = time.monotonic()
             if self._reading:
                 self._resize(began)
-            self._change.wait_for(lambda: self._items or self._closed, timeout_s)
+            self._change.wait_for(lambda: self._items or self._closed or self._woken, timeout_s)
+            self._woken = False
             self._idle_s += time.monotonic() - began
             item = self._items.popleft() if self._items else None
             self._change.notify_all()

@@ -67,6 +67,7 @@ class IncomingBursts(Subscriber):
             self._bursts.put(body)
         elif isinstance(body, ReferenceBurst):
             self._references.put(body)
+            self._bursts.wake()  # it is prepared while the next burst is taken
         else:
             self.close()
 

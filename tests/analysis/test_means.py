@@ -13,7 +13,7 @@ from analysis.evaluate import AreaStrain
 from analysis.field import StrainField, Window
 from analysis.field.uncertainty import CommonError, PictureError, variance_of_sum
 from analysis.fit.moments import CHANNELS
-from analysis.fit.sums import MONOMIALS, scatter, sum_of_squares
+from analysis.fit.sums import MONOMIALS, squares
 from analysis.kernel.images import continue_rim, padded, with_second_differences
 from analysis.optics import BurstMotion
 from tests.analysis.speckle import picture
@@ -70,14 +70,6 @@ def test_a_mean_over_some_leaves_the_others_out() -> None:
     )
 
 
-@pytest.mark.parametrize("shift", range(8))
-def test_the_sum_of_squares_has_the_same_bits_wherever_it_is_in_memory(shift: int) -> None:
-    image = np.random.default_rng(1).normal(0, 1, (47, 333))
-    moved = np.empty(image.size + 8)[shift : shift + image.size].reshape(image.shape)
-    moved[:] = image
-    assert sum_of_squares(moved) == sum_of_squares(image) == pytest.approx(np.sum(image**2), rel=1e-14)
-
-
 def test_the_pattern_of_the_zois_of_a_mean_decides_its_noise() -> None:
     class Pattern:
         """Twice the noise of the overlap where row 1 is measured alone."""
@@ -94,27 +86,28 @@ def test_the_pattern_of_the_zois_of_a_mean_decides_its_noise() -> None:
     assert field.mean("u")[1] == pytest.approx(plain.mean("u")[1])
 
 
-def test_what_a_zoi_takes_of_each_pixel_is_the_sum_of_its_channels_and_monomials() -> None:
-    rng, size, at = np.random.default_rng(5), 8, (3, 2)
+def test_what_zois_take_of_each_pixel_is_the_sum_of_their_channels_and_monomials() -> None:
+    """Of two that overlap; the squares of their sum are added row by row."""
+    rng, size, origins = np.random.default_rng(5), 8, np.array([(3, 2), (5, 4)])
     images = padded(*rng.normal(size=(4, 14, 13)).astype(np.float32))
     continue_rim(images, 2, (14, 13))
-    weights = np.zeros((1, CHANNELS, len(MONOMIALS)))
-    weights[0, :2] = rng.normal(size=(2, len(MONOMIALS)))
-    weights[0, 2:4, :3] = rng.normal(size=(2, 3))
-    weights[0, 4:, 0] = rng.normal(size=CHANNELS - 4)
-    line, along = rng.random(size), np.linspace(-1, 1, size)
-    out = np.zeros((size, size))
+    weights = np.zeros((2, CHANNELS, len(MONOMIALS)))
+    weights[:, :2] = rng.normal(size=(2, 2, len(MONOMIALS)))
+    weights[:, 2:4, :3] = rng.normal(size=(2, 2, 3))
+    weights[:, 4:, 0] = rng.normal(size=(2, CHANNELS - 4))
+    line, along, rows = rng.random(size), np.linspace(-1, 1, size), np.empty(10)
     flat, samples, pitch = images.reshape(-1), images[0].size, images.shape[2]
-    scatter(flat, samples, pitch, np.array([at]), weights, line, along, np.array(at), out)
-    place = np.s_[at[0] : at[0] + size, at[1] : at[1] + size]
+    squares(flat, samples, pitch, origins, weights, line, along, origins[0], 10, rows)
     second = with_second_differences(images)[4:]
     channels = [images[0], images[1], images[2], np.ones_like(images[0]), *second]
     eta, xi = np.meshgrid(along, along, indexing="ij")
-    expected = np.zeros((size, size))
-    for channel, weight in zip(channels, weights[0], strict=True):
-        for (x, y), share in zip(MONOMIALS, weight, strict=True):
-            expected += np.outer(line, line) * share * channel[place] * xi**x * eta**y
-    assert out == pytest.approx(expected, abs=1e-5)
+    taken = np.zeros((14, 13))
+    for (row, column), of_zoi in zip(origins, weights, strict=True):
+        place = np.s_[row : row + size, column : column + size]
+        for channel, weight in zip(channels, of_zoi, strict=True):
+            for (x, y), share in zip(MONOMIALS, weight, strict=True):
+                taken[place] += np.outer(line, line) * share * channel[place] * xi**x * eta**y
+    assert rows == pytest.approx((taken[3:13] ** 2).sum(axis=1), rel=1e-5)
 
 
 OVERLAPPING = ZoiGrid.cover(Roi(0, 0, 96, 64), 32, 16)
