@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 import time
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -134,7 +135,8 @@ def test_again_only_what_is_missing(runs: Path, done: Path, capsys: pytest.Captu
 def test_other_settings_need_another_folder(
     runs: Path, done: Path, capsys: pytest.CaptureFixture[str], other: list[str]
 ) -> None:
-    assert batch(runs / "hole-1" / "session.h5", *SETTINGS, *other, "--out", done) == 2
+    settings = dict(zip(SETTINGS[::2], SETTINGS[1::2], strict=True)) | {other[0]: other[1]}
+    assert batch(runs / "hole-1" / "session.h5", *chain(*settings.items()), "--out", done) == 2
     assert "holds results of other settings" in capsys.readouterr().err
 
 
