@@ -231,6 +231,6 @@ def test_mean_and_scatter_stand_in_their_rows(tmp_path: Path, monkeypatch: pytes
 def test_what_holds_nothing_is_not_compared(tmp_path: Path, run: RunFolder) -> None:
     with (
         open_run(make_run(tmp_path, [], session=False)) as empty,
-        pytest.raises(DataError, match="to compare"),
+        pytest.raises(DataError, match="holds no measurement"),
     ):
         comparison.tests_of([run, empty])
