@@ -131,7 +131,7 @@ def test_that_a_map_lies_on_the_reference_is_told_where_it_matters(
     assert "note:" not in capsys.readouterr().out, "nothing has moved as far as a person sees"
     monkeypatch.setattr("live.commands.map._VISIBLE_PX", 0.05)
     assert main(["map", str(results / "out" / "strain.h5"), str(tmp_path / "b.png"), *over]) == 0
-    assert "note: the map lies on the reference picture" in capsys.readouterr().out
+    assert "note: the ZOIs lie where they were in the reference" in capsys.readouterr().out
 
 
 def test_what_was_done_is_named() -> None:
