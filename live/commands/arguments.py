@@ -300,8 +300,16 @@ def full_parser(complete: Iterable[str], *, all_options: bool = True) -> argpars
 
 
 def _given_twice(parser: argparse.ArgumentParser, argv: Sequence[str]) -> str:
-    """An option of one value that is given with two, of which argparse drops the first; empty without one."""
-    single = {name for one in parser._actions if type(one) is _STORE for name in one.option_strings}
+    """An option of one file or device that is given two, of which argparse drops the first; empty without one.
+
+    Of a setting the last one counts, as everywhere: scripts give their own and pass on what they get.
+    """
+    single = {
+        name
+        for one in parser._actions
+        if type(one) is _STORE and any(kind in str(one.metavar) for kind in ("FILE", "ADDRESS"))
+        for name in one.option_strings
+    }
     values: dict[str, str] = {}
     for word, after in pairwise([*argv, ""]):
         name, is_joined, value = word.partition("=")

@@ -18,7 +18,7 @@ from hw_mocks.specimen import KINDS
 from live import cli
 from live.cli import main
 from live.commands import arguments as arguments_module
-from live.commands.arguments import COMMANDS, full_parser, subparsers
+from live.commands.arguments import COMMANDS, full_parser, parse, subparsers
 from live.commands.demo import SPECIMENS
 from live.commands.process import ended_by_sigterm, interrupts
 from live.results.report import saving
@@ -473,13 +473,15 @@ def test_a_slip_of_the_keys_is_met_with_what_is_near(
     assert code == 2 and f"(did you mean {near}?)" in said
 
 
-def test_an_option_with_two_values_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_second_file_or_device_of_one_option_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     code, said = refused(capsys, "run", "--load", "sim:", "--camera=sim:", "--load", "/dev/ttyUSB0")
     assert code == 2 and "--load is given twice" in said
     code, said = refused(
         capsys, "run", "--camera", "sim:unifrom", "--camera=sim:unifrom", "--meta", "a=1", "--meta", "b=2"
     )
     assert code == 2 and "given twice" not in said
+    _, settings = parse(["run", "--camera", "sim:", "--zoi", "32", "--zoi", "48"])
+    assert vars(settings)["measure.zoi"] == 48, "of a setting the last one counts"
 
 
 @pytest.mark.parametrize("name", COMMANDS)
