@@ -220,7 +220,6 @@ class Measurer:
         self._prepared, self._run_state, self._incoming = prepared, run_state, incoming
         self._latency, self._stream, self._stop, self._name = latency, stream, stop, name
         self.failure = 0
-        self._selector = ReferenceSelector(prepared, run_state, incoming)
         self._refused: PhasedicError | None = None
         self._thread = threading.Thread(target=self._work, name="measure", daemon=True)
 
@@ -248,7 +247,7 @@ class Measurer:
     def _work(self) -> None:
         lower_priority(MEASURE)
         try:
-            ready = self._selector.take()
+            ready = ReferenceSelector(self._prepared, self._run_state, self._incoming).take()
             if ready is None:
                 self._incoming.skip_rest()
             else:
