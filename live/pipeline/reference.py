@@ -151,6 +151,16 @@ def needed_MiB(pixels: int, zois: int) -> float:
     return (BYTES_A_PIXEL * pixels + BYTES_A_ZOI * zois) / 2**20
 
 
+def held_memory(pixels: int, zois: int) -> NDArray[np.uint8] | None:
+    """Memory as a kernel and its first picture take, until they come; None where so much is not easily spared.
+
+    The system finds it meanwhile, and gives the same again at once: new memory was up to half of the time from the
+    reference to the first result (12 MP, 2 cores, November 2026).
+    """
+    need = needed_MiB(pixels, zois)
+    return np.ones(int(need * 2**20), np.uint8) if 2 * need < available_MiB() else None
+
+
 @dataclass(frozen=True, slots=True)
 class ReferenceMotion:
     """The motion of the picture from one half of the reference burst to the other.

@@ -17,7 +17,7 @@ from acquire.text import Message
 from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample
 from live.pipeline.measure import NewReference
 from live.pipeline.measurement import Measurement
-from live.pipeline.reference import ReferenceBurst, ReferenceMotion, blank_text, motion_between
+from live.pipeline.reference import ReferenceBurst, ReferenceMotion, blank_text, held_memory, motion_between
 from live.pipeline.run_state import RunState
 from live.results.folder import BurstFailures
 from live.run.incoming_bursts import IncomingBursts
@@ -42,6 +42,8 @@ class ReferenceSelector:
 
     def __init__(self, prepared: PreparedRun, run_state: RunState, incoming: IncomingBursts) -> None:
         self._prepared, self._run_state, self._incoming = prepared, run_state, incoming
+        plan = prepared.plan
+        self._held = held_memory(plan.width * plan.height, plan.kernel_grid.n_active)
 
     def take(self) -> PreparedKernel | None:
         """The kernel on it; None where the run ended before there was a reference.
@@ -54,6 +56,7 @@ class ReferenceSelector:
             The grid does not fit.
         """
         reference = self._incoming.next_reference()
+        self._held = None
         if reference is None:
             text = Message(
                 "the camera ended before the reference was complete ({grabbed} frames)",

@@ -41,7 +41,12 @@ class References:
         for k in range(101):
             self.state.loads.append(LoadSample(START - 0.5 + k / 100, float(k)))
         self._taken, self._motions, self._n = 0, motions, n
-        plan = SimpleNamespace(on=lambda burst, what: SimpleNamespace(burst=burst, what=what, plan=None))
+        plan = SimpleNamespace(
+            on=lambda burst, what: SimpleNamespace(burst=burst, what=what, plan=None),
+            width=64,
+            height=48,
+            kernel_grid=SimpleNamespace(n_active=1),
+        )
         config = SimpleNamespace(
             measure=SimpleNamespace(reference_shift_px=0.05), camera=SimpleNamespace(address="sim:")
         )
