@@ -34,9 +34,8 @@ INTRA = {
 """Codecs, by their code in small letters, each of whose pictures stands alone; H.264, VP9 and all others do not."""
 FILM_WARNING = Message("compressed film: strain may be 10 % low; record MJPG, FFV1 or pictures")
 _AS_JPEG = ("mjpg", "jpeg", "mjpa", "avrn")
-_COLOURED = (
-    8.0  # of 255, between the planes of a picture in the mean; a codec shifts those of a grey one less
-)
+# Of 255, between the planes of a picture in the mean; a codec shifts those of a grey one less.
+_COLOURED = 8.0
 _HEAD = 1 << 20  # bytes, with the tables of the first picture
 _COUNTED = ((0, b"RIFF"), (4, b"ftyp"))  # containers with the number of frames; others have but a duration
 _MOST_COUNTED = 50_000_000  # bytes that are read through to count frames
@@ -128,9 +127,8 @@ class VideoFile(CameraBase):
     def _depth(self, cv2: Any) -> Iterator[str]:
         """What OpenCV leaves of samples with more than 8 bits, by the code of FFmpeg for their format."""
         code = int(self._capture.get(cv2.CAP_PROP_CODEC_PIXEL_FORMAT)) & 0xFFFFFFFF
-        ends = (
-            () if _fourcc(code)[:3] in ("RGB", "BGR") else (code & 0xFF, code >> 24)
-        )  # least, most significant first
+        # The bits are the last byte of the code, or the first: by the order of the bytes of a sample.
+        ends = () if _fourcc(code)[:3] in ("RGB", "BGR") else (code & 0xFF, code >> 24)
         for bits in (one for one in ends if 8 < one <= 16):
             yield Message(
                 "film of {bits} bits, read as 8: noise and strain are coarser; give it as pictures", bits
