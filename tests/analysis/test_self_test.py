@@ -19,7 +19,7 @@ from analysis.fit import sensitivity
 from analysis.kernel import solve
 from analysis.kernel.phase_kernel import _measure_known as measure_known
 from analysis.kernel.phase_kernel import check_machine
-from analysis.picture import splines
+from analysis.picture import spectrum, splines
 from analysis.self_test import SelfTestCase, errors_of, limits, measuring_fault, picture
 
 GRID = ZoiGrid.cover(Roi(8, 8, 80, 80), size=32, step=16)
@@ -124,11 +124,17 @@ def test_what_makes_sigma_wrong_is_found(
     for module, name, wrong in faults:
         with monkeypatch.context() as patched:
             patched.setattr(module, name, wrong)
-            self_test._check_measuring.cache_clear()
+            _forget()
             with pytest.raises(MachineError, match="what sigma is made of"):
                 check_machine(settings, size)
-    self_test._check_measuring.cache_clear()
+    _forget()
     check_machine(settings, size)
+
+
+def _forget() -> None:
+    """A process starts with neither: what it has once made is kept."""
+    self_test._check_measuring.cache_clear()
+    spectrum._gradient_response.cache_clear()
 
 
 def test_a_kernel_is_refused_with_the_names_of_the_libraries(
