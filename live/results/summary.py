@@ -10,7 +10,7 @@ import numpy as np
 
 from acquire.load_cell import LoadLog
 from acquire.text import Amount, Message, counts, joined, word
-from acquire.text.message import brief, share_text
+from acquire.text.message import brief, counted, share_text
 from analysis.field import Blur, Status
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
@@ -39,8 +39,8 @@ def valid_line(history: History) -> str:
     last = history.time_steps[-1]
     refused = Message(" ({refused})", last.refused) if last.refused else ""
     return Message(
-        "measured {bursts} bursts, {valid} of {zois} ZOIs valid in the last{refused}",
-        *counts(len(history.time_steps), last.n_valid, last.n_zoi), refused,
+        "measured {bursts}, {valid} of {zois} ZOIs valid in the last{refused}",
+        counted(len(history.time_steps), "burst"), *counts(last.n_valid, last.n_zoi), refused,
     )  # fmt: skip
 
 

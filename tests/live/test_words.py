@@ -206,6 +206,24 @@ def test_a_translation_has_the_fields_of_its_text_and_stands_for_one_that_is_the
         assert not FIELDS.search(english) or english in known or english.startswith(made_of_words), english
 
 
+def nouns() -> set[str]:
+    """What ``counted`` is given as a word; the nouns of consumers and levels come as variables."""
+    trees = (
+        ast.parse(path.read_text("utf-8"))
+        for path in [*(ROOT / "acquire").rglob("*.py"), *(ROOT / "live").rglob("*.py")]
+    )
+    calls = (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call))
+    words = (call.args[1] for call in calls if name_of(call) == "counted" and len(call.args) == 2)
+    return {str(word.value) for word in words if isinstance(word, ast.Constant)}
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_what_is_counted_has_one_and_many_in_each_language(name: str) -> None:
+    found = nouns()
+    assert len(found) > 5
+    assert not {noun for noun in found for end in ("", "s") if f"{{n}} {noun}{end}" not in entries(name)}
+
+
 def helps(parser: argparse.ArgumentParser) -> Iterator[str]:
     """All texts of a parser and those of its commands: descriptions line by line, headings, helps."""
     for text in (parser.description, parser.epilog):
