@@ -130,7 +130,7 @@ class Strain(Closing):
         """
         self.check_measured()
         t = self.time_s
-        low, high = -np.inf if start_s is None else start_s, np.inf if end_s is None else end_s
+        low, high = t[0] if start_s is None else start_s, t[-1] if end_s is None else end_s
         rows = np.flatnonzero((t >= low - _ROUNDING_S) & (t <= high + _ROUNDING_S))
         if not rows.size:
             raise ConfigError(
