@@ -117,7 +117,7 @@ def test_pulled_for_four_seconds_in_mid_test(tmp_path: Path) -> None:
     # At the rate that came last: on a busy machine the camera of the test is slower than it says.
     before = frames[max(later - 21, 0) : later]
     steps = [(b.raw_t - a.raw_t) / (b.lost_before + 1) for a, b in pairwise(before)]
-    assert gap == pytest.approx(away / np.median(steps) - 1, abs=1.01)
+    assert gap == pytest.approx(away / np.median(steps) - 1, rel=0.05, abs=1.01)
     assert gap == pytest.approx(away * 10 - 1, rel=0.15)
 
 

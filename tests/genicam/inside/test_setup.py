@@ -90,7 +90,7 @@ def test_automatics_are_off_and_the_white_level_is_the_cameras(fake: FakeCameraP
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ("format=Mono9", "the camera offers Mono12p, "),
+        ("format=Mono9", "allowed: Mono12p, "),
         ("width=5000", "allowed: 1 to 2048"),
         ("exposure_us=1", "from 10 to"),
         ("gain=11", "from 0 to 10"),
