@@ -42,6 +42,7 @@ STYLE += "".join(
     for k, line in enumerate(LINES, 1)
 )
 _TICKS = 5
+_LETTER = 7.0  # px, a wide one of the words in a plot
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -244,8 +245,8 @@ def _thinned(x: Array, y: Array) -> NDArray[np.intp]:
 
 def _mark(mark: Mark, axes: _Axes) -> str:
     x, y = axes.across(mark.x), axes.down(mark.y)
-    left = x > WIDTH - 150
     name = Message("{name} {sign} {value}", mark.name, "≥" if mark.is_bound else "=", mark.value)
+    left = x + 8 + _LETTER * len(name) > WIDTH  # where the curve often is
     words = _word(x + (-8 if left else 8), y + 18, name, "end" if left else "start", "word ink")
     return f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="5"/>{words}'
 
