@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from acquire.burst.accumulate import BurstAccumulator
 from acquire.clock import ClockPair
-from acquire.frame import CameraInfo, Frame, frozen
+from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.session import SessionInfo, SessionWriter
 
@@ -69,3 +70,22 @@ def writer(
 ) -> SessionWriter:
     """A new session of the test camera."""
     return SessionWriter(path, info(camera, **changes), now=now)
+
+
+def recorded(
+    path: Path, frames: int = 1, *, loads: bool = True, camera: CameraInfo = CAMERA, **changes: Any
+) -> Path:
+    """A closed session of so many frames, each with a load sample."""
+    with writer(path, camera, **changes) as session:
+        for k in range(frames):
+            if loads:
+                session.write_load(sample(k))
+            session.write_frame(frame(k, camera))
+    return path
+
+
+def bursts_of(n: int, count: int, camera: CameraInfo = CAMERA) -> list[Burst]:
+    """Bursts of the test camera."""
+    accumulator = BurstAccumulator(n)
+    found = [accumulator.add(frame(k, camera)) for k in range(n * count)]
+    return [burst for burst in found if burst is not None]
