@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from acquire.addresses import parse_address
-from acquire.camera.contract import Camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import Event, ignore_event
 from acquire.frame import Frame

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import itertools
-import math
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from acquire.addresses import Options, parse_address
+from acquire.addresses import parse_address
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, ignore_event
 from acquire.load_cell.contract import LoadCell
 from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
 from hw_mocks.indicator import IndicatorReading
-from hw_mocks.indicator_server import IndicatorServer, PtyPort
-from hw_mocks.sim_indicators import INDICATORS, HbmAedIndicator
+from hw_mocks.indicator_server import PtyPort
+from hw_mocks.sim_indicators import HbmAedIndicator
 from hw_mocks.sim_load_cell import NominalLoadCell, SimLoadCell, SimLoadSettings, _indicator, open_sim_load
-from hw_mocks.sim_settings import SERIAL_FAULTS, SPECIMEN_KEYS
-from hw_mocks.specimen import VirtualSpecimen, specimen_from, take_specimen
+from hw_mocks.sim_settings import SERIAL_FAULTS
+from hw_mocks.specimen import VirtualSpecimen, specimen_from
 
 
 def opened(text: str, on_event=ignore_event) -> tuple[LoadCell, VirtualSpecimen]:

@@ -30,16 +30,8 @@ def frame(number: int, camera: CameraInfo = CAMERA, **changes: Any) -> Frame:
     dtype = np.uint8 if camera.bits <= 8 else np.uint16
     image = rng.integers(0, 2**camera.bits, (camera.height, camera.width)).astype(dtype)
     t = START.monotonic + number / 60 + 1 / 3
-    plain: dict[str, Any] = {
-        "image": frozen(image),
-        "index": 5 + number,
-        "t": t,
-        "clock": camera.clock,
-        "lost_before": 0,
-        "bits": camera.bits,
-        "raw_t": t + 0.004,
-    }
-    return Frame(**{**plain, **changes})
+    plain = Frame(frozen(image), 5 + number, t, camera.clock, 0, camera.bits, t + 0.004)
+    return dataclasses.replace(plain, **changes)
 
 
 def sample(number: int) -> LoadSample:
