@@ -12,7 +12,8 @@ import pytest
 from analysis.evaluate import AreaStrain
 from analysis.field import Block, Roi, Status, StrainField, ZoiGrid, part_of
 from analysis.optics import ApparentMotion, Model, PlateLayout, choose_model, trouble, without_plates
-from tests.analysis.test_optics import FOCAL, NAMES, ONE, TWO, covariance, fit_of
+from tests.analysis.planes import NAMES
+from tests.analysis.test_optics import FOCAL, ONE, TWO, covariance, fit_of
 
 
 @pytest.mark.parametrize(("px", "uneven"), [(0.024, False), (0.0262, True)])
@@ -86,8 +87,8 @@ def test_a_plate_needs_half_of_its_zois(left: int, lost: bool) -> None:
     part = np.zeros(66, int)
     part[left:] = Status.LOST
     status[plate.at] = part.reshape(22, 3)
-    words = trouble(fit, StrainField.from_values(fit.layout.whole, {}, 1e-3, status))[0]
-    assert words == ("plate right is lost or shaded: 32 of 66 ZOIs have a value" if lost else "")
+    found = trouble(fit, StrainField.from_values(fit.layout.whole, {}, 1e-3, status))
+    assert found == ("plate right is lost or shaded: 32 of 66 ZOIs have a value" if lost else "", False)
 
 
 GRID = ZoiGrid.cover(Roi(100, 200, 160, 160), 32, 16)  # 9 x 9 ZOIs

@@ -245,6 +245,7 @@ def test_the_other_side_is_known_between_its_instants_alone() -> None:
     )
     assert BACK.at(asked, 4.0).value == pytest.approx([math.nan, 1.5e-4, 5e-4, 7e-4, math.nan], nan_ok=True)
     assert BACK.at(asked, 4.0).sigma[1] == pytest.approx(math.hypot(0.75, 0.25) * 6e-6)
+    assert np.isnan(Course(np.zeros(1), np.zeros(1), np.zeros(1)).at(np.zeros(3), 1.0).value).all()
 
 
 @pytest.mark.parametrize(("rising", "half"), [(600, 4), (150, 2), (40, 0)])
