@@ -218,3 +218,19 @@ def test_the_ends_of_a_strip_are_thirds_across_the_load_and_sixths_along_it(alon
         np.testing.assert_array_equal(first, inside & (place >= 20) & (place <= 20 + end))
         np.testing.assert_array_equal(last, inside & (place >= 140 - end) & (place <= 140))
     assert ExtensionGauge("e", box, along).length == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize(("statistic", "value"), [("smallest", -3e-3), ("largest", 2e-3), ("mean", 0.0)])
+def test_the_extremes_of_an_area(statistic: str, value: float) -> None:
+    """Where a ZOI has no value it is neither."""
+    grid = ZoiGrid.cover(Roi(0, 0, 96, 64), 32, 16)
+    strain, status = np.zeros(grid.shape), np.zeros(grid.shape, int)
+    strain[0, 1], strain[1, 2], strain[2, 0], strain[2, 4] = -3e-3, 2e-3, 1e-3, 9.0
+    status[2, 4] = Status.POOR_MATCH
+    sigmas = np.arange(15.0).reshape(grid.shape) * 1e-6 + 1e-6
+    field = StrainField.from_values(grid, {"du_dx": strain}, sigmas, status)
+    gauge = AreaGauge("", (0, 0, 96, 64), value="exx", statistic=statistic)  # type: ignore[arg-type]
+    found = gauge.measure(field)
+    assert found.value == pytest.approx(value, abs=1e-12)
+    place = {"smallest": (0, 1), "largest": (1, 2)}.get(statistic)
+    assert place is None or found.sigma == pytest.approx(field.sigma("exx")[place])
