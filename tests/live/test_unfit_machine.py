@@ -56,37 +56,26 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> None:
     assert "Traceback" not in printed
 
 
-QUIET = ("--no-view", "--no-rrd")
-
-
-@pytest.mark.parametrize("command", ["run", "replay"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        "run --camera SHOTS --zoi 48 --burst 1 --no-view --no-rrd --out OUT",
+        "replay SHOTS --zoi 48 --burst 1 --no-view --no-rrd --out OUT",
+        "check --camera SHOTS --zoi 48",
+        "study SHOTS --zoi 32,48 --static 0,2 --loaded 5,8 --out OUT",
+        "characterise --pattern SHOTS/00.png --quick --out OUT",
+    ],
+)
 def test_nothing_is_measured(
-    command: str,
+    words: str,
     shots: Path,
     tmp_path: Path,
     break_taps: Callable[[], None],
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    source = ["--camera", str(shots)] if command == "run" else [str(shots)]
-    words = [command, *source, "--zoi", "48", "--burst", "1", *QUIET, "--out", str(tmp_path / "out")]
     break_taps()
-    refused(capsys, *words)
+    refused(capsys, *words.replace("SHOTS", str(shots)).replace("OUT", str(tmp_path / "out")).split())
     assert not list(tmp_path.rglob("strain.h5"))
-
-
-def test_a_check_is_not_go(
-    shots: Path, break_taps: Callable[[], None], capsys: pytest.CaptureFixture[str]
-) -> None:
-    break_taps()
-    refused(capsys, "check", "--camera", f"files:{shots}", "--zoi", "48")
-
-
-def test_nor_is_a_study(
-    shots: Path, tmp_path: Path, break_taps: Callable[[], None], capsys: pytest.CaptureFixture[str]
-) -> None:
-    break_taps()
-    times = ["--static", "0,2", "--loaded", "5,8"]
-    refused(capsys, "study", str(shots), "--zoi", "32,48", *times, "--out", str(tmp_path / "out"))
 
 
 def test_a_worker_of_a_batch(shots: Path, tmp_path: Path, break_taps: Callable[[], None]) -> None:
@@ -101,14 +90,3 @@ def test_warming_up(break_taps: Callable[[], None], capsys: pytest.CaptureFixtur
     assert "self-test: a known pattern is measured right" in capsys.readouterr().out
     break_taps()
     refused(capsys, "warm-up")
-
-
-def test_characterise(
-    tmp_path: Path, break_taps: Callable[[], None], capsys: pytest.CaptureFixture[str]
-) -> None:
-    pattern = tmp_path / "pattern.png"
-    cv2.imwrite(
-        str(pattern), np.rint(255 * Speckle((128, 160), radius=2.0, seed=3).render(Affine(), (128, 160)))
-    )
-    break_taps()
-    refused(capsys, "characterise", "--pattern", str(pattern), "--quick", "--out", str(tmp_path / "out"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import signal
 import subprocess
@@ -21,9 +20,6 @@ from live.commands import arguments as arguments_module
 from live.commands.arguments import COMMANDS, full_parser, parse, subparsers
 from live.commands.demo import SPECIMENS
 from live.commands.process import ended_by_sigterm, interrupts
-from live.results.report import saving
-from live.results.report.svg import Plot, PlotLine
-from live.ui.terminal.screen import TerminalScreen
 from tests.adversary.test_terminal import HOSTILE
 from tests.live.ended import code_of
 from tests.live.made_run import make_run
@@ -78,26 +74,6 @@ def test_names_that_cannot_be(
     code, said = refused(capsys, *words)
     assert code in (2, 4), said
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    ("number", "code", "advice"),
-    [
-        (errno.EACCES, 4, "check the path, the permissions and the room on the disk"),
-        (errno.ENOSPC, 4, "the room on the disk"),
-        (errno.ENAMETOOLONG, 2, "give another name"),
-    ],
-)
-def test_what_the_system_refuses_names_the_file(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, number: int, code: int, advice: str
-) -> None:
-    def command(arguments: object) -> int:
-        raise OSError(number, os.strerror(number), "/there/session.h5")
-
-    monkeypatch.setattr(cli, "parse", lambda words: (command, arguments_module.argparse.Namespace()))
-    found, said = refused(capsys, "devices")
-    assert found == code
-    assert f"phasedic: /there/session.h5: {os.strerror(number)}; " in said and advice in said
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
@@ -156,21 +132,6 @@ def test_a_mistyped_command(capsys: pytest.CaptureFixture[str], typed: str, mean
     code, said = refused(capsys, typed, "--camera", "sim:")
     assert code == 2 and f"there is no command '{typed}'" in said
     assert (f"(did you mean {meant}?)" in said) is bool(meant)
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        *(("NUMBA_NUM_THREADS", value) for value in ("0", "-1", "two", "")),
-        *(("SOURCE_DATE_EPOCH", value) for value in ("x", "-1", "1.5", "")),
-    ],
-)
-def test_an_environment_that_ends_numba(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str, value: str
-) -> None:
-    monkeypatch.setenv(name, value)
-    code, said = refused(capsys, "devices")
-    assert code == 2 and f"{name}={value} is not possible" in said
 
 
 @pytest.mark.parametrize(
@@ -252,11 +213,6 @@ def test_the_specimens_of_the_demo_are_those_of_the_simulator() -> None:
     assert set(SPECIMENS) == set(KINDS)
 
 
-def test_the_simulated_camera_is_among_the_known_ones(capsys: pytest.CaptureFixture[str]) -> None:
-    code, said = refused(capsys, "run", "--camera", "firewire:0")
-    assert code == 2 and "known: /dev/..., files:, genicam:, opencv:, pylon:, session:, video:, sim:" in said
-
-
 @pytest.mark.parametrize("limit", ["0", "nan", "-1", "inf"])
 def test_a_colour_range_that_cannot_be(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, limit: str
@@ -321,19 +277,6 @@ def test_results_do_not_need_the_recording(
         or part in {"png": ("the whole", "one picture"), "r3xa": ("the whole",)}[command[-1]]
     )
     assert ("note: the recording cannot be read, the results can: " in said) is needed, said
-
-
-def test_a_browser_that_fails_costs_the_png_alone(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """It lost a finished study of many minutes."""
-    monkeypatch.setattr(saving, "find_browser", lambda: "/bin/false")
-    x = np.array([0.0, 1.0])
-    saving.save_figures(
-        [Plot("a", "A", "x", "y", (PlotLine("one", x, x),))], tmp_path / "figures", TerminalScreen()
-    )
-    assert {path.name for path in (tmp_path / "figures").iterdir()} == {"a.svg", "a.csv"}
-    assert "warning: the figures are SVG and CSV without PNG: " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, *HANGUP])
@@ -431,29 +374,6 @@ def test_options_of_another_format_are_not_accepted(
 ) -> None:
     code, said = refused(capsys, "export", str(make_run(tmp_path)), "--to", to, option)
     assert code == 2 and f"{option.partition('=')[0]} has no effect with --to {to}" in said
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_has_a_help(capsys: pytest.CaptureFixture[str], name: str) -> None:
-    assert refused(capsys, name, "--help")[0] == 0
-
-
-@pytest.mark.parametrize(
-    ("scheduler", "why"),
-    [
-        ("xx", "give tcp://HOST:PORT"),
-        ("tcp://127.0.0.1", "give tcp://"),
-        ("tcp://127.0.0.1:1", "nothing answers there"),
-    ],
-)
-def test_a_scheduler_that_is_not_there(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, scheduler: str, why: str
-) -> None:
-    (tmp_path / "session.h5").write_bytes(b"x")
-    words = ("batch", str(tmp_path / "session.h5"), "--out", str(tmp_path / "out"), "--scheduler", scheduler)
-    code, said = refused(capsys, *words)
-    assert code == 2 and why in said
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
