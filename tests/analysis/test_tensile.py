@@ -179,7 +179,7 @@ def test_without_enough_points_nothing_is_made_up() -> None:
         found = evaluate_test(curve)
         assert not known(found)
         assert (
-            "test in compression" if found.kind == "compression" else "have strain and a tensile force"
+            "test in compression" if found.kind == "compression" else "with strain and a tensile force"
         ) in found.E.why
     found = evaluate_test(Curve(np.zeros(0), np.zeros(0), np.zeros(0)))
     assert not known(found) and "0 measurements in all, 8 are needed: more pictures" in found.E.why

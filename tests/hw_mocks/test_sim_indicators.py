@@ -150,6 +150,8 @@ def test_mark10_conversation() -> None:
     )
     talk(indicator, [(b"AOUT1\r", b"")])
     assert (indicator.left, indicator.rate) == (math.inf, 50.0)
+    talk(indicator, [(b"AOUT250\r", b"")])
+    assert (indicator.left, indicator.rate) == (math.inf, 250.0)
     talk(indicator, [(b"AOUT125\rAOUT0\r", b"")])
     assert (indicator.left, indicator.rate) == (0, None)
 
@@ -204,27 +206,35 @@ def test_modbus_reads_the_laumas_registers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("registers", "words"),
+    ("registers", "force", "words"),
     [
-        (RegisterMap(value_type="f32"), struct.pack(">f", 123)),
-        (RegisterMap(value_type="u32"), struct.pack(">I", 123)),
-        (RegisterMap(low_word_first=True), struct.pack(">HH", 123, 0)),
+        (RegisterMap(value_type="f32"), 12.34, struct.pack(">f", 123)),
+        (RegisterMap(value_type="u32"), 12.34, struct.pack(">I", 123)),
+        (RegisterMap(value_type="u32"), -12.3, bytes(4)),  # without a sign nothing is below zero
+        (RegisterMap(low_word_first=True), 12.34, struct.pack(">HH", 123, 0)),
     ],
 )
-def test_modbus_types_and_word_order(registers: RegisterMap, words: bytes) -> None:
-    answer = ModbusIndicator(registers=registers).receive(read(7, 2), AT_12)
+def test_modbus_types_and_word_order(registers: RegisterMap, force: float, words: bytes) -> None:
+    answer = ModbusIndicator(registers=registers).receive(read(7, 2), IndicatorReading(force))
     assert answer[3:7] == words
 
 
-def test_modbus_status_by_map() -> None:
-    def status(registers: RegisterMap, shown: IndicatorReading) -> int:
-        answer = ModbusIndicator(registers=registers).receive(read(registers.status, 1), shown)
-        return int.from_bytes(answer[3:5])
-
-    assert status(DAT400, AT_12) == 0b10
-    assert status(DAT400, IndicatorReading(0, stable=False, status="overload")) == 0b100000
-    assert status(PT113, AT_12) == 0b010
-    assert status(PT113, IndicatorReading(0, stable=False)) == 0b110
+@pytest.mark.parametrize(
+    ("registers", "shown", "tared", "status"),
+    [
+        (DAT400, AT_12, False, 0b10),
+        (DAT400, IndicatorReading(0, stable=False, status="overload"), False, 0b100000),
+        (DAT400, IndicatorReading(0.0, status="underload"), True, 0b11010),
+        (PT113, AT_12, False, 0b010),
+        (PT113, IndicatorReading(0, stable=False), False, 0b110),
+    ],
+)
+def test_modbus_status_by_map(
+    registers: RegisterMap, shown: IndicatorReading, tared: bool, status: int
+) -> None:
+    indicator, tare = ModbusIndicator(registers=registers), framed(struct.pack(">BBHH", 1, 6, 5, 2))
+    assert not tared or indicator.receive(tare, AT_12) == tare
+    assert int.from_bytes(indicator.receive(read(registers.status, 1), shown)[3:5]) == status
 
 
 def test_modbus_holds_its_peak_until_it_is_reset() -> None:
@@ -299,26 +309,6 @@ def test_mark10_tells_its_settings() -> None:
     indicator = Mark10Indicator()
     talk(indicator, [(b"LIST\r", b"V1.00;N;CUR;FLTC8;FLTP1;AOUT0;FULL\r\n"), (b"AOUT25\r", b"")])
     talk(indicator, [(b"LIST\r", b"V1.00;N;CUR;FLTC8;FLTP1;AOUT25;FULL\r\n"), (b"FLTC3\r", b"*12\r\n")])
-
-
-@pytest.mark.parametrize(("said", "lines", "rate"), [(b"AOUT250\r", math.inf, 250.0), (b"AOUT3\r", 0, None)])
-def test_mark10_streams_at_the_rates_that_it_has(said: bytes, lines: float, rate: float | None) -> None:
-    indicator = Mark10Indicator()
-    indicator.receive(said, AT_12)
-    assert (indicator.left, indicator.rate) == (lines, rate)
-
-
-def test_modbus_without_a_sign_shows_nothing_below_zero() -> None:
-    indicator = ModbusIndicator(registers=RegisterMap(value_type="u32"))
-    assert indicator.receive(read(7, 2), IndicatorReading(-12.3))[3:7] == bytes(4)
-
-
-def test_modbus_status_shows_what_was_tared_and_what_is_too_little() -> None:
-    indicator = ModbusIndicator(registers=DAT400)
-    tare = framed(struct.pack(">BBHH", 1, 6, 5, 2))
-    assert indicator.receive(tare, AT_12) == tare
-    status = indicator.receive(read(6, 1), IndicatorReading(0.0, status="underload"))[3:5]
-    assert int.from_bytes(status) == 0b11010
 
 
 @pytest.mark.parametrize(
