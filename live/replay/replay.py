@@ -28,6 +28,7 @@ from acquire.opencv.images import picture_times
 from acquire.text import Amount, Message, about, counts, joined
 from acquire.text.message import counted
 from analysis.compiled.interruption import abandoned_when
+from live.config.effect import without_forces
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
 from live.pipeline.consumer import Compose, RunInfo, Screen
@@ -137,6 +138,8 @@ def _with_forces(
 ) -> ReplaySource:
     """The same source with the forces of the given file, after a line on what was taken from it."""
     if request.forces is None:
+        for note in () if len(source.loads) else without_forces(request.overrides):
+            screen.print(note)
         return source
     table = read_forces(request.forces, config.load)
     named = table.export.times is None
