@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import errno
-import threading
 from collections.abc import Callable
 from itertools import islice
 from typing import Any
@@ -191,23 +190,6 @@ def test_waking_for_nothing_counts_as_a_dead_device() -> None:
         rig.fake.queued.clear()  # as a driver does that reports an error without a buffer
         assert next(stream).index > 0
     assert "fatal error" in rig.texts()
-
-
-def test_closing_from_another_thread_while_it_streams() -> None:
-    rig = CameraRig()
-    camera = rig.open()
-    seen = []
-
-    def read() -> None:
-        seen.extend(camera)
-
-    with camera:
-        reader = threading.Thread(target=read)
-        reader.start()
-    reader.join()  # as the stream has ended, and no buffer was taken from under it
-    assert not rig.kernel._handles
-    assert rig.fake.maps_open == 0
-    assert not rig.events
 
 
 def test_a_missing_device_names_what_there_is() -> None:
