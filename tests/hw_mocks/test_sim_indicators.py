@@ -20,62 +20,40 @@ from hw_mocks.sim_indicators import (
     SauterIndicator,
 )
 
-AT_12 = IndicatorReading(12.34)
-G = 9.80665e-3
+shown = IndicatorReading
+AT_12, OVER, UNDER = shown(12.34), shown(0, status="overload"), shown(0, status="underload")
+G, LBF = 9.80665e-3, 4.4482216153
+SICS, AED, HBM = MtSicsIndicator, AedStandardIndicator, HbmAedIndicator
 LINES: dict[str, tuple[Indicator, IndicatorReading, bytes]] = {
-    "sics stable": (MtSicsIndicator(0.01 * G, "g"), IndicatorReading(100 * G), b"S S     100.00 g\r\n"),
-    "sics dynamic": (
-        MtSicsIndicator(0.01 * G, "g"),
-        IndicatorReading(100.03 * G, stable=False),
-        b"S D     100.03 g\r\n",
-    ),
-    "sics overload": (MtSicsIndicator(), IndicatorReading(0, status="overload"), b"S +\r\n"),
-    "sics underload": (MtSicsIndicator(), IndicatorReading(0, status="underload"), b"S -\r\n"),
-    "sics error": (MtSicsIndicator(), IndicatorReading(0, status="error"), b"S I\r\n"),
-    "aed one header": (
-        AedStandardIndicator(0.01 * G, "g", second_header=False),
-        IndicatorReading(123.45 * G),
-        b"ST,+00123.45  g\r\n",
-    ),
-    "aed two headers": (
-        AedStandardIndicator(G, "kg"),
-        IndicatorReading(1.234 * 9.80665),
-        b"ST,GS,+0001.234kg\r\n",
-    ),
-    "aed unstable": (AedStandardIndicator(), IndicatorReading(-18.3, stable=False), b"US,GS,-000018.3 N\r\n"),
-    "aed overload": (
-        AedStandardIndicator(unit="g", second_header=False),
-        IndicatorReading(0, status="overload"),
-        b"OL,+9999999.9  g\r\n",
-    ),
-    "aed blank": (
-        AedStandardIndicator(blank_overload=True),
-        IndicatorReading(0, status="overload"),
-        b"OL,GS,      .  N\r\n",
-    ),
-    "aed prefix": (AedStandardIndicator(prefix="01"), IndicatorReading(5), b"01ST,GS,+000005.0 N\r\n"),
-    "mark10 tension is negative": (Mark10Indicator(0.001), IndicatorReading(-4.285), b"4.285 N\r\n"),
-    "mark10 pounds": (
-        Mark10Indicator(0.01 * 4.4482216153, "lbF"),
-        IndicatorReading(18.78 * 4.4482216153),
-        b"-18.78 lbF\r\n",
-    ),
-    "sauter tension": (SauterIndicator(0.01), IndicatorReading(21.15), b"1021.15"),
-    "sauter compression": (SauterIndicator(0.01), IndicatorReading(-11.70), b"0011.70"),
-    "sauter large": (SauterIndicator(0.01), IndicatorReading(7712.32), b"17712.3"),
-    "hbm": (HbmAedIndicator(nominal_N=10_000), IndicatorReading(1234.5), b" 0123450,31,008\r\n"),
-    "hbm negative": (
-        HbmAedIndicator(nominal_N=10_000),
-        IndicatorReading(-1234.5, stable=False),
-        b"-0123450,31,000\r\n",
-    ),
-    "hbm overload": (HbmAedIndicator(), IndicatorReading(0, status="overload"), b" 1600000,31,011\r\n"),
+    "sics stable": (SICS(0.01 * G, "g"), shown(100 * G), b"S S     100.00 g\r\n"),
+    "sics dynamic": (SICS(0.01 * G, "g"), shown(100.03 * G, stable=False), b"S D     100.03 g\r\n"),
+    "sics overload": (SICS(), OVER, b"S +\r\n"),
+    "sics underload": (SICS(), UNDER, b"S -\r\n"),
+    "sics error": (SICS(), shown(0, status="error"), b"S I\r\n"),
+    "aed one header": (AED(0.01 * G, "g", second_header=False), shown(123.45 * G), b"ST,+00123.45  g\r\n"),
+    "aed two headers": (AED(G, "kg"), shown(1234 * G), b"ST,GS,+0001.234kg\r\n"),
+    "aed unstable": (AED(), shown(-18.3, stable=False), b"US,GS,-000018.3 N\r\n"),
+    "aed overload": (AED(unit="g", second_header=False), OVER, b"OL,+9999999.9  g\r\n"),
+    "aed blank": (AED(blank_overload=True), OVER, b"OL,GS,      .  N\r\n"),
+    "aed prefix": (AED(prefix="01"), shown(5), b"01ST,GS,+000005.0 N\r\n"),
+    "mark10 tension is negative": (Mark10Indicator(0.001), shown(-4.285), b"4.285 N\r\n"),
+    "mark10 pounds": (Mark10Indicator(0.01 * LBF, "lbF"), shown(18.78 * LBF), b"-18.78 lbF\r\n"),
+    "sauter tension": (SauterIndicator(0.01), shown(21.15), b"1021.15"),
+    "sauter compression": (SauterIndicator(0.01), shown(-11.70), b"0011.70"),
+    "sauter large": (SauterIndicator(0.01), shown(7712.32), b"17712.3"),
+    "hbm": (HBM(nominal_N=10_000), shown(1234.5), b" 0123450,31,008\r\n"),
+    "hbm negative": (HBM(nominal_N=10_000), shown(-1234.5, stable=False), b"-0123450,31,000\r\n"),
+    "hbm overload": (HBM(), OVER, b" 1600000,31,011\r\n"),
+    "hbm underload": (HBM(), shown(-1e9, status="underload"), b"-1600000,31,011\r\n"),
+    "hbm counts a million at its nominal load": (HBM(), shown(10_000.0), b" 1000000,31,008\r\n"),
+    "hbm has no zero below zero": (HBM(), shown(-0.04), b" 0000000,31,008\r\n"),
+    "hbm of another nominal load": (HBM(nominal_N=500.0), shown(250.0), b" 0500000,31,008\r\n"),
 }
 
 
-@pytest.mark.parametrize(("indicator", "shown", "line"), LINES.values(), ids=LINES.keys())
-def test_lines(indicator: Indicator, shown: IndicatorReading, line: bytes) -> None:
-    assert indicator.render(shown) == line
+@pytest.mark.parametrize(("indicator", "reading", "line"), LINES.values(), ids=LINES.keys())
+def test_lines(indicator: Indicator, reading: IndicatorReading, line: bytes) -> None:
+    assert indicator.render(reading) == line
 
 
 def talk(
@@ -309,19 +287,6 @@ def test_mark10_tells_its_settings() -> None:
     indicator = Mark10Indicator()
     talk(indicator, [(b"LIST\r", b"V1.00;N;CUR;FLTC8;FLTP1;AOUT0;FULL\r\n"), (b"AOUT25\r", b"")])
     talk(indicator, [(b"LIST\r", b"V1.00;N;CUR;FLTC8;FLTP1;AOUT25;FULL\r\n"), (b"FLTC3\r", b"*12\r\n")])
-
-
-@pytest.mark.parametrize(
-    ("shown", "line"),
-    [
-        (IndicatorReading(-1e9, status="underload"), b"-1600000,31,011\r\n"),
-        (IndicatorReading(10_000.0), b" 1000000,31,008\r\n"),
-        (IndicatorReading(-0.04), b" 0000000,31,008\r\n"),
-    ],
-)
-def test_hbm_counts_a_million_at_its_nominal_load(shown: IndicatorReading, line: bytes) -> None:
-    assert HbmAedIndicator().render(shown) == line
-    assert HbmAedIndicator(nominal_N=500.0).render(IndicatorReading(250.0)) == b" 0500000,31,008\r\n"
 
 
 @pytest.mark.parametrize(
