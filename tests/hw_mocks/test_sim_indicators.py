@@ -56,32 +56,28 @@ def test_lines(indicator: Indicator, reading: IndicatorReading, line: bytes) -> 
     assert indicator.render(reading) == line
 
 
-def talk(
-    indicator: Indicator, conversation: list[tuple[bytes, bytes]], shown: IndicatorReading = AT_12
-) -> None:
+def talk(indicator: Indicator, *conversation: tuple[bytes, bytes], reading: IndicatorReading = AT_12) -> None:
     for said, answered in conversation:
-        assert indicator.receive(said, shown) == answered, said
+        assert indicator.receive(said, reading) == answered, said
 
 
 def test_mt_sics_conversation() -> None:
     indicator = MtSicsIndicator()
     talk(
         indicator,
-        [
-            (b"SI\r\n", b"S S       12.3 N\r\n"),
-            (b"S\r\n", b"S S       12.3 N\r\n"),
-            (b"I4\r\n", b'I4 A "B021002593"\r\n'),
-            (b"si\r\n", b"ES\r\n"),
-            (b"TI\r\n", b"TI S       12.3 N\r\n"),
-            (b"SI\r\n", b"S S        0.0 N\r\n"),
-            (b"TAC\r\n", b"TAC A\r\n"),
-            (b"Z\r\n", b"Z A\r\n"),
-        ],
+        (b"SI\r\n", b"S S       12.3 N\r\n"),
+        (b"S\r\n", b"S S       12.3 N\r\n"),
+        (b"I4\r\n", b'I4 A "B021002593"\r\n'),
+        (b"si\r\n", b"ES\r\n"),
+        (b"TI\r\n", b"TI S       12.3 N\r\n"),
+        (b"SI\r\n", b"S S        0.0 N\r\n"),
+        (b"TAC\r\n", b"TAC A\r\n"),
+        (b"Z\r\n", b"Z A\r\n"),
     )
-    talk(indicator, [(b"S\r\n", b"S I\r\n"), (b"T\r\n", b"T I\r\n")], IndicatorReading(1, stable=False))
-    talk(indicator, [(b"SIR\r\n", b"")])
+    talk(indicator, (b"S\r\n", b"S I\r\n"), (b"T\r\n", b"T I\r\n"), reading=shown(1, stable=False))
+    talk(indicator, (b"SIR\r\n", b""))
     assert indicator.left == math.inf
-    talk(indicator, [(b"SI\r\n", b"S S        0.0 N\r\n")])
+    talk(indicator, (b"SI\r\n", b"S S        0.0 N\r\n"))
     assert indicator.left == 0
 
 
@@ -96,15 +92,13 @@ def test_aed_standard_conversation() -> None:
     indicator = AedStandardIndicator()
     talk(
         indicator,
-        [
-            (b"Q\r\n", b"ST,GS,+000012.3 N\r\n"),
-            (b"T\r\n", b""),
-            (b"Q\r\n", b"ST,NT,+000000.0 N\r\n"),
-            (b"SIR\r\n", b""),
-        ],
+        (b"Q\r\n", b"ST,GS,+000012.3 N\r\n"),
+        (b"T\r\n", b""),
+        (b"Q\r\n", b"ST,NT,+000000.0 N\r\n"),
+        (b"SIR\r\n", b""),
     )
     assert indicator.left == math.inf
-    talk(indicator, [(b"C\r\n", b"")])
+    talk(indicator, (b"C\r\n", b""))
     assert indicator.left == 0
 
 
@@ -112,54 +106,50 @@ def test_mark10_conversation() -> None:
     indicator = Mark10Indicator()
     talk(
         indicator,
-        [
-            (b"?\r", b"-12.3 N\r\n"),
-            (b"NUM\r\n?C\r\n", b"-12.3\r\n"),
-            (b"FULL\r", b""),
-            (b"?PT\r", b"-12.3 N\r\n"),
-            (b"LB\r?\r", b"-2.77 lbF\r\n"),
-            (b"N\rZ\r?\r", b"0.0 N\r\n"),
-            (b"JUMP\r", b"*10\r\n"),
-            (b"AOUTX\r", b"*12\r\n"),
-            (b"AOUT7\r", b"*12\r\n"),
-            (b"AOUT999\r", b"*22\r\n"),
-            (b"FLTC8\r", b""),
-        ],
+        (b"?\r", b"-12.3 N\r\n"),
+        (b"NUM\r\n?C\r\n", b"-12.3\r\n"),
+        (b"FULL\r", b""),
+        (b"?PT\r", b"-12.3 N\r\n"),
+        (b"LB\r?\r", b"-2.77 lbF\r\n"),
+        (b"N\rZ\r?\r", b"0.0 N\r\n"),
+        (b"JUMP\r", b"*10\r\n"),
+        (b"AOUTX\r", b"*12\r\n"),
+        (b"AOUT7\r", b"*12\r\n"),
+        (b"AOUT999\r", b"*22\r\n"),
+        (b"FLTC8\r", b""),
     )
-    talk(indicator, [(b"AOUT1\r", b"")])
+    talk(indicator, (b"AOUT1\r", b""))
     assert (indicator.left, indicator.rate) == (math.inf, 50.0)
-    talk(indicator, [(b"AOUT250\r", b"")])
+    talk(indicator, (b"AOUT250\r", b""))
     assert (indicator.left, indicator.rate) == (math.inf, 250.0)
-    talk(indicator, [(b"AOUT125\rAOUT0\r", b"")])
+    talk(indicator, (b"AOUT125\rAOUT0\r", b""))
     assert (indicator.left, indicator.rate) == (0, None)
 
 
 def test_sauter_conversation() -> None:
-    talk(SauterIndicator(0.01), [(b"9", b"1012.34"), (b"x", b""), (b"99", b"1012.34" * 2)])
+    talk(SauterIndicator(0.01), (b"9", b"1012.34"), (b"x", b""), (b"99", b"1012.34" * 2))
 
 
 def test_hbm_conversation() -> None:
     indicator = HbmAedIndicator()
     talk(
         indicator,
-        [
-            (b"MSV?;", b" 0001230,31,008\r\n"),
-            (b"COF3;MSV?;", b"0\r\n 0001230\r\n"),
-            (b"COF11;MSV?\n", b"0\r\n 0001230,008\r\n"),
-            (b"COF77;", b"?\r\n"),
-            (b"IDN?;", b"HBM,AD103C,0012345,P20\r\n"),
-            (b"ESR?;", b"000\r\n"),
-            (b"NOV?;", b"0000000\r\n"),
-            (b"TAR;MSV?;", b"0\r\n 0000000,008\r\n"),
-            (b"ICR2;", b"0\r\n"),
-            (b"HELLO;", b"?\r\n"),
-            (b"MSV?20;", b""),
-        ],
+        (b"MSV?;", b" 0001230,31,008\r\n"),
+        (b"COF3;MSV?;", b"0\r\n 0001230\r\n"),
+        (b"COF11;MSV?\n", b"0\r\n 0001230,008\r\n"),
+        (b"COF77;", b"?\r\n"),
+        (b"IDN?;", b"HBM,AD103C,0012345,P20\r\n"),
+        (b"ESR?;", b"000\r\n"),
+        (b"NOV?;", b"0000000\r\n"),
+        (b"TAR;MSV?;", b"0\r\n 0000000,008\r\n"),
+        (b"ICR2;", b"0\r\n"),
+        (b"HELLO;", b"?\r\n"),
+        (b"MSV?20;", b""),
     )
     assert (indicator.left, indicator.rate) == (20, 25.0)
-    talk(indicator, [(b"MSV?0;", b"")])
+    talk(indicator, (b"MSV?0;", b""))
     assert indicator.left == math.inf
-    talk(indicator, [(b"STP;", b"")])
+    talk(indicator, (b"STP;", b""))
     assert indicator.left == 0
 
 
@@ -278,15 +268,15 @@ def test_mark10_keeps_the_highest_and_the_lowest() -> None:
     indicator = Mark10Indicator()
     for force in (5.0, -7.0, 3.0):
         indicator.render(IndicatorReading(force))
-    talk(indicator, [(b"?PT\r", b"-5.0 N\r\n"), (b"?PC\r", b"7.0 N\r\n")])
+    talk(indicator, (b"?PT\r", b"-5.0 N\r\n"), (b"?PC\r", b"7.0 N\r\n"))
     indicator.restart()
-    talk(indicator, [(b"?PT\r?PC\r", b"0.0 N\r\n0.0 N\r\n"), (b"KG\r?\r", b"-1.25 kgF\r\n")])
+    talk(indicator, (b"?PT\r?PC\r", b"0.0 N\r\n0.0 N\r\n"), (b"KG\r?\r", b"-1.25 kgF\r\n"))
 
 
 def test_mark10_tells_its_settings() -> None:
     indicator = Mark10Indicator()
-    talk(indicator, [(b"LIST\r", b"V1.00;N;CUR;FLTC8;FLTP1;AOUT0;FULL\r\n"), (b"AOUT25\r", b"")])
-    talk(indicator, [(b"LIST\r", b"V1.00;N;CUR;FLTC8;FLTP1;AOUT25;FULL\r\n"), (b"FLTC3\r", b"*12\r\n")])
+    talk(indicator, (b"LIST\r", b"V1.00;N;CUR;FLTC8;FLTP1;AOUT0;FULL\r\n"), (b"AOUT25\r", b""))
+    talk(indicator, (b"LIST\r", b"V1.00;N;CUR;FLTC8;FLTP1;AOUT25;FULL\r\n"), (b"FLTC3\r", b"*12\r\n"))
 
 
 @pytest.mark.parametrize(
@@ -294,7 +284,7 @@ def test_mark10_tells_its_settings() -> None:
 )
 def test_hbm_rates_have_their_numbers(number: int, rate: float) -> None:
     indicator = HbmAedIndicator()
-    talk(indicator, [(b"ICR%d;" % number, b"0\r\n"), (b"ICR8;", b"?\r\n")])
+    talk(indicator, (b"ICR%d;" % number, b"0\r\n"), (b"ICR8;", b"?\r\n"))
     assert indicator.rate == rate
 
 
