@@ -255,17 +255,11 @@ def test_bounds_are_said_as_far_as_there_are_any() -> None:
 @pytest.mark.parametrize(
     ("got", "asked", "same"),
     [
-        ("100.009", "100", True),
-        ("100.02", "100", False),
-        ("-100.009", "-100", True),
-        ("0", "0", True),
-        ("1e-9", "0", False),
-        ("Off", "off", True),
-        ("Office", "Off", False),
-        ("On", "Off", False),
+        ("100.009", "100", True), ("100.02", "100", False), ("-100.009", "-100", True), ("0", "0", True),
+        ("1e-9", "0", False), ("Off", "off", True), ("Office", "Off", False), ("On", "Off", False),
         ("1", "true", False),
     ],
-)
+)  # fmt: skip
 def test_what_a_device_has_in_force(got: str, asked: str, same: bool) -> None:
     assert same_value(got, asked) == same
 

@@ -217,14 +217,6 @@ def test_a_time_is_never_worse_than_the_arrival_and_right_after_half_a_minute(
     assert np.all(found.error <= found.late + 1e-9)
 
 
-def test_a_clock_without_jitter_is_followed_and_its_rate_told() -> None:
-    own = np.arange(1200) / 20
-    late, clock = own * 0.0055, DeviceClock()
-    t = [clock.stamp(float(1000 * x), float(100 + x + y)).t for x, y in zip(own, late, strict=True)]
-    assert np.abs(np.array(t) - 100 - own - late).max() < 1 * MS
-    assert clock.drift == pytest.approx(-0.0055, abs=1e-5)
-
-
 @pytest.mark.parametrize("drift", [2e-6, -2e-6])
 def test_a_rate_that_drifts_with_temperature_is_followed(drift: float) -> None:
     """By 120 us/s in a minute, as a resonator that warms up by several kelvin a minute."""
@@ -288,17 +280,11 @@ def test_the_pace_tells_what_is_counted(rate: float, hz: float) -> None:
         assert [words in text for text in told] == ([True] if words else [])
 
 
-@pytest.mark.parametrize("per_s", [0.0, 20.0, 100.0, 700.0, 1400.0, 1e4, -1000.0, -1e6])
+@pytest.mark.parametrize("per_s", [0.0, 20.0, 100.0, 700.0, 930.0, 1070.0, 1400.0, 1e4, -1000.0, -1e6])
 def test_what_is_no_clock_is_refused_in_words(per_s: float) -> None:
     unit, told = looked(per_s)
     assert unit.ms is None
     assert len(told) == 1 and "no clock" in told[0] and "millis=" in told[0]
-
-
-@pytest.mark.parametrize("per_s", [0.93, 1.07])
-def test_a_pace_that_is_near_only_is_refused_in_the_end(per_s: float) -> None:
-    unit, told = looked(1000 * per_s)
-    assert unit.ms is None and "no clock" in told[0]
 
 
 def test_whole_seconds_are_too_coarse() -> None:

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from acquire.errors import DeviceError
 from acquire.serial_line import byte_ports
 from acquire.serial_line.byte_ports import (
-    Rfc2217Port,
     TcpPort,
     Telnet,
     TtyPort,
@@ -240,9 +239,10 @@ def test_a_server_that_does_not_answer_is_named(
 ) -> None:
     monkeypatch.setattr(byte_ports, "CONNECT_S", 0.02)
     made = Server(answers, monkeypatch)
+    url = f"rfc2217://127.0.0.1:{made.number}"
     with pytest.raises(DeviceError) as caught:
-        Rfc2217Port("127.0.0.1", made.number, line_settings(9600, 8, "N", 1), 0.1)
-    assert str(caught.value) == f"the other side {words}"
+        open_port(LineSettings(url))
+    assert str(caught.value) == f"{url}: the other side {words}"
     made.end.close()
     made.listening.close()
 

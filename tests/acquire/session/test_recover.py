@@ -113,6 +113,6 @@ def test_the_child_that_reads_a_session_first_says_what_is_wrong(
     with h5py.File(path, "r+") as file:
         file["entry/load/line_end"][0] = 99
     assert (child(str(path)), child(str(path), "salvage")) == (4, 0)
-    told = capsys.readouterr().out.removeprefix("\0\n")  # a sign of progress
+    told = capsys.readouterr().out.replace("\0\n", "")  # signs of progress, as many as it takes
     assert told.startswith(f"{path}: the load samples cannot be read (the lines of the samples do not follow")
     assert told.count("\n") == 1

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import errno
-import threading
 from collections.abc import Callable
 from itertools import islice
 from typing import Any
@@ -14,7 +13,7 @@ from acquire.addresses import parse_address
 from acquire.camera.live import LiveCamera
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import Event
-from acquire.frame import CameraSetting, Frame
+from acquire.frame import Frame
 from acquire.v4l2 import api
 from acquire.v4l2.camera import open_v4l2
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
@@ -193,30 +192,6 @@ def test_waking_for_nothing_counts_as_a_dead_device() -> None:
     assert "fatal error" in rig.texts()
 
 
-def test_closing_from_another_thread_while_it_streams() -> None:
-    rig = CameraRig()
-    camera = rig.open()
-    seen = []
-
-    def read() -> None:
-        seen.extend(camera)
-
-    with camera:
-        reader = threading.Thread(target=read)
-        reader.start()
-    reader.join()  # as the stream has ended, and no buffer was taken from under it
-    assert not rig.kernel._handles
-    assert rig.fake.maps_open == 0
-    assert not rig.events
-
-
-def test_a_missing_device_names_what_there_is() -> None:
-    with pytest.raises(
-        DeviceError, match=r"/dev/video9: there is no such device.*/dev/video0 \(fake camera\)"
-    ):
-        CameraRig(address="/dev/video9").open()
-
-
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
@@ -291,14 +266,6 @@ def test_automatic_controls_are_put_on_manual_first() -> None:
         "brightness": 10,
     }
     assert camera.info.warnings == ()
-
-
-def test_what_can_be_changed_has_the_bounds_of_the_driver() -> None:
-    controls = exposure_controls()
-    camera = CameraRig(FakeCamera(controls=controls), address="/dev/video0?exposure_us=8000&fps=20").open()
-    exposure, gain = camera.info.settings
-    assert exposure == CameraSetting("exposure_us", pytest.approx(8000), 100, 50_000, 100, log=True)
-    assert gain == CameraSetting("gain", 16, 0, 100, 4)
 
 
 def test_formats_and_rates_are_those_of_the_driver_that_can_be_read() -> None:
