@@ -44,7 +44,6 @@ def test_the_notebook_runs_cell_by_cell(
     runpy.run_module("examples.notebook", run_name="__main__")
     printed = capsys.readouterr().out
     modulus = re.search(r"E = ([0-9.]+) GPa from 5 instants", printed)
-    assert modulus is not None
     assert float(modulus[1]) == pytest.approx(70, rel=0.01)
     assert re.search(r"<StrainField 11 x 15 ZOIs, 165 of 165 with a value; mean exx -0.0018", printed)
     assert "<Strain strain.h5: 5 instants of 11 x 15 ZOIs, engineering strain>" in printed
