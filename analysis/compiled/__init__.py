@@ -1,3 +1,3 @@
-"""numba: compiled ``loops``, their threading ``layer``, the cores of their ``threads``, and explicit vector
-instructions (``vectors``).
+"""numba: compiled ``loops``, their threading ``layer``, the cores of their ``threads``, explicit vector instructions
+(``vectors``), and what ends them early (``interruption``).
 """

@@ -25,6 +25,7 @@ from numba.np.ufunc import parallel as numba_threads
 from numpy.typing import NDArray
 
 from acquire.compiled_loops import KeptFile
+from analysis.compiled.interruption import go_on
 from analysis.compiled.layer import give_start_lock, threading_layer
 
 # Threads that wait by spinning keep the other threads of a live test, and other programs, from their cores: with
@@ -130,7 +131,8 @@ class ExclusiveLoop:
         self.dispatcher = dispatcher
 
     def __call__(self, *arguments: Any) -> Any:
-        """Run the loop, once no other one runs."""
+        """Run the loop, once no other one runs; raises ``Abandoned`` where nobody wants it any more."""
+        go_on()
         with ExclusiveLoop._turn:
             if not ExclusiveLoop._started:
                 threading_layer()

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+from analysis.compiled.interruption import go_on
+
 Part = TypeVar("Part")
 Found = TypeVar("Found")
 THREADS = 2
@@ -16,6 +18,7 @@ THREADS = 2
 
 def each(work: Callable[[Part], Found], parts: Iterable[Part]) -> Iterator[Found]:
     """What ``work`` gives for each part, in their order; raises what it raises."""
+    go_on()
     with ThreadPoolExecutor(THREADS) as pool:
         yield from pool.map(work, parts)
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.compiled.interruption import go_on
 from analysis.field import (
     PAIR_INDEX,
     VALUES,
@@ -288,6 +289,7 @@ class Covariance:
         way, left = rest.copy(), _squares(rest)
         enough = _RESIDUAL**2 * left
         for _ in range(_STEPS):
+            go_on()
             there = (self.times(way / unit) / unit + UNCORRELATED * way) * inside
             share = left / np.maximum(np.sum(way * there, axis=(-3, -2, -1), keepdims=True), 1e-300)
             found, rest = found + share * way, rest - share * there

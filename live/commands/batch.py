@@ -12,6 +12,7 @@ from acquire.system import cores
 from acquire.text import Message
 from live.commands import options
 from live.commands.process import signals
+from live.config.effect import check_forces
 from live.ui.terminal.screen import TerminalScreen
 
 OUTPUT = ("axis", "standard", "test", "zero", "lag")
@@ -56,16 +57,19 @@ def command(arguments: argparse.Namespace) -> int:
         raise ConfigError(
             "--as-measured is bit-identical to the live run and chunks are not; leave --chunk out"
         )
+    tests, given = find_tests(arguments.tests), options.overrides(arguments)
+    if not any(test.forces for test in tests):
+        check_forces(given, Message("a list of tests with their files of forces"))
     request = CampaignRequest(
         tests=[
             replace(test, source=options.in_picture_order(test.source, arguments.picture_order))
-            for test in find_tests(arguments.tests)
+            for test in tests
         ],
         reference=arguments.reference,
         out=Path(arguments.folder),
         workers=arguments.workers,
         config=arguments.config,
-        overrides=options.overrides(arguments),
+        overrides=given,
         start_s=arguments.start_s,
         end_s=arguments.end_s,
         as_measured=arguments.as_measured,

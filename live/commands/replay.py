@@ -13,6 +13,7 @@ from acquire.errors import exit_code_of_all
 from live.commands import options
 from live.commands.consumers import finish_test
 from live.commands.process import signals
+from live.config.effect import check_forces
 from live.results.folder import check_folder, make_folder
 from live.ui.terminal.screen import CamerasScreen, TerminalScreen
 
@@ -42,6 +43,9 @@ def command(arguments: argparse.Namespace) -> int:
     from live.replay.replay import replay
     from live.replay.source import ReplayRequest
 
+    given = _overrides(arguments)
+    if arguments.forces is None:
+        check_forces(given, "--load FILE.csv")
     request = ReplayRequest(
         source=options.in_picture_order(arguments.source, arguments.picture_order),
         as_measured=arguments.as_measured,
@@ -49,7 +53,7 @@ def command(arguments: argparse.Namespace) -> int:
         end_s=arguments.end_s,
         reference=arguments.reference,
         config_file=Path(arguments.config) if arguments.config else None,
-        overrides=_overrides(arguments),
+        overrides=given,
         forces=Path(arguments.forces) if arguments.forces else None,
     )
     screen, stopping = TerminalScreen(), threading.Event()

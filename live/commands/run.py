@@ -17,6 +17,7 @@ from live.commands.attended import attended, page_opened
 from live.commands.consumers import finish_test, standard_consumers
 from live.commands.options import add_measure, add_options, configured, overrides
 from live.config.cameras import FRONT, camera_configs
+from live.config.effect import check_effect
 from live.config.loading import Config
 from live.pipeline.consumer import Consumer, Screen
 from live.results.folder import check_folder
@@ -64,8 +65,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic run``."""
-    screen, config = TerminalScreen(), configured(arguments)
-    configs = camera_configs(config, overrides(arguments))
+    screen, config, given = TerminalScreen(), configured(arguments), overrides(arguments)
+    check_effect(given, config)
+    configs = camera_configs(config, given)
     check_alarms(config, both_sides=FRONT in configs)
     check_folder(config.output.dir)
     check_load_port(config.load.address)

@@ -113,6 +113,13 @@ def other_shapes(given: Mapping[str, Any]) -> frozenset[str]:
     return frozenset().union(*_SHAPES).difference(*used) if used else frozenset()
 
 
+def two_sections(specimen: Mapping[str, Any]) -> list[str]:
+    """Two ways in which keys of [specimen] say the section; empty where they say it in one, or not."""
+    given = {f"specimen.{key}" for key, value in specimen.items() if value is not None}
+    ways = [" and ".join(sorted(shape & given, reverse=True)) for shape in _SHAPES if shape & given]
+    return ways[:2] if len(ways) > 1 else []
+
+
 def laid_over(lower: Mapping[str, Any], upper: Mapping[str, Any]) -> dict[str, Any]:
     """``upper`` over ``lower``, both "section.key" -> value."""
     gone = other_shapes(upper)
@@ -192,11 +199,8 @@ def _read_toml(path: Path, text: str | None = None) -> dict[str, Any]:
     tree = _plain_toml(path, text)
     if isinstance(tree.get("lens"), str):
         tree["lens"] = lens_in(Path(tree["lens"]))
-    specimen = tree.get("specimen")
-    given = {f"specimen.{key}" for key in specimen} if isinstance(specimen, Mapping) else set()
-    if len(ways := [shape & given for shape in _SHAPES if shape & given]) > 1:
-        one, other, *_ = (" and ".join(sorted(way, reverse=True)) for way in ways)
-        raise ConfigError("{path}: {one} and {other} are two sections; leave out one", path, one, other)
+    if isinstance(specimen := tree.get("specimen"), Mapping) and (ways := two_sections(specimen)):
+        raise ConfigError("{path}: {one} and {other} are two sections; leave out one", path, *ways)
     return tree
 
 

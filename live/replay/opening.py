@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,7 @@ from acquire.session import Session
 from acquire.text import Message
 from analysis.evaluate import AUTO_GAUGES
 from live.config.gauges import gauges_for
-from live.config.loading import Config, from_dict, laid_over, load_config, settings_in
+from live.config.loading import Config, from_dict, laid_over, load_config, settings_in, two_sections
 from live.config.values import AUTO
 from live.pipeline.consumer import Screen
 from live.pipeline.measure import NewReference
@@ -72,10 +72,18 @@ def session_config(session: Session, request: ReplayRequest, extra: Mapping[str,
         stored[section] = _beside(stored.get(section, {}), keys, path)
     file = {} if request.config_file is None else settings_in(request.config_file)
     try:
-        return from_dict(stored, laid_over({**file, **extra}, request.overrides), str(path))
+        config = from_dict(stored, laid_over({**file, **extra}, request.overrides), str(path))
     except ConfigError:
         _check_stored(stored, str(path))
         raise
+    if ways := two_sections(asdict(config.specimen)):
+        raise DataError(
+            "{path}: {one} and {other} are two sections (stored so in the session); say which: --section W,T, or one"
+            " of them in the file of --config",
+            path,
+            *ways,
+        )
+    return config
 
 
 def _check_stored(stored: Mapping[str, Any], path: str) -> None:

@@ -27,6 +27,8 @@ from acquire.load_sample import LoadSample
 from acquire.opencv.images import picture_times
 from acquire.text import Amount, Message, about, counts, joined
 from acquire.text.message import counted
+from analysis.compiled.interruption import abandoned_when
+from live.config.effect import without_forces
 from live.config.loading import Config, load_config
 from live.config.values import AUTO
 from live.pipeline.consumer import Compose, RunInfo, Screen
@@ -39,7 +41,15 @@ from live.replay.forces import read_forces
 from live.replay.opening import open_session_source, prepare_replay, session_path
 from live.replay.parts import StoredResults
 from live.replay.pictures import picture_of, picture_source, with_reference, write_names
-from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Work, check_window, prefetch
+from live.replay.source import (
+    PictureCount,
+    ReplayRequest,
+    ReplaySource,
+    Work,
+    check_window,
+    prefetch,
+    until_stopped,
+)
 from live.results.finished.figures_file import finished
 from live.results.finished.finished_test import FinishedTest
 from live.results.folder import LOG, BurstFailures, check_folder, make_folder
@@ -128,6 +138,8 @@ def _with_forces(
 ) -> ReplaySource:
     """The same source with the forces of the given file, after a line on what was taken from it."""
     if request.forces is None:
+        for note in () if len(source.loads) else without_forces(request.overrides):
+            screen.print(note)
         return source
     table = read_forces(request.forces, config.load)
     named = table.export.times is None
@@ -189,8 +201,9 @@ def _run(
 ) -> Replayed:
     check_folder(config.output.dir)
     config = with_film(config, source.camera)
-    ready = prepare_replay(source, config, request.source, screen, stopping)
-    if stopping.is_set():  # nothing is measured yet, and the first burst is the slowest
+    with abandoned_when(stopping.is_set):
+        ready = prepare_replay(source, config, request.source, screen, stopping)
+    if stopping.is_set():
         raise KeyboardInterrupt
     stored = StoredResults.of(request.parts, ready)
     bursts = _not_empty(stored.bursts() if stored else source.bursts, request, source.count)
@@ -255,15 +268,17 @@ class _Run:
                 stream.publish(event)
         for sample in self.source.samples if stream.wants(LoadSample) else ():
             stream.publish(sample)
-        for m in measured:
+        for m in until_stopped(measured, self.stopping):
             self.run_state.frame_counts.add(measured=m.burst.n)
             if stream.wants(Frame):
                 stream.publish(picture_of(m.burst))
             stream.publish(m)
             self.screen.progress(m.time_step, m.number + 1, self.source.expected, time.perf_counter() - began)
             del m  # frees its pictures before the next burst is measured
-            if self.stopping.is_set():
-                break
+        if self.stopping.is_set():
+            done = counted(len(self.run_state.history.time_steps), "burst")
+            text = Message("interrupted after {bursts}; the others are not measured", done)
+            self.run_state.event_log.emit(EventKind.STOP, "phasedic", text, "warning")
         return time.perf_counter() - began
 
     def lines(self, took: float, folder: Path) -> list[str]:
@@ -295,9 +310,9 @@ class _Run:
         ]
 
     def _cut_off(self) -> list[str]:
-        """Where the recording ends before its test did."""
-        warnings = self.run_state.event_log.events("warning")
-        return [e.text for e in warnings if "missing" in e.data and not self.stopping.is_set()]
+        """Where the recording ends before its test did, or the replay was stopped."""
+        warnings, stopped = self.run_state.event_log.events("warning"), self.stopping.is_set()
+        return [e.text for e in warnings if (e.kind is EventKind.STOP if stopped else "missing" in e.data)]
 
     def exit_code(self) -> int:
         """That of an interrupted replay, of one that lost something, or 0."""

@@ -21,6 +21,7 @@ from acquire.frame import Burst, CameraInfo, Frame
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from acquire.text import Message, counts
+from analysis.compiled.interruption import Abandoned, abandoned_when
 from live.pipeline.measure import NewReference
 
 Work = Burst | NewReference
@@ -241,3 +242,16 @@ def prefetch(items: Iterable[Item], queue_size: int = 1) -> Generator[Item]:
             raise item.error
     finally:
         reader.close()
+
+
+def until_stopped(measured: Iterable[Item], stopping: threading.Event) -> Iterator[Item]:
+    """The same items in order until ``stopping`` is set; the one that is being made then is abandoned."""
+    rest = iter(measured)
+    while not stopping.is_set():
+        try:
+            with abandoned_when(stopping.is_set):
+                item = next(rest)
+        except (StopIteration, Abandoned):
+            return
+        yield item
+        del item  # frees it before the next one is made

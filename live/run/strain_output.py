@@ -164,9 +164,8 @@ class TcpOut(StrainOut):
         """Close the connections."""
         self._server.close()
         server = self._server
-        skipped = server.skipped and Message("{n} skipped by clients that did not read", server.skipped)
-        parts = counted(server.served, "client"), counted(server.taken, "line"), skipped
-        return joined(", ", filter(None, parts))
+        skipped = Message("{n} skipped by clients that did not read", server.skipped) * (server.skipped > 0)
+        return joined(", ", (counted(server.served, "client"), counted(server.taken, "line"), skipped))
 
 
 class UdpOut(StrainOut):
@@ -247,5 +246,5 @@ class SerialOut(StrainOut):
     def end(self) -> str:
         """Close the port."""
         self._close()
-        skipped = self._skipped and Message("{n} skipped, the port took nothing", self._skipped)
-        return joined(", ", filter(None, (counted(self._sent, "line"), skipped)))
+        skipped = Message("{n} skipped, the port took nothing", self._skipped) * (self._skipped > 0)
+        return joined(", ", (counted(self._sent, "line"), skipped))

@@ -85,6 +85,7 @@ def test_a_common_error_is_part_of_what_the_later_picture_adds() -> None:
     field = replace(StrainField.from_values(GRID, {}, 4e-3), common=common)
     for part in ("all", "current"):
         assert field.sigma("u", part) == pytest.approx(np.hypot(4e-3, 6e-3))  # type: ignore[arg-type]
+    assert field.sigma("u", "reference") == pytest.approx(replace(field, common=None).sigma("u", "reference"))
     assert field.mean("u")[1] == pytest.approx(np.hypot(replace(field, common=None).mean("u")[1], 6e-3))
 
 

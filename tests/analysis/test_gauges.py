@@ -115,6 +115,10 @@ def test_a_gauge_beside_the_grid_names_where_the_grid_is() -> None:
         (lambda: LineGauge("a", (3, 3), (3, 3)), "one point"),
         (lambda: LineGauge("a", (3, 3), (3, 9), 0), "radius must be positive"),
         (lambda: TransverseGauge("a", (0, 0, 0, 5)), "must be positive"),
+        (lambda: TransverseGauge("a", (0, 0, 5, 0)), "must be positive"),
+        (lambda: CircleGauge("a", (9, 9), 0.0), "gauge a: the radius"),
+        (lambda: StripGauge("a", (9, 9), (9, 9)), "gauge a: the two ends"),
+        (lambda: StripGauge("a", (9, 9), (19, 9), 0.0), "gauge a: the width"),
         (lambda: TransverseGauge("a", (0, 0, 5, 5), "z"), "along is x or y"),  # type: ignore[arg-type]
     ],
 )
@@ -187,15 +191,6 @@ class TestEveryKind:
             kind.of("g", {}, "y")
         assert kind.label and kind.hint and kind.default_name.isidentifier()
         assert kind.gesture in ("click", "line", "box")
-
-
-def test_what_follows_from_the_axis_of_the_load() -> None:
-    for axis, value, along in (("y", "eyy", "x"), ("x", "exx", "y")):
-        assert ZoiGauge.of("g", {"at": (1, 2)}, axis) == ZoiGauge("g", (1, 2), value)
-        assert TransverseGauge.of("g", {"box": (1, 2, 3, 4)}, axis) == TransverseGauge(
-            "g", (1, 2, 3, 4), along
-        )
-    assert ZoiGauge.of("g", {"at": (1, 2), "value": "exy"}, "y") == ZoiGauge("g", (1, 2), "exy")
 
 
 def test_a_box_is_drawn_in_whole_px_within_the_picture() -> None:

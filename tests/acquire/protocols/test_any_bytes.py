@@ -251,9 +251,7 @@ def test_forces_in_newtons(unit: str, newtons: float) -> None:
 @pytest.mark.parametrize(("unit", "kg"), KILOGRAMS.items())
 def test_masses_need_leave_and_weigh_as_under_standard_gravity(unit: str, kg: float) -> None:
     assert newtons_per(unit, mass_reads_force=True) == pytest.approx(9.80665 * kg, rel=1e-9)
-    with pytest.raises(
-        ConfigError, match=rf"mass_reads_force=yes .*1 {unit} is then"
-    ):
+    with pytest.raises(ConfigError, match=rf"mass_reads_force=yes .*1 {unit} is then"):
         newtons_per(unit)
 
 

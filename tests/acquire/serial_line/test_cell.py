@@ -82,8 +82,6 @@ def test_overload_is_never_a_number_and_is_told_with_the_last_good_value() -> No
     assert "the load is within its range again" in line.told
 
 
-
-
 def test_garbage_keeps_its_bytes_and_is_told_after_a_while() -> None:
     line = FakeLine([FIRST, *[b"\xff\x00x\r\n"] * 12])
     samples = line.run()

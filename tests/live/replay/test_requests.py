@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -15,14 +16,17 @@ from acquire.errors import ConfigError, DataError
 from acquire.frame import CameraInfo
 from acquire.record_mode import RecordMode
 from acquire.session import Session
+from analysis.compiled.interruption import go_on
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
+from live.pipeline.measurement import TimeStep
 from live.replay.burst_index import open_store
 from live.replay.pictures import reference_from
 from live.replay.replay import replay
-from live.replay.source import ReplayRequest
+from live.replay.source import ReplayRequest, until_stopped
 from live.results import Strain
+from live.results.finished.figures_file import stored_remarks
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.ended import code_of
 from tests.live.shots import write_shots
@@ -173,6 +177,33 @@ def test_one_that_is_stopped_while_it_is_prepared_measures_nothing(shots: Path, 
     with pytest.raises(KeyboardInterrupt):
         replay(request, Stopping(quiet=True), stopping)
     assert not out.exists()
+
+
+def test_one_that_is_stopped_says_how_far_it_came(shots: Path, tmp_path: Path) -> None:
+    class Stopping(TerminalScreen):
+        def progress(self, i: TimeStep, done: int, expected: int | None, elapsed_s: float) -> None:
+            if done == 2:
+                stopping.set()
+
+    stopping, out = threading.Event(), tmp_path / "out"
+    request = ReplayRequest(str(shots), None, {"measure.zoi": 48, "measure.step": 24, "output.dir": str(out)})
+    found = replay(request, Stopping(quiet=True), stopping)
+    assert (found.exit_code, len(measured(out))) == (130, 2)
+    assert "interrupted after 2 bursts; the others are not measured" in stored_remarks(out)
+
+
+def test_the_burst_under_way_is_abandoned_where_a_replay_is_stopped() -> None:
+    """That of 34,000 ZOIs takes ten seconds."""
+
+    def measured() -> Iterator[int]:
+        yield 1
+        stopping.set()
+        go_on()  # as between two loops
+        yield 2
+
+    stopping = threading.Event()
+    assert list(until_stopped(measured(), stopping)) == [1]
+    go_on()
 
 
 def test_the_results_say_which_file_each_frame_was(shots: Path, session: Path, tmp_path: Path) -> None:

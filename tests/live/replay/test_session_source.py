@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst
 from acquire.load_sample import LoadSample
@@ -19,7 +19,7 @@ from acquire.record_mode import RecordMode
 from live.config.loading import load_config
 from live.pipeline.measure import NewReference
 from live.replay import opening as module
-from live.replay.opening import session_source
+from live.replay.opening import session_config, session_source
 from live.replay.source import ReplayRequest, ReplaySource
 from tests.live.made_up import CAMERA, START, make_measurement
 
@@ -108,6 +108,16 @@ def test_forces_have_the_lag_the_gap_and_the_tares_of_the_recording(monkeypatch:
     wide, _ = source(monkeypatch, settings={"load.max_gap_s": 1.0})
     assert wide.loads.force_at(START + 0.9) == pytest.approx(109.0)
     assert wide.loads.force_at(START + 0.2) == pytest.approx(102.0) and len(list(wide.samples)) == 5
+
+
+def test_a_session_with_two_sections_asks_which() -> None:
+    specimen = {"width_mm": 20.0, "thickness_mm": 2.0, "diameter_mm": 10.0}
+    session: Any = SimpleNamespace(config={"specimen": specimen}, metadata={})
+    request = ReplayRequest("session.h5", None, {})
+    with pytest.raises(DataError, match=r"and specimen.diameter_mm are two sections .*--section W,T"):
+        session_config(session, request, {}, PATH)
+    chosen = replace(request, overrides={"specimen.diameter_mm": 9.0})
+    assert session_config(session, chosen, {}, PATH).specimen.section_text == "diameter 9 mm"
 
 
 def test_of_the_load_what_comes_after_the_window_and_the_reference_is_not_read(

@@ -13,6 +13,15 @@ import { showAfter } from "./after.js";
 const LOST_MS = 2000;
 let last = performance.now(), stage = {};
 
+// A refused Start stands in red until something changes on which it depends.
+const ON_START = ["camera", "trouble", "region", "gauges", "plates", "measure", "scale", "specimen", "metadata", "can"], grounds = new Map();
+const allGrounds = () => JSON.stringify([...grounds]);
+let refused = null;
+function forgetRefused() {
+  if ($("answer").textContent === refused.text) { put($("answer"), ""); $("answer").className = ""; }
+  refused = null;
+}
+
 const handlers = {
   stage(value) {
     const changed = stage.n !== value.n;
@@ -35,7 +44,11 @@ const handlers = {
     if (value.stage === "run") beginRun(value);
     if (value.stage === "setup") beginSetup(value);
   },
-  setup: (value) => { if (stage.stage === "setup") showSetup(value); },
+  setup(value) {
+    grounds.set(value.side, JSON.stringify(ON_START.map((key) => value[key])));
+    if (refused && refused.grounds !== allGrounds()) forgetRefused();
+    if (stage.stage === "setup") showSetup(value);
+  },
   run: (value) => { if (stage.stage === "run") showRun(value); },
   after: showAfter,
   beat() {},
@@ -77,7 +90,8 @@ async function order(button, isHeld = false) {
   try {
     const { line, ask: question, because, yes } = button.dataset;
     if (question && !isHeld && !(await ask(question, because ?? "", yes, button))) return;
-    const { risk } = await command(line);
+    const { risk, refused: isRefused } = await command(line);
+    if (isRefused && stage.stage === "setup") refused = { grounds: allGrounds(), text: $("answer").textContent };
     if (risk && (await ask("Tare in mid-test?", risk, "Tare", button))) await command("tare force");
   } finally {
     if (busy === button) busy = null;

@@ -183,6 +183,19 @@ def test_the_forms_of_scale_and_board_read_numbers_and_can_be_left(page: MadePag
     assert not page.page.locator("#scale form").count() and page.sent() == []
 
 
+def test_why_a_start_was_refused_stands_until_what_it_depends_on_changes(page: MadePage) -> None:
+    page.set_up(region=None, go=True)
+    page.until(lambda: not page.page.locator("body.pausing").count(), "a press is taken")
+    page.answer("no region is found yet")
+    page.page.click("#start")
+    page.until(lambda: page.text("answer") == "no region is found yet", "it is refused")
+    page.set_up(region=None, go=True, picture=7)
+    assert page.text("answer") == "no region is found yet"
+    page.set_up(go=True)
+    page.until(lambda: not page.text("answer"), "its reason is gone")
+    assert page.page.get_attribute("#answer", "class") == ""
+
+
 def test_a_setting_of_the_kind_of_camera_is_written_into_its_address(page: MadePage) -> None:
     page.set_up(address="sim:woven?fps=20&hole=30")
     page.step("camera")
