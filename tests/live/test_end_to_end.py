@@ -107,7 +107,6 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome]:
 def test_the_strain_is_that_of_the_specimen(recorded: tuple[Path, Outcome]) -> None:
     _, outcome = recorded
     specimen = outcome.rig.specimen
-    assert specimen is not None
     last = outcome.run_state.history.time_steps[-1]
     true = float(specimen.axial_strain(specimen.elapsed(last.t)))
     assert last.n_valid == last.n_zoi > 10
@@ -125,7 +124,6 @@ def test_everything_is_accounted_for(recorded: tuple[Path, Outcome]) -> None:
     assert (frame_counts.reference, frame_counts.skipped, frame_counts.lost) == (4, 0, 0)
     with Session.open(folder / "session.h5") as session:
         assert len(session) == 46
-        assert session.frame_counts is not None
         assert session.frame_counts["measured"] == frame_counts.measured
         kinds = [event.kind for event in session.events()]
         assert kinds.count(EventKind.MEASURED) == 14
@@ -252,7 +250,6 @@ def test_a_new_reference_is_composed_and_replayed(tmp_path: Path) -> None:
     assert outcome.run_state.frame_counts.adds_up
     assert outcome.run_state.frame_counts.reference == 8
     specimen = outcome.rig.specimen
-    assert specimen is not None
     last = outcome.run_state.history.time_steps[-1]
     assert last.eyy == pytest.approx(float(specimen.axial_strain(specimen.elapsed(last.t))), rel=0.25)
     assert_replay_is_bit_equal(folder, tmp_path / "again")
@@ -372,7 +369,6 @@ def test_dark_and_flat_frames_take_the_fixed_pattern_out(tmp_path: Path) -> None
     for name, more in (("raw", {}), ("corrected", {"camera.flat": str(flat)})):
         outcome = live_run(tmp_path / name, camera, **more)
         specimen = outcome.rig.specimen
-        assert specimen is not None
         with h5py.File(tmp_path / name / "strain.h5") as file:
             found = file["entry/strain"]
             x, y = (place.ravel() for place in np.meshgrid(found["x"][()], found["y"][()]))

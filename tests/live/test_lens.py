@@ -73,13 +73,10 @@ def corrected(lens: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_shifted_pictures_show_the_lens(lens: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = load_config(lens, {}).lens
     corner = math.hypot((WIDTH - 1) / 2, (HEIGHT - 1) / 2)
-    assert found.covariance is not None
-    assert found.focal_px is not None
     sigma = math.sqrt(found.covariance[3][3])
     assert found.k1 == pytest.approx(DISTORTION * (found.focal_px / corner) ** 2, abs=4 * sigma)
     assert sigma < 0.1 * abs(found.k1)
     assert found.picture == (WIDTH, HEIGHT)
-    assert found.rms_px is not None
     assert found.rms_px < 0.02
 
 
@@ -218,7 +215,6 @@ def test_boards_show_the_lens_with_honest_uncertainty(tmp_path: Path) -> None:
     assert abs(strain - truth) < 3 * stated < 0.75 * truth
     write_rig(tmp_path / "lens.toml", found.changes)
     stored = lens_for(load_config(tmp_path / "lens.toml", {}), 480, 360, grid)
-    assert stored is not None
     np.testing.assert_array_equal(stored.parameters, lens.parameters)
 
 

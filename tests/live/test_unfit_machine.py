@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
 from analysis import self_test as machine
 from analysis.kernel import solve
 from analysis.picture.splines import tap_table
-from hw_mocks.deformation import Affine
-from hw_mocks.speckle import Speckle
 from live.cli import main
 from live.replay.batch.task import Task, perform
+from tests.live.shots import write_shots
 
 
 @pytest.fixture
@@ -39,13 +37,7 @@ def break_taps(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
 
 @pytest.fixture
 def shots(tmp_path: Path) -> Path:
-    folder = tmp_path / "shots"
-    folder.mkdir()
-    speckle = Speckle((128, 160), radius=2.0, seed=3)
-    for k in range(10):
-        seen = 255 * speckle.render(Affine(dv_dy=1e-4 * k, x0=80, y0=64), (128, 160))
-        cv2.imwrite(str(folder / f"{k:02}.png"), np.rint(seen).astype(np.uint8))
-    return folder
+    return write_shots(tmp_path / "shots", (128, 160), [1e-4 * k for k in range(10)])
 
 
 def refused(capsys: pytest.CaptureFixture[str], *words: str) -> None:
@@ -63,7 +55,7 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> None:
         "replay SHOTS --zoi 48 --burst 1 --no-view --no-rrd --out OUT",
         "check --camera SHOTS --zoi 48",
         "study SHOTS --zoi 32,48 --static 0,2 --loaded 5,8 --out OUT",
-        "characterise --pattern SHOTS/00.png --quick --out OUT",
+        "characterise --pattern SHOTS/a0.png --quick --out OUT",
     ],
 )
 def test_nothing_is_measured(

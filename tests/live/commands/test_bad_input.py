@@ -42,32 +42,6 @@ def check_refusal(
     assert message in error and "Traceback" not in error
 
 
-@pytest.mark.parametrize(
-    ("code", "message", "arguments"),
-    [
-        (2, "no camera is given", ["run"]),
-        (3, "/dev/video77", ["run", "--camera", "/dev/video77"]),
-        (
-            2,
-            "known: /dev/..., files:, genicam:, opencv:, pylon:, session:, video:, sim:",
-            ["run", "--camera", "firewire:0"],
-        ),
-        (2, "unknown setting 'fsp'", ["run", "--camera", "sim:uniform?fsp=3"]),
-        (2, "burst", ["run", "--camera", "sim:", "--burst", "0"]),
-        (2, "leaves the picture", ["run", "--camera", "sim:?lockstep=yes", "--roi", "600,0,100,100"]),
-        (2, "no such configuration file", ["run", "--camera", "sim:", "--config", "nowhere.toml"]),
-        (3, "/dev/ttyUSB77", ["run", "--camera", "sim:?lockstep=yes", "--load", "/dev/ttyUSB77"]),
-        (4, "nowhere", ["replay", "files:nowhere/*.tif"]),
-        (4, "no such file", ["replay", "nowhere.h5"]),
-    ],
-)
-def test_arguments(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, code: int, message: str, arguments: list[str]
-) -> None:
-    check_refusal(capsys, code, message, *arguments, out=tmp_path / "out")
-    assert not (tmp_path / "out" / "session.h5").exists()
-
-
 def test_pictures_that_are_cut_off_or_of_another_size_are_left_out(
     capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path
 ) -> None:

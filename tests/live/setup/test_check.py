@@ -213,7 +213,6 @@ TRIALS = [
 def test_predicted_and_measured_agree(trial: str) -> None:
     bits, noise, radius, contrast, zoi = trial.split()
     found = figures(f"&bits={bits}&noise={noise}&radius={radius}&contrast={contrast}", int(zoi)).floor
-    assert found is not None
     for one in found.noises:
         assert one.measured == pytest.approx(one.predicted, rel=0.2), (trial, one)
 
@@ -305,9 +304,7 @@ def test_the_blocks_of_a_codec_are_named_and_leave_the_pattern(taken: FrameStack
 def test_the_noise_of_each_zoi_is_that_of_a_burst_of_the_test() -> None:
     """Half of the frames against the other half is scaled to reference and burst of the test, as in the table."""
     found = figures("&bits=12&noise=1", zoi=48)
-    assert found.floor is not None
     one = found.floor.of(found.burst)
-    assert one is not None
     assert np.nanmedian(found.zois.sigma) == pytest.approx(one.predicted, rel=0.1)
 
 

@@ -148,7 +148,6 @@ def test_simulated_specimens(address: str) -> None:
     config = load_config(None, {"camera.address": address, "measure.zoi": 32})
     rig = open_rig(address, "none:")
     rig.close()
-    assert rig.specimen is not None
     truth = rig.specimen.mask()
     first = first_look(config, Screen())
     inside = region_of(config, first.picture, first.noise).inside(*first.size, 32)

@@ -195,7 +195,6 @@ def test_it_ends_with_the_test_however_that_ends(tmp_path: Path) -> None:
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": root},
     ) as parent:
-        assert parent.stdout is not None
         child = int(parent.stdout.readline())
         os.kill(child, signal.SIGINT)
         os.kill(child, signal.SIGHUP)

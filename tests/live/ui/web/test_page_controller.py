@@ -78,7 +78,6 @@ def at(tmp_path: Path) -> Iterator[PageSession]:
 
 def test_set_up_changed_saved_and_started(at: PageSession, tmp_path: Path) -> None:
     session = at.controller.session
-    assert session is not None
     until(lambda: session.region.drawn is not None and bool(session.draft.config.gauges))
     assert set(session.draft.config.gauges) == {"extension", "width", "area"}, "placed, as the rig asks for"
     assert at.command("tare").startswith("no:") and at.command("next").startswith("no:")
@@ -163,7 +162,6 @@ def test_two_cameras_are_set_up_checked_saved_and_started_together(tmp_path: Pat
 
 def test_a_camera_setting_that_is_refused_leaves_the_camera_as_it_was(at: PageSession) -> None:
     session = at.controller.session
-    assert session is not None
     until(lambda: session.preview.info is not None)
     assert at.change(do="camera", key="exposure_us", value=3000) == "ok"
     assert session.preview.info is not None and session.preview.info.exposure_s == pytest.approx(3e-3)
@@ -271,7 +269,6 @@ def test_a_check_begun_before_the_first_frame_of_a_recording_gets_its_frames(tmp
 
 def test_a_zero_taken_in_the_set_up_holds_in_the_test(at: PageSession) -> None:
     session = at.controller.session
-    assert session is not None
     assert at.change(do="tare").startswith("no: not tared"), "there is no load cell"
     assert at.change(do="untare") == "no: there is no tare to undo"
     assert at.change(do="load", value="sim:?noise_N=0.5") == "ok"
@@ -293,7 +290,6 @@ def test_a_zero_taken_in_the_set_up_holds_in_the_test(at: PageSession) -> None:
 )
 def test_a_bad_address_is_refused_in_words(at: PageSession, address: Any) -> None:
     session = at.controller.session
-    assert session is not None
     before = session.draft.config.camera.address
     answer = at.change(do="address", value=address)
     assert (
