@@ -75,6 +75,7 @@ def test_small_strain_is_the_symmetric_part() -> None:
     assert np.allclose(field.exx, 0.01) and np.allclose(field.eyy, -0.003)
     assert np.allclose(field.exy, 0.003) and np.allclose(field.gamma_xy, 0.006)
     assert np.allclose(field.omega, -0.001)
+    assert np.array_equal(field.principal, field.strain("small").principal)
 
 
 @pytest.mark.parametrize("measure", ["engineering", "green", "hencky"])
@@ -219,10 +220,8 @@ def test_a_field_and_a_grid_are_described_in_one_line() -> None:
 @pytest.mark.parametrize("size", [40, 33])
 def test_the_windows(size: int) -> None:
     x = np.abs(np.arange(size) - (size - 1) / 2)
-    flat, flank = (
-        0.35 * size,
-        0.15 * size,
-    )  # of Tukey's: two cosine flanks that take 30 % of the side together
+    # Tukey's has two cosine flanks that take 30 % of the side together.
+    flat, flank = 0.35 * size, 0.15 * size
     expected = {
         "gaussian": np.exp(-(x**2) / 2 / (size / 6) ** 2),
         "uniform": np.ones(size),

@@ -49,15 +49,9 @@ def test_a_plate_is_loaded_by_stretch_and_by_shear(gradient: dict[str, float], s
     x, y = np.meshgrid(fit.layout.whole.x - fit.centre[0], fit.layout.whole.y - fit.centre[1])
     g = {name: gradient.get(name, 0.0) for name in ("du_dx", "du_dy", "dv_dx", "dv_dy")}
     values = {"u": g["du_dx"] * x + g["du_dy"] * y, "v": g["dv_dx"] * x + g["dv_dy"] * y, **g}
-    found = trouble(fit, StrainField.from_values(fit.layout.whole, values, 1e-9))[0]
-    words = re.fullmatch(
-        r"plate left is loaded or not flat: it is strained by ([\d\u202f]+) um/m itself", found
-    )
-    assert (
-        int(words[1].replace("\u202f", "")) == pytest.approx(strain, rel=3e-3)
-        if words
-        else (found, strain) == ("", 0)
-    )
+    found = trouble(fit, StrainField.from_values(fit.layout.whole, values, 1e-9))[0].replace("\u202f", "")
+    words = re.fullmatch(r"plate left is loaded or not flat: it is strained by (\d+) um/m itself", found)
+    assert int(words[1]) == pytest.approx(strain, rel=3e-3) if words else (found, strain) == ("", 0)
 
 
 @pytest.mark.parametrize(("boxes", "model", "sigma"), [(ONE, "scale", 3e-2), (TWO, "scale", 1e-1)])

@@ -148,8 +148,8 @@ def test_slopes_are_of_the_elastic_strain_and_the_rest_of_the_other() -> None:
         (7, r"7 measurements in all, 8 are needed: more pictures"),
         (
             8,
-            r"no elastic line: only \d measurements? between 10 % and 40 % of half of the highest stress, 8 are needed:"
-            r" take more pictures there, or give modulus_between",
+            r"no elastic line: only \d measurements? between 10 % and 40 % of half of the highest stress, 8 are "
+            r"needed: take more pictures there, or give modulus_between",
         ),
     ],
 )
