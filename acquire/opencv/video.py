@@ -101,7 +101,11 @@ class VideoFile(CameraBase):
             fps=self._fps,
             pixel_format=code,
             controls={"gray": settings.gray or "luma", "frames": frames, "inter_frame": inter_frame} | steps,
-            warnings=(FILM_WARNING,) * inter_frame + (WEBCAM_WARNING,) + tuple(self._depth(cv2)),
+            warnings=tuple(
+                [FILM_WARNING] * inter_frame
+                + [WEBCAM_WARNING] * (not self._is_grey(cv2))
+                + [*self._depth(cv2)]
+            ),
         )
 
     def __iter__(self) -> Iterator[Frame]:
@@ -123,6 +127,11 @@ class VideoFile(CameraBase):
                 t = stamp if stamp > t or index == 0 else t + 1 / self._fps
             yield Frame(frozen(self._grey(picture, index)), index, t, "nominal", 0, 8, stamp)
             index += 1
+
+    def _is_grey(self, cv2: Any) -> bool:
+        """Whether the film itself is grey, by the code of FFmpeg for its samples: Y800, and Y1 with more bits."""
+        code = _fourcc(int(self._capture.get(cv2.CAP_PROP_CODEC_PIXEL_FORMAT)) & 0xFFFFFFFF)
+        return code.startswith(("Y8", "Y1")) or code.endswith("1Y")
 
     def _depth(self, cv2: Any) -> Iterator[str]:
         """What OpenCV leaves of samples with more than 8 bits, by the code of FFmpeg for their format."""

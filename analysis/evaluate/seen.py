@@ -35,6 +35,7 @@ _LEAP, _FLAT = 0.01, 1e-3  # of the highest stress: a leap, and what a straight 
 _LEAST_STRAIN = 5e-5  # a leap
 LEAPS_NEED = 2 * _AROUND + _FEWEST
 """Instants of a test that shows leaps."""
+_STEADY = 0.75  # of the usual modulus: a step that shows it
 _YIELDS = 0.3  # of the stress: a fall by more is no yield point
 _KINK = 1.75  # of a rate a reading: what a kink in it may look like beside a leap (1.61 at most over _AROUND)
 
@@ -226,6 +227,27 @@ def leap(curve: Curve) -> tuple[float, float] | None:
     over = np.minimum(np.abs(leaps), np.abs(stress[2:] - stress[:-2])[at]) - explained - least
     k = int(np.argmax(over))
     return (float(t[k + _AROUND]), float(leaps[k])) if over[k] > 0 and stiffest > 0 else None
+
+
+def fall(curve: Curve, until: float) -> tuple[float, float] | None:
+    """When the stress most falls short of what the strain makes of it between two instants, s, and by how much.
+
+    Up to the strain ``until``, the end of the elastic part: one step has less than half of the usual modulus, and its
+    neighbours have it. None where there is none.
+    """
+    known = np.isfinite(curve.stress) & np.isfinite(curve.strain) & (np.cumsum(curve.strain > until) == 0)
+    t, stress, strain = curve.t[known], curve.stress[known], curve.strain[known]
+    pulls, unsure = np.diff(strain), _SURE * noise(strain)
+    if len(pulls) < _EQUAL:
+        return None
+    slopes = np.diff(stress) / np.where(pulls > unsure, pulls, math.inf)  # 0 where the strain rests
+    usual = float(np.median(slopes))
+    short = (np.diff(stress) - usual * pulls)[1:-1]
+    least = np.maximum(_SURE * noise(stress) + usual * unsure, (1 - _RISEN) * stress[1:-2])
+    beside = np.minimum(slopes[:-2], slopes[2:]) > _STEADY * usual
+    over = np.where(beside & (slopes[1:-1] < usual / 2) & (usual > 0), -short - least, 0.0)
+    k = int(np.argmax(over))
+    return (float(t[k + 2]), float(short[k])) if over[k] > 0 else None
 
 
 def leap_alike(curve: Curve) -> tuple[float, float, float] | None:

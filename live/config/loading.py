@@ -212,8 +212,11 @@ def _plain_toml(path: Path, text: str | None = None) -> dict[str, Any]:
 
 
 def toml_text(path: Path) -> str:
-    """The text of a file."""
-    return read_bytes(path, MAX_BYTES).decode("utf-8-sig")
+    """The text of a file; raises UnicodeDecodeError for another encoding than UTF-8."""
+    content = read_bytes(path, MAX_BYTES)
+    if (zero := content.find(b"\0")) >= 0:  # UTF-16
+        raise UnicodeDecodeError("utf-8", content, zero, zero + 1, "a zero byte")
+    return content.decode("utf-8-sig")
 
 
 @contextmanager
@@ -221,7 +224,9 @@ def as_toml(path: Path) -> Iterator[None]:
     """Around the reading of a file and of its TOML: raises ConfigError where that fails."""
     try:
         yield
-    except (DataError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError:
+        raise ConfigError("{path}: is no text in UTF-8; save it so in an editor", path) from None
+    except DataError as error:
         raise ConfigError("{path}: cannot be read ({error}); give a text file in TOML", path, error) from None
     except RecursionError:
         raise ConfigError("{path}: not valid TOML: too many brackets within brackets", path) from None

@@ -84,7 +84,7 @@ class PartsGuard:
 
 
 class StrainGuard:
-    """Checks each field of small strains, and warns once where another measure is more exact.
+    """Checks each field of small strains, and warns where another measure is more exact, again where twice as much.
 
     A rotation by r changes small strains by r^2/2 (3 degrees: 1400 µm/m); they differ from the other measures
     by about e^2/2 at a strain e.
@@ -97,22 +97,23 @@ class StrainGuard:
     """
 
     def __init__(self, measure: Measure, on_event: EventSink) -> None:
-        self._on_event, self._warned = on_event, measure != "small"
+        self._on_event, self._told = on_event, 0.0 if measure == "small" else math.inf
 
     def check(self, field: StrainField, step: TimeStep) -> None:
         """Check the strains and rotations of a field."""
-        if self._warned or not field.ok.any():
+        if self._told == math.inf or not field.ok.any():
             return
         turned = abs(float(np.nanmedian(field.rotation)))
         strained = max(abs(float(np.nanmedian(values))) for values in (field.du_dx, field.dv_dy))
-        if turned > MAX_ROTATION or strained > MAX_STRAIN:
-            self._warned = True
+        off = (turned**2 + strained**2) / 2
+        if (turned > MAX_ROTATION or strained > MAX_STRAIN) and off > 2 * self._told:
+            self._told = off
             text = Message(
                 "turned by {degrees:.1f} degrees, strained by {strained:.1%}: small strains are off by about "
                 "{off}; measure with --strain engineering",
                 math.degrees(turned),
                 strained,
-                Amount("strain", (turned**2 + strained**2) / 2),
+                Amount("strain", off),
             )
             data = {"rotation": turned, "strain": strained}
             self._on_event(Event(step.t, EventKind.MEASUREMENT, "strain", text, "warning", data))

@@ -154,7 +154,13 @@ class Strain(Closing):
             )
         if isinstance(row, int) and not -self.n <= row < self.n:
             self.check_measured()
-            raise DataError("{path}: no row {row}; there are {n}", self.path, row, self.n)
+            raise DataError(
+                "{path}: no row {row}; give 0 to {last}, or -1 (the last) to {first}",
+                self.path,
+                row,
+                self.n - 1,
+                -self.n,
+            )
         rows = range(self.n)[row]
         try:
             if self.response is not None and name in self.response.names:

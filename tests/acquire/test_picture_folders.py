@@ -17,6 +17,7 @@ from acquire.camera.contract import open_camera
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event
 from acquire.files.headers import full_pages, quantisation
+from acquire.files.picture import WEBCAM_WARNING
 from acquire.frame import QUANTISATION
 from acquire.opencv.image_metadata import taken_times
 from acquire.opencv.images import find_images, picture_names, picture_times
@@ -191,7 +192,9 @@ def test_a_film_of_more_than_8_bits_is_named(tmp_path: Path) -> None:
     writer.write(np.full(size[::-1], 30000, np.uint16))
     writer.release()
     with open_camera(f"video:{path}") as camera:
-        assert any("film of 16 bits, read as 8" in text for text in camera.info.warnings)
+        assert [text.partition(",")[0] for text in camera.info.warnings] == ["film of 16 bits"], "it is grey"
+    with open_camera(f"video:{film(tmp_path / 'b.mkv', 'FFV1')}") as camera:
+        assert camera.info.warnings == (WEBCAM_WARNING,)
 
 
 @pytest.mark.parametrize(("code", "name"), [("FFV1", "a.mkv"), ("VP80", "a.webm")])

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from acquire.text import Amount, Message
 from analysis.evaluate import CONFIDENCE, Figure, Track
 from analysis.evaluate.curve import noise
-from analysis.evaluate.seen import LEAPS_NEED, leap, leap_alike, renewal_s, without_stopped
+from analysis.evaluate.seen import LEAPS_NEED, fall, leap, leap_alike, renewal_s, without_stopped
 from live.results.figures import LAG_MATTERS_S, figure_text
 from live.results.finished.finished_test import FinishedTest
 
@@ -193,7 +193,8 @@ def _leaps(test: FinishedTest) -> str | None:
 
     Where the pictures are too few for one, a rise of the force may be the elastic part.
     """
-    found = leap(test.curve)
+    span = test.figures.span
+    found = leap(test.curve) or (fall(test.curve, span.strain[1]) if span is not None else None)
     if not test.figures.E.known and (found is None or found[1] > 0):
         return None
     if found is None:

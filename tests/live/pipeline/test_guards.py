@@ -123,6 +123,15 @@ def test_the_error_of_small_strains_is_half_the_squares_of_turn_and_strain() -> 
     assert events[0].data == {"rotation": pytest.approx(0.0199, rel=1e-3), "strain": pytest.approx(0.01)}
 
 
+def test_small_strains_are_told_again_where_they_are_off_by_twice_as_much() -> None:
+    events: list[Event] = []
+    guard = StrainGuard("small", events.append)
+    for turn in (0.035 * k / 19 for k in range(20)):
+        guard.check(field(du_dy=-turn, dv_dx=turn), make_measurement(0).time_step)
+    turns = [event.data["rotation"] for event in events]
+    assert len(turns) == 4 and turns[-1] == pytest.approx(0.03, abs=0.005)
+
+
 def step_of(exx: float, eyy: float, sigma: float = 0.0) -> Any:
     return replace(make_measurement(0).time_step, exx=exx, eyy=eyy, sigma_exx=sigma, sigma_eyy=sigma)
 

@@ -110,7 +110,7 @@ def test_maps_by_row_and_by_slice(strain: Strain) -> None:
     np.testing.assert_array_equal(strain.maps("eyy", slice(0, 4, 2)), whole[::2])
     np.testing.assert_array_equal(strain.maps("eyy", slice(-2, None)), whole[2:])
     for row in (4, -5):
-        with pytest.raises(DataError, match=f"no row {row}; there are 4"):
+        with pytest.raises(DataError, match=rf"no row {row}; give 0 to 3, or -1 \(the last\) to -4"):
             strain.maps("eyy", row)
     assert repr(strain) == "<Strain strain.h5: 4 instants of 5 x 7 ZOIs, small strain>"
     strain.close()

@@ -121,6 +121,17 @@ def test_a_zero_that_moves_in_the_test_is_named_and_is_no_lag() -> None:
     assert found["lag"].outcome == "not checked"
 
 
+@pytest.mark.parametrize("left", [0.8, 0.9])
+def test_a_force_that_leaps_in_the_elastic_part_of_few_pictures_is_named(left: float) -> None:
+    """The grips or the load cell slip: E of all points was a quarter low, and called good."""
+    strains = np.r_[np.arange(21) * 0.0125, 0.4, 1.0, 2.0, 3.0, 4.0] * YIELD
+    force = stress_of(strains) * 20e-6
+    assert outcomes(test_of(strains, force=force))["leaps of the force"] == "not checked"
+    test = test_of(strains, force=np.where(np.arange(26) < 12, force, left * force))
+    found = {one.name: one for one in findings(test)}["leaps of the force"]
+    assert test.figures.E.known and found.outcome == "doubt" and "the force leaps by" in found.text
+
+
 def test_a_display_that_is_renewed_slowly_is_named() -> None:
     t, rng = np.arange(0, 14, 1 / 80), np.random.default_rng(5)
     values = stress_of(np.interp(np.arange(0, 14, 0.4), np.arange(len(STRAINS)) / FPS, STRAINS)) * 20e-6
