@@ -49,6 +49,8 @@ class Calibration:
     points : tuple of Point
     date : str
         ISO 8601, UTC.
+    address : str
+        Of the load cell when it was calibrated; empty where it is not known.
     """
 
     gain: float
@@ -56,6 +58,7 @@ class Calibration:
     residual_N: float
     points: tuple[Point, ...]
     date: str
+    address: str = ""
 
 
 def point(force_N: float, values: Sequence[float]) -> Point:
@@ -152,7 +155,7 @@ def load(path: str) -> Calibration:
             for p in content["points"]
         )
         numbers = [float(content[name]) for name in ("gain", "zero", "residual_N")]
-        date = str(content["date"])
+        date, address = str(content["date"]), str(content.get("address", ""))
     except OSError as error:
         raise ConfigError(
             "calibration={path}: {strerror}; name the file of a calibration", path, error
@@ -165,4 +168,4 @@ def load(path: str) -> Calibration:
         raise ConfigError(
             "calibration={path}: gain, zero and residual must be numbers, the gain not zero", path
         )
-    return Calibration(numbers[0], numbers[1], numbers[2], points, date)
+    return Calibration(numbers[0], numbers[1], numbers[2], points, date, address)

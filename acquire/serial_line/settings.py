@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import cast
 
-from acquire.addresses import Address, Options
+from acquire.addresses import Address, Options, parse_address
 from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError
 from acquire.load_cell import Calibration, load_calibration
@@ -18,6 +18,11 @@ from acquire.text import Message
 
 USUAL = "of the line; where not given as usual with the protocol"
 UNITS = "of lines without one: N (newton), kN, mN, daN, kgf, gf, lbf, ozf; masses kg, g, mg, t, lb, oz"
+_OF_SCALING = (
+    "gain", "zero", "sign", "unit", "calibration", "capacity", "max_step", "mass_reads_force", "tare", "timeout",
+    "wait", "wire",
+)  # fmt: skip
+"""Settings on which the value on the line does not depend."""
 MODES = "listen: it sends by itself; stream: after a command; poll: each reading is asked for; else as usual"
 
 
@@ -211,5 +216,25 @@ def describe(settings: SerialSettings, usb: str) -> LoadCellInfo:
             "byte_time_s": s.byte_time_s,
             "usb": usb,
         },
-        warnings=(s.protocol.undetected,) if s.protocol.undetected else (),
+        warnings=tuple(one for one in (s.protocol.undetected, _calibrated_otherwise(s)) if one),
+    )
+
+
+def _calibrated_otherwise(settings: SerialSettings) -> str:
+    """Whether the calibration was made with another port or other settings, on which the gain may depend."""
+    if settings.calibration is None or not settings.calibration.address:
+        return ""
+    then, now = (
+        {"port": one.target, "protocol": "ascii"}
+        | {key: value for key, value in one.settings if key not in _OF_SCALING}
+        for one in map(parse_address, (settings.calibration.address, settings.address))
+    )
+    other = sorted(key for key in then.keys() | now.keys() if then.get(key) != now.get(key))
+    if not other:
+        return ""
+    return Message(
+        "calibrated with other settings ({other}), as {address}: hang a known load on it, forces may be wrong by a "
+        "factor",
+        ", ".join(other),
+        settings.calibration.address,
     )

@@ -275,9 +275,9 @@ class _Run:
             stream.publish(m)
             self.screen.progress(m.time_step, m.number + 1, self.source.expected, time.perf_counter() - began)
             del m  # frees its pictures before the next burst is measured
-        if self.stopping.is_set():
-            done = counted(len(self.run_state.history.time_steps), "burst")
-            text = Message("interrupted after {bursts}; the others are not measured", done)
+        done = len(self.run_state.history.time_steps)
+        if self.stopping.is_set() and done != self.source.expected:
+            text = Message("interrupted after {bursts}; the others are not measured", counted(done, "burst"))
             self.run_state.event_log.emit(EventKind.STOP, "phasedic", text, "warning")
         return time.perf_counter() - began
 

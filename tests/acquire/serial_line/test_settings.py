@@ -99,6 +99,26 @@ def test_gain_and_zero_of_the_address_come_before_those_of_a_calibration(
     assert (s.gain, s.zero) == (pytest.approx(gain), pytest.approx(zero))
 
 
+@pytest.mark.parametrize(
+    ("then", "now", "other"),
+    [
+        ("/dev/fake?protocol=ascii", "/dev/fake?unit=N&", ""),
+        ("/dev/fake?baud=9600", "/dev/fake?baud=19200&rate=80&", "(baud, rate)"),
+        ("/dev/other", "/dev/fake?", "(port)"),
+        ("", "/dev/fake?rate=80&", ""),
+    ],
+)
+def test_a_calibration_with_other_settings_is_named(tmp_path: Path, then: str, now: str, other: str) -> None:
+    """A device with another range or filter may send other values for the same force."""
+    points = [Point(0.0, 100.0, 0.1, 50), Point(50.0, 125.0, 0.1, 50)]
+    save(fit(points), tmp_path / "cal.toml", then)
+    settings = read_settings(parse_address(f"{now}calibration={tmp_path}/cal.toml"))
+    found = [
+        text for text in describe(settings, "").warnings if text.startswith("calibrated with other settings")
+    ]
+    assert [other in text and then in text for text in found] == [True] * bool(other)
+
+
 def test_what_is_stored_of_a_load_cell() -> None:
     address = (
         "/dev/fake?protocol=aed-standard&unit=kN&sign=-1&capacity=500&max_step=20&zero=3"
