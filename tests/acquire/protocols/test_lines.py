@@ -7,6 +7,8 @@ import struct
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
@@ -194,6 +196,15 @@ def test_commands_of_a_profile() -> None:
 def test_exception_is_an_error_not_a_value() -> None:
     (reading,) = parser("modbus", "profile=pt113").feed(frame(1, 0x83, 2))
     assert math.isnan(reading.value) and reading.flags is LoadFlag.ERROR
+
+
+@given(st.integers(0, 10), st.integers(1, 255))
+def test_every_damaged_byte_is_noticed(at: int, change: int) -> None:
+    whole = bytearray(answer(0, 12345, 2))
+    whole[at] ^= change
+    made = parser("modbus", "profile=pt113")
+    readings = made.feed(bytes(whole)) + made.silence()
+    assert all(math.isnan(reading.value) for reading in readings) and readings
 
 
 def test_a_wrong_profile_names_its_file_or_key(tmp_path: Path) -> None:
