@@ -13,7 +13,7 @@ _EXPLAINED = 0.01  # of what differs between the rows: less is noise, or a patte
 def rows_apart(image: NDArray[np.generic]) -> float:
     """Shift between the odd rows and the mean of the even ones beside them, px; 0 where no shift explains them.
 
-    From the gradients of both, by least squares; to 0.01 px on a speckle of 1 px radius and more, nothing on a finer one.
+    From the gradients of both, by least squares; to 0.01 px on a speckle of 1 px radius or more, 0 on a finer one.
     """
     height, width = image.shape
     top, left = max(height - _PART, 0) // 2, max(width - _PART, 0) // 2
