@@ -18,6 +18,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from acquire.text import Message
+
 Clock = Callable[[], float]
 """Says the time, s: ``time.monotonic``, or in a test a clock that is moved by hand."""
 
@@ -305,14 +307,21 @@ class ClockUnit:
         changed, self.ms, self._found = unit != self.ms, unit, True
         if unit == 1e3 and not self._fine:
             self.ms = None
-            return "the device's own time has whole seconds or tenths only: times are those of arrival"
-        return f"the device's own time counts {self.UNITS[unit]}, and is taken so" if changed else ""
+            return Message(
+                "the device's own time has whole seconds or tenths only: times are those of arrival"
+            )
+        return (
+            Message("the device's own time counts {unit}, and is taken so", self.UNITS[unit])
+            if changed
+            else ""
+        )
 
     def _refuse(self, pace: float) -> str:
         self.ms = None
-        return (
-            f"the device's own time is no clock in seconds, milliseconds or microseconds ({pace:.4g} counts a second): "
-            "times are those of arrival; check the column of its time (millis=)"
+        return Message(
+            "the device's own time is no clock in s, ms or us ({pace:.4g} counts a second): times are those of arrival;"
+            " check the column of its time (millis=)",
+            pace,
         )
 
 

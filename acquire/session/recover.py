@@ -139,7 +139,9 @@ def _copy_frames(part: SessionPart, writer: SessionWriter, unreadable: list[str]
         writer.write_frame(dataclasses.replace(frame, lost_before=frame.lost_before + skipped))
         copied, skipped = copied + 1, 0
     if lost:
-        unreadable.append(f"{len(lost)} of {len(part)} frames cannot be read, the first: {lost[0]}")
+        unreadable.append(
+            Message("{n} of {all} frames cannot be read, the first: {why}", len(lost), len(part), lost[0])
+        )
     return copied
 
 

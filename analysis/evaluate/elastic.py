@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.text import Message
+from acquire.text.message import counted
 from analysis.evaluate.curve import Loading, UncertainValue, first_crossing, noise, reading
 from analysis.evaluate.figure import Figure
 
@@ -236,9 +237,9 @@ def poisson_between(loading: Loading, low: float, high: float) -> Figure:
     if n < MIN_POINTS:
         return Figure.none(
             Message(
-                "only {n} measurements between the strains {low:g} and {high:g} %, {MIN_POINTS} are needed: take more "
+                "only {measurements} between the strains {low:g} and {high:g} %, {MIN_POINTS} are needed: take more "
                 "pictures there (the strain reaches {reached:.2g} %)",
-                n,
+                counted(n, "measurement"),
                 100 * low,
                 100 * high,
                 MIN_POINTS,

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from acquire.text import Message, joined
+from acquire.text.message import counted
 from analysis.evaluate import strengths
 from analysis.evaluate.curve import Curve, Floats, Loading, first_crossing, noise, reading
 from analysis.evaluate.elastic import (
@@ -179,13 +180,17 @@ def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:
     loading, strength = Loading.of(curve), strengths.tensile_strength(curve)
     if loading.n < MIN_POINTS or loading.stress[loading.top] <= 0:
         words = Message(
-            "only {n} measurements have strain and a tensile force, {MIN_POINTS} are needed: are sign (--load-sign) "
+            "only {measurements} with strain and a tensile force, {MIN_POINTS} are needed: are sign (--load-sign) "
             "and time (--lag) of the force right?",
-            loading.n,
+            counted(loading.n, "measurement"),
             MIN_POINTS,
         )
         if (n := len(curve.t)) < MIN_POINTS:
-            words = Message("{n} measurements in all, {MIN_POINTS} are needed: more pictures", n, MIN_POINTS)
+            words = Message(
+                "{measurements} in all, {MIN_POINTS} are needed: more pictures",
+                counted(n, "measurement"),
+                MIN_POINTS,
+            )
         return replace(_nothing(words, options), Rm=strength)
     if not strength.known:
         return _nothing(strength.why, options)
@@ -214,9 +219,9 @@ def _elastic(loading: Loading, options: TensileOptions) -> _Elastic | str:
         line = line_through(loading, first, last)
         if line is None:
             return Message(
-                "only {n} measurements {words}, {MIN_POINTS} are needed: take more pictures there, or give "
+                "only {measurements} {words}, {MIN_POINTS} are needed: take more pictures there, or give "
                 "modulus_between",
-                last - first,
+                counted(last - first, "measurement"),
                 words,
                 MIN_POINTS,
             )

@@ -293,7 +293,10 @@ def lost_plate(fit: PlateFit, field: StrainField) -> str:
     for name, block in fit.layout.plates.items():
         ok = field.ok[block.at]
         if ok.sum() < MIN_VALID * ok.size:
-            return f"plate {name} is lost or shaded: {int(ok.sum())} of {ok.size} ZOIs have a value"
+            return Message(
+                "plate {name} is lost or shaded: {n} of {all} ZOIs have a value",
+                *(name, int(ok.sum()), ok.size),
+            )
     return ""
 
 
@@ -310,9 +313,10 @@ def not_rigid(fit: PlateFit, field: StrainField) -> str:
         sigma = math.hypot(area.sigma("exx"), area.sigma("eyy")) / 2
         own = max(abs(stretch) - LOADED_SIGMAS * sigma, abs(shear) - LOADED_SIGMAS * area.sigma("exy"))
         if own > LOADED_STRAIN:
-            return (
-                f"plate {name} is loaded or not flat: it is strained by {math.hypot(stretch, shear) * 1e6:.0f} um/m"
-                " itself"
+            return Message(
+                "plate {name} is loaded or not flat: it is strained by {strain:.0f} um/m itself",
+                name,
+                math.hypot(stretch, shear) * 1e6,
             )
         if words := _uneven(name, plate):
             return words
@@ -325,7 +329,7 @@ def _uneven(name: str, plate: StrainField) -> str:
     expected = math.sqrt(float(np.mean(plate.sigma_u[ok] ** 2 + plate.sigma_v[ok] ** 2)) / 2)
     if left <= _UNEVEN_PX + _UNEVEN_SIGMAS * expected:
         return ""
-    return f"plate {name} does not move with the others as one piece: {left:.3f} px"
+    return Message("plate {name} does not move with the others as one piece: {left:.3f} px", name, left)
 
 
 def trouble(fit: PlateFit, field: StrainField) -> tuple[str, bool]:

@@ -272,6 +272,9 @@ def _warn_of_motion(strain: Strain, row: int) -> None:
     moved = float(np.nanmax(np.hypot(strain.maps("u", row), strain.maps("v", row)), initial=0.0))
     if moved > _VISIBLE_PX:
         print_line(
-            f"note: the ZOIs lie where they were in the reference; the specimen moved by up to {moved:.0f} px since:"
-            " phasedic export --to png moves the map with it"
+            Message(
+                "note: the ZOIs lie where they were in the reference; the specimen moved by up to {moved:.0f} px since:"
+                " phasedic export --to png moves the map with it",
+                moved,
+            )
         )

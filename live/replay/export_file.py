@@ -233,7 +233,8 @@ class _Reader:
         if any(texts[: len(known)] == known for known in t.texts):
             self._other = ""
         elif not self._other and not t.by_name and is_heading(texts):
-            self._other = f"line {line}: another table begins ({', '.join(filter(None, texts))[:60]!r})"
+            heading = repr(", ".join(filter(None, texts))[:60])
+            self._other = Message("line {line}: another table begins ({heading})", line, heading)
         elif self._other:
             self._n_unread += 1
         elif at is not None or export_text.is_value(key) or (not key and force is not None and value):
@@ -381,4 +382,4 @@ class _Reader:
 
 
 def _shown(force: float) -> str:
-    return grouped(force) if abs(force) >= 1000 else f"{force:.4g}"
+    return grouped(force) if abs(force) >= 1000 else f"{force + 0.0:.4g}"  # not -0

@@ -304,8 +304,10 @@ class _Search:
                     option,
                 )
         left = (
-            f"line {t.first + 1}: another table ({', '.join(t.heads)[:60]!r}): its"
-            f" {counted(self.length(t), 'row')} are not read"
+            Message(
+                "line {line}: another table ({heading}): its {rows} are not read",
+                *(t.first + 1, repr(", ".join(t.heads)[:60]), counted(self.length(t), "row")),
+            )
             for t in found[:begin]
             if t.first < table.first  # not the same rows under a line above their heading
         )

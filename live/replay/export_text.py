@@ -37,7 +37,14 @@ _BOMS = {
     codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16",
 }  # fmt: skip
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x19\x1c-\x1f\x7f]")
-_JAPANESE = re.compile("荷重|試験力|時間|時刻")
+_CODE_PAGES = {
+    "cp932": re.compile("荷重|試験力|時間|時刻"),
+    "gb18030": re.compile("载荷|负荷|试验力|拉力|力值|时间"),
+    "cp949": re.compile("하중|시간"),
+    "cp1251": re.compile("(?i)сила|усилие|нагрузка|время"),
+    "cp1250": re.compile("(?i)siła"),
+}
+"""Code pages of eight bits, with words of headings that show them; else it is cp1252."""
 
 Rows = list[list[str]]
 
@@ -79,14 +86,15 @@ _ENDINGS = {
     "time": ("zeit", "時間", "时间"),
 }
 _SECONDS = {
-    1.0: "s sec secs second seconds sek sekunde sekunden seconde secondes 秒",
-    1e-3: "ms msec millisecond milliseconds millisekunden",
+    1.0: "s sec secs second seconds sek sekunde sekunden seconde secondes 秒 с сек",
+    1e-3: "ms msec millisecond milliseconds millisekunden мс",
     1e-6: "us µs usec microsecond microseconds",
-    60.0: "min mins minute minutes minuten 分",
+    60.0: "min mins minute minutes minuten 分 мин",
     3600.0: "h hr hour hours std stunde stunden heure heures",
 }
 _ALIASES = {
     "newton": "N", "newtons": "N", "kilonewton": "kN", "kilonewtons": "kN", "kip": "klbf", "kips": "klbf",
+    "н": "N", "кн": "kN", "кгс": "kgf",
 }  # fmt: skip
 _BRACKETS = re.compile(r"(.*?)\s*[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]\s*")
 _BARE = re.compile(r"(.*?)(?:\s*[/,|]\s*|[\s_]+(?:in\s+)?)([^\s/,|_]+)")
@@ -107,7 +115,8 @@ def encoding_of(file: BinaryIO, where: str) -> str:
     if max(zeros) > len(head) // 4 and min(zeros) == 0:
         found = "utf-16-le" if zeros[1] else "utf-16-be"
     elif _decoded(head, "utf-8") is None:
-        found = "cp932" if _JAPANESE.search(_decoded(head, "cp932") or "") else "cp1252"
+        shown = (page for page, words in _CODE_PAGES.items() if words.search(_decoded(head, page) or ""))
+        found = next(shown, "cp1252")
     if _CONTROL.search(head.decode(found, "replace")):
         raise DataError("{where}: is binary, no text; export the forces as CSV or text", where)
     return found

@@ -369,8 +369,8 @@ def speed_line(history: History, seconds: float) -> str:
     n, zois = len(history.time_steps), history.column("n_zoi").sum()
     share = history.column("measure_s").sum() / seconds
     return Message(
-        "{n} bursts in {seconds:.3g} s: {rate:.3g} bursts/s, {zois} ZOI/s, of that time {share:.0%} in the kernel",
-        *counts(n), seconds, n / seconds, Amount("count", zois / seconds), share,
+        "{bursts} in {seconds:.3g} s: {rate:.3g} bursts/s, {zois} ZOI/s, of that time {share:.0%} in the kernel",
+        counted(n, "burst"), seconds, n / seconds, Amount("count", zois / seconds), share,
     )  # fmt: skip
 
 

@@ -211,7 +211,7 @@ def response_of(
         with Strain.open(folder / STRAIN) as strain:
             return response_lines(strain), [*response_figures(strain)]
     except DataError as error:
-        return [f"no response over {channel}: {error}"], []
+        return [Message("no response over {channel}: {why}", channel, error.text)], []
 
 
 def respond(folder: Path, figures: TensileFigures, channel: str) -> None:

@@ -22,7 +22,8 @@ from typing import Any
 from acquire.errors import DeviceError, PhasedicError
 from acquire.events import Event, Level
 from acquire.serial_line.ports import LineSettings, open_port
-from acquire.text import Message
+from acquire.text import Message, joined
+from acquire.text.message import counted
 from live.config.figures import OF_SNAPSHOT
 from live.pipeline.consumer import Consumer, Policy
 from live.pipeline.measurement import Measurement
@@ -162,10 +163,9 @@ class TcpOut(StrainOut):
     def end(self) -> str:
         """Close the connections."""
         self._server.close()
-        skipped = f", {self._server.skipped} skipped by clients that did not read" * (
-            self._server.skipped > 0
-        )
-        return f"{self._server.served} clients, {self._server.taken} lines{skipped}"
+        server = self._server
+        skipped = Message("{n} skipped by clients that did not read", server.skipped) * (server.skipped > 0)
+        return joined(", ", (counted(server.served, "client"), counted(server.taken, "line"), skipped))
 
 
 class UdpOut(StrainOut):
@@ -246,6 +246,5 @@ class SerialOut(StrainOut):
     def end(self) -> str:
         """Close the port."""
         self._close()
-        return f"{self._sent} lines" + f", {self._skipped} skipped, the port took nothing" * (
-            self._skipped > 0
-        )
+        skipped = Message("{n} skipped, the port took nothing", self._skipped) * (self._skipped > 0)
+        return joined(", ", (counted(self._sent, "line"), skipped))

@@ -45,25 +45,14 @@ FORCE_NOISE_N = 1.0
 
 @dataclass(frozen=True)
 class Outcome:
-    """Errors of exx, eyy and exy of the region in the elastic part, (T, 3), and what they are compared with.
-
-    Attributes
-    ----------
-    truth, error, sigma : (T, 3)
-    strips : (T,)
-        Error of the extension along the load.
-    limit : (3,)
-    reference_share : float
-        Of the variance of a value: the noise of the reference, common to all.
-    figures : TensileFigures
-    """
+    """Errors of exx, eyy and exy of the region in the elastic part, (T, 3), and what they are compared with."""
 
     truth: Floats
     error: Floats
     sigma: Floats
-    strips: Floats
-    limit: Floats
-    reference_share: float
+    strips: Floats  # (T,), error of the extension along the load
+    limit: Floats  # (3,)
+    reference_share: float  # of the variance of a value: the noise of the reference, common to all
     figures: TensileFigures
 
     @property

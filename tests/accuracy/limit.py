@@ -1,15 +1,18 @@
 """What no unbiased estimator with a given weight can beat; nothing of ``analysis`` is used.
 
 The limit of weighted least squares for a known pattern with white noise of standard deviation sigma
-in both images: covariance 2 sigma^2 (J'wJ)^-1 (J'w^2J) (J'wJ)^-1 with the six affine modes. The attenuation of
-a sinusoid is the Fourier transform of the same weight.
+in both images: covariance 2 sigma^2 (J'wJ)^-1 (J'w^2J) (J'wJ)^-1 with the six affine modes, and for a displacement
+(u, v) the response (J'wJ)^-1 J'w (f_x u + f_y v). The attenuation of a sinusoid is the Fourier transform of the weight.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
+Floats = NDArray[np.float64]
 NAMES = ("u", "du_dx", "du_dy", "v", "dv_dx", "dv_dy")
 
 
@@ -19,32 +22,52 @@ def gaussian(size: int) -> NDArray[np.float64]:
     return np.exp(-0.5 * (x / (size / 6)) ** 2)
 
 
-def noise_limit(
-    level: NDArray[np.float64], first_x: NDArray, first_y: NDArray, line: NDArray[np.float64], sigma: float
-) -> dict[str, float]:
-    """Root mean square over the ZOIs of the limit of each parameter.
+@dataclass(frozen=True, slots=True, eq=False)
+class Limit:
+    """Of each parameter and ZOI, (6, R, C).
 
-    Parameters
-    ----------
-    level : (H, W), the noise-free reference; sigma in its unit
-    first_x, first_y : first pixels of the ZOIs
-    line : (n,), the weight along one axis
+    ``sigma`` is the standard deviation for noise of 1 in the unit of the pictures; ``response`` is what noise-free
+    pictures of a displacement field give: the window's attenuation.
     """
-    size = len(line)
-    fy, fx = (derivative(level, axis) for axis in (0, 1))
-    x = np.arange(size) - (size - 1) / 2
-    ones = np.ones((size, size))
-    modes = [ones, ones * x, ones * x[:, None]]
-    w = np.outer(line, line)
-    total = np.zeros(6)
-    for top in first_y:
-        for left in first_x:
-            zoi = np.s_[top : top + size, left : left + size]
-            j = np.stack([(g[zoi] * m).ravel() for g in (fx, fy) for m in modes])
-            inverse = np.linalg.inv((j * w.ravel()) @ j.T)
-            total += np.diag(inverse @ ((j * w.ravel() ** 2) @ j.T) @ inverse)
-    values = np.sqrt(2 * sigma**2 * total / (len(first_x) * len(first_y)))
-    return dict(zip(NAMES, values, strict=True))
+
+    sigma: Floats
+    response: Floats | None = None
+
+
+def least_squares(
+    slopes: tuple[Floats, Floats],
+    first_x: NDArray,
+    first_y: NDArray,
+    line: Floats,
+    field: tuple[Floats, Floats] | None = None,
+) -> Limit:
+    """The limit for the gradient of a picture along x and y, (H, W) each, in ZOIs with these first pixels.
+
+    ``line`` (n,) is the weight along one axis, ``field`` a displacement on the pixels, two (H, W) px.
+    """
+    size, shape = len(line), (6, len(first_y), len(first_x))
+    x, weight = np.arange(size) - (size - 1) / 2, np.outer(line, line).ravel()
+    sigma, response = np.empty(shape), np.empty(shape)
+    for row, top in enumerate(first_y):
+        for column, left in enumerate(first_x):
+            cut = np.s_[top : top + size, left : left + size]
+            fx, fy = slopes[0][cut], slopes[1][cut]
+            j = np.stack([fx, fx * x, fx * x[:, None], fy, fy * x, fy * x[:, None]]).reshape(6, -1)
+            jw = j * weight
+            inverse = np.linalg.inv(jw @ j.T)
+            sigma[:, row, column] = np.sqrt(2 * np.diag(inverse @ (jw * weight @ j.T) @ inverse))
+            if field is not None:
+                change = (fx * field[0][cut] + fy * field[1][cut]).ravel()
+                response[:, row, column] = inverse @ (jw @ change)
+    return Limit(sigma, None if field is None else response)
+
+
+def noise_limit(
+    level: Floats, first_x: NDArray, first_y: NDArray, line: Floats, sigma: float
+) -> dict[str, float]:
+    """Root mean square over the ZOIs for a noise-free reference (H, W) and noise in its unit."""
+    found = least_squares((derivative(level, 1), derivative(level, 0)), first_x, first_y, line).sigma
+    return dict(zip(NAMES, sigma * np.sqrt(np.mean(found**2, axis=(1, 2))), strict=True))
 
 
 def derivative(level: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
@@ -59,11 +82,7 @@ def derivative(level: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
 
 
 def l10(line: NDArray[np.float64]) -> float:
-    """Period of a displacement along x that has lost 10 % in its amplitude, px.
-
-    For an affine fit with a separable symmetric weight: the displacement at the centre is the weighted
-    mean, so the response is the transform of the weight.
-    """
+    """Period of a displacement along x that has lost 10 % in its amplitude, px, of a separable symmetric weight."""
     x = np.arange(len(line)) - (len(line) - 1) / 2
     periods = np.linspace(1.0, 20.0, 20001) * len(line) / 2
     response = np.cos(2 * np.pi * np.outer(1 / periods, x)) @ line / line.sum()

@@ -34,27 +34,15 @@ MAX_E_ERROR, COVERAGE = 0.003, (0.93, 0.97)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlateTest:
-    """One simulated test.
-
-    Attributes
-    ----------
-    model : str
-    true : (N, 2) float64
-        exx and eyy of the specimen.
-    raw, found, sigma : (N, 2) float64
-        As measured, corrected, and the standard uncertainty of the latter.
-    stress : (N,) float64, Pa
-    E : float, Pa
-        Of the specimen.
-    """
+    """One simulated test: exx and eyy of the specimen, as measured, corrected, and the sigma of these, (N, 2) each."""
 
     model: Model
     true: NDArray[np.float64]
     raw: NDArray[np.float64]
     found: NDArray[np.float64]
     sigma: NDArray[np.float64]
-    stress: NDArray[np.float64]
-    E: float
+    stress: NDArray[np.float64]  # (N,) Pa
+    E: float  # of the specimen, Pa
 
     def modulus_error(self, strain: NDArray[np.float64]) -> float:
         """Of E from the strain along the load (N,), over E."""

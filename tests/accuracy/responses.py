@@ -33,32 +33,15 @@ FALSE_MPA, LATE_MPA = 5.0, 8.0
 
 @dataclass(frozen=True)
 class Case:
-    """One line of the table.
-
-    Attributes
-    ----------
-    kind : str
-    sigma : float
-        Of the slope of a place, in modulus times compliance: 1 is the material.
-    one_frame : float
-        The same from the last elastic instant alone.
-    coverage : Coverage
-        Of slopes and of Poisson's ratios.
-    pattern : float
-        Rms of slopes without noise about those of the best affine field.
-    chi2 : float
-    leaves : list of (float, float, float), MPa
-        Median, 1 and 99 %, of each knee.
-    places, left, false : int
-    """
+    """One line of the table."""
 
     kind: str
-    sigma: float
-    one_frame: float
-    coverage: Coverage
-    pattern: float
+    sigma: float  # of the slope of a place, in modulus times compliance: 1 is the material
+    one_frame: float  # the same from the last elastic instant alone
+    coverage: Coverage  # of slopes and of Poisson's ratios
+    pattern: float  # rms of slopes without noise about those of the best affine field
     chi2: float
-    leaves: list[tuple[float, float, float]]
+    leaves: list[tuple[float, float, float]]  # median, 1 and 99 % of each knee, MPa
     places: int
     left: int
     false: int

@@ -105,20 +105,44 @@ def test_the_session_of_a_run_is_in_its_folder(tmp_path: Path) -> None:
     assert session_file(tmp_path / "session.h5") == tmp_path / "session.h5"
 
 
-@pytest.mark.parametrize("word", ["1", "yes", "true", "on", "YES", "On"])
-def test_words_for_yes(word: str) -> None:
-    assert Options(parse_address(f"sim:?a={word}")).flag("a")
+WORDS = dict.fromkeys(("1", "yes", "true", "on", "YES", "On"), True)
+WORDS |= dict.fromkeys(("0", "no", "false", "off", "False"), False)
 
 
-@pytest.mark.parametrize("word", ["0", "no", "false", "off", "False"])
-def test_words_for_no(word: str) -> None:
-    assert not Options(parse_address(f"sim:?a={word}")).flag("a", True)
+@pytest.mark.parametrize(("word", "meant"), WORDS.items())
+def test_words_for_yes_and_no(word: str, meant: bool) -> None:
+    assert Options(parse_address(f"sim:?a={word}")).flag("a", not meant) == meant
 
 
-@pytest.mark.parametrize("word", ["", "y", "2", "yesno", "ja"])
-def test_other_words_are_neither(word: str) -> None:
-    with pytest.raises(ConfigError, match=rf"sim:\?a={word}: a={word} is not possible; allowed: yes or no"):
-        Options(parse_address(f"sim:?a={word}")).flag("a")
+NUMBER, WHOLE = {"minimum": 0.5, "maximum": 8}, {"minimum": 1, "maximum": 8}
+
+
+@pytest.mark.parametrize(
+    ("kind", "bounds", "values", "allowed"),
+    [
+        ("flag", {}, ("", "y", "2", "yesno", "ja"), "yes or no"),
+        ("number", NUMBER, ("0.4", "8.1", "inf", "nan", "five"), "a number from 0.5 to 8"),
+        ("number", {}, ("inf", "-inf", "nan", "1e999"), "a number"),
+        ("integer", WHOLE, ("0", "9", "2.0", "1e3", "x"), "a whole number from 1 to 8"),
+    ],
+    ids=["no word", "no number", "no finite number", "no whole number"],
+)
+def test_a_value_of_another_kind_or_beyond_its_bounds_is_refused(
+    kind: str, bounds: dict[str, float], values: tuple[str, ...], allowed: str
+) -> None:
+    for value in values:
+        with pytest.raises(ConfigError) as caught:
+            getattr(Options(parse_address(f"sim:?a={value}")), kind)("a", **bounds)
+        assert str(caught.value) == f"sim:?a={value}: a={value} is not possible; allowed: {allowed}"
+
+
+def test_what_an_address_gives_is_what_it_says() -> None:
+    options = Options(parse_address("sim:?fps=0.5&bits=8&seed=-3&lockstep=No&mode=b"))
+    assert options.number("fps", minimum=0.5) == 0.5 and options.number("gain", 3.0) == 3.0
+    assert options.integer("bits", maximum=8) == 8 and options.integer("seed") == -3
+    assert not options.flag("lockstep", True) and options.flag("other", True)
+    assert options.choice("mode", ("a", "b"), "a") == "b"
+    options.done()
 
 
 def test_what_nobody_takes_is_refused_with_what_is_known() -> None:
@@ -231,17 +255,11 @@ def test_bounds_are_said_as_far_as_there_are_any() -> None:
 @pytest.mark.parametrize(
     ("got", "asked", "same"),
     [
-        ("100.009", "100", True),
-        ("100.02", "100", False),
-        ("-100.009", "-100", True),
-        ("0", "0", True),
-        ("1e-9", "0", False),
-        ("Off", "off", True),
-        ("Office", "Off", False),
-        ("On", "Off", False),
+        ("100.009", "100", True), ("100.02", "100", False), ("-100.009", "-100", True), ("0", "0", True),
+        ("1e-9", "0", False), ("Off", "off", True), ("Office", "Off", False), ("On", "Off", False),
         ("1", "true", False),
     ],
-)
+)  # fmt: skip
 def test_what_a_device_has_in_force(got: str, asked: str, same: bool) -> None:
     assert same_value(got, asked) == same
 

@@ -13,21 +13,29 @@ from pathlib import Path
 
 import pytest
 
-from acquire.addresses import Options, parse_address
 from acquire.clock import ClockPair
-from acquire.errors import ConfigError
 from acquire.opening import Closing
 
 
-def test_the_text_comes_back() -> None:
-    pair = ClockPair(12.5, datetime(2026, 5, 9, 7, 35, 25, 123456, tzinfo=UTC))
-    assert pair.iso() == "2026-05-09T07:35:25.123456Z"
-    assert ClockPair.from_iso(12.5, pair.iso()) == pair
+def test_a_time_is_written_in_utc() -> None:
+    at_nine = datetime(2026, 5, 9, 9, 35, 25, 123456, tzinfo=timezone(timedelta(hours=2)))
+    assert ClockPair(0.0, at_nine).iso() == "2026-05-09T07:35:25.123456Z"
 
 
-def test_other_zones_are_written_in_utc() -> None:
-    zone = timezone(timedelta(hours=2))
-    assert ClockPair(0.0, datetime(2026, 5, 9, 9, 0, tzinfo=zone)).iso() == "2026-05-09T07:00:00.000000Z"
+@pytest.mark.parametrize(
+    ("text", "utc"),
+    [
+        ("2026-05-09T07:35:25.123456Z", datetime(2026, 5, 9, 7, 35, 25, 123456, UTC)),
+        ("2026-05-09T07:35:25", datetime(2026, 5, 9, 7, 35, 25, 0, UTC)),
+        ("2026-05-09T09:35:25+02:00", datetime(2026, 5, 9, 9, 35, 25, 0, timezone(timedelta(hours=2)))),
+    ],
+)
+def test_a_time_without_a_zone_is_utc(text: str, utc: datetime, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TZ", "XYZ-13")
+    time.tzset()
+    assert ClockPair.from_iso(3.5, text) == ClockPair(3.5, utc)
+    monkeypatch.undo()
+    time.tzset()
 
 
 def test_now_is_now() -> None:
@@ -160,33 +168,6 @@ ROOMS = ("burst", "camera", "hdf5", "load_cell", "opencv", "protocols", "serial_
 def test_a_room_loads_its_libraries_when_they_are_needed(room: str) -> None:
     heavy = {"cv2", "serial", "numba"} if room in ("hdf5", "session") else {"cv2", "serial", "numba", "h5py"}
     assert not loaded_by(f"import acquire.{room}") & heavy
-
-
-@pytest.mark.parametrize("value", ["0.4", "8.1", "inf", "nan", "five"])
-def test_a_number_of_an_address_is_finite_and_within_its_bounds(value: str) -> None:
-    with pytest.raises(ConfigError, match=r"is not possible; allowed: a number from 0\.5 to 8"):
-        Options(parse_address(f"sim:?fps={value}")).number("fps", minimum=0.5, maximum=8)
-
-
-@pytest.mark.parametrize("value", ["inf", "-inf", "nan", "1e999"])
-def test_a_number_of_an_address_without_bounds_is_finite(value: str) -> None:
-    with pytest.raises(ConfigError, match="is not possible; allowed: a number"):
-        Options(parse_address(f"sim:?drift_x={value}")).number("drift_x")
-
-
-@pytest.mark.parametrize("value", ["0", "9", "2.0", "1e3", "x"])
-def test_a_whole_number_of_an_address_is_within_its_bounds(value: str) -> None:
-    with pytest.raises(ConfigError, match="is not possible; allowed: a whole number from 1 to 8"):
-        Options(parse_address(f"sim:?bits={value}")).integer("bits", minimum=1, maximum=8)
-
-
-def test_what_an_address_gives_is_what_it_says() -> None:
-    options = Options(parse_address("sim:?fps=0.5&bits=8&seed=-3&lockstep=No&mode=b"))
-    assert options.number("fps", minimum=0.5) == 0.5 and options.number("gain", 3.0) == 3.0
-    assert options.integer("bits", maximum=8) == 8 and options.integer("seed") == -3
-    assert not options.flag("lockstep", True) and options.flag("other", True)
-    assert options.choice("mode", ("a", "b"), "a") == "b"
-    options.done()
 
 
 def test_limits_of_opencv_stand_in_the_environment_before_it_is_loaded() -> None:

@@ -70,32 +70,41 @@ def test_memory_is_its_own_and_read_only() -> None:
     assert not burst.clipped.flags.writeable
 
 
-def test_a_gap_restarts_the_burst_and_is_counted() -> None:
-    indices = [0, 1, 2, 5, 6, 7, 8, 9, 10]
-    lost = {5: 2}
-    bursts = list(average_bursts((small(i, lost=lost.get(i, 0)) for i in indices), 4))
-    assert [(b.first_index, b.last_index, b.lost) for b in bursts] == [(5, 8, 2)]
+@pytest.mark.parametrize(
+    ("frames", "n", "bursts"),
+    [
+        pytest.param(
+            [small(i, lost=2 * (i == 5)) for i in (0, 1, 2, 5, 6, 7, 8, 9, 10)],
+            4,
+            [(5, 8, 2)],
+            id="a gap restarts it",
+        ),
+        pytest.param(
+            [small(0), small(1, lost=4), small(2)], 2, [(1, 2, 4)], id="also one without a step in the index"
+        ),
+        pytest.param(
+            [small(0), small(1, damaged=True), small(2), small(3)], 2, [(2, 3, 1)], id="a damaged frame"
+        ),
+        pytest.param(
+            [small(0), small(1), small(4, lost=2), small(5)],
+            2,
+            [(0, 1, 0), (4, 5, 2)],
+            id="a loss is of the next one",
+        ),
+        pytest.param([], 3, [], id="no frames"),
+        pytest.param([], 65536, [], id="the longest"),
+    ],
+)
+def test_what_is_lost_on_the_way(frames: list[Frame], n: int, bursts: list[tuple[int, int, int]]) -> None:
+    found = [(b.first_index, b.last_index, b.lost) for b in average_bursts(frames, n)]
+    assert found == bursts
 
 
-def test_a_loss_told_without_a_step_in_the_index_is_a_gap_too() -> None:
-    bursts = list(average_bursts([small(0), small(1, lost=4), small(2)], 2))
-    assert [(b.first_index, b.lost) for b in bursts] == [(1, 4)]
-
-
-def test_a_damaged_frame_is_left_out() -> None:
-    frames = [small(0), small(1, damaged=True), small(2), small(3)]
-    bursts = list(average_bursts(frames, 2))
-    assert [(b.first_index, b.lost) for b in bursts] == [(2, 1)]
-
-
-def test_loss_between_bursts_belongs_to_the_next_one() -> None:
-    frames = [small(0), small(1), small(4, lost=2), small(5)]
-    assert [b.lost for b in average_bursts(frames, 2)] == [0, 2]
-
-
-def test_frames_older_than_the_command_are_left_out() -> None:
-    bursts = list(average_bursts([small(i) for i in range(6)], 2, not_before=100.25))
-    assert [(b.first_index, b.lost) for b in bursts] == [(3, 0)]
+@pytest.mark.parametrize(("not_before", "first"), [(100.25, [3]), (100.2, [2, 4])])
+def test_frames_older_than_the_command_are_left_out(not_before: float, first: list[int]) -> None:
+    """One of its very instant counts."""
+    bursts = list(average_bursts([small(i) for i in range(6)], 2, not_before=not_before))
+    assert [(b.first_index, b.lost) for b in bursts] == [(index, 0) for index in first]
 
 
 @pytest.mark.parametrize("n", [0, -1, 65537])
@@ -104,15 +113,11 @@ def test_an_impossible_n_is_a_configuration_error(n: int) -> None:
         average_bursts([], n)
 
 
-def test_no_frames_make_no_burst() -> None:
-    with pytest.raises(ConfigError):
-        burst_of([])
-    assert list(average_bursts([], 3)) == []
-
-
 def test_an_exact_list_with_a_gap_is_refused() -> None:
     with pytest.raises(DataError, match="consecutive"):
         burst_of([small(0), small(2)])
+    with pytest.raises(ConfigError):
+        burst_of([])
 
 
 def test_frames_of_another_kind_are_refused_by_name() -> None:
@@ -143,16 +148,9 @@ def _stream(kinds: list[str]) -> Iterator[Frame]:
         yield small(index, lost=2 if kind == "gap" else 0, damaged=kind == "damaged")
 
 
-@pytest.mark.parametrize("bits", [8, 12])
-def test_a_burst_of_one_is_the_frame_itself(bits: int) -> None:
-    top = 2**bits - 1
-    image = frozen(np.array([[1, top], [top - 1, 0]], np.uint8 if bits == 8 else np.uint16))
-    only = Frame(image, 5, 1.5, "device", 2, bits, 1.5)
-    burst = burst_of([only])
-    assert burst.mean is image
-    assert (burst.n, burst.first_index, burst.last_index, burst.t, burst.lost) == (1, 5, 5, 1.5, 2)
-    assert math.isnan(burst.noise)
-    assert burst.clipped.tolist() == [[False, True], [False, False]]
+def test_a_burst_of_one_is_the_frame_itself() -> None:
+    only = small(5, lost=2)
+    assert burst_of([only]).mean is only.image and burst_of([only]).lost == 2
 
 
 def waves(
@@ -189,15 +187,15 @@ def test_a_large_motion_is_never_taken_for_none() -> None:
 
 
 @pytest.mark.parametrize(
-    "image", [np.full((50, 60), 9, np.uint8), np.tile(np.arange(60, dtype=np.uint8), (50, 1))]
+    "image",
+    [
+        np.full((50, 60), 9, np.uint8),
+        np.tile(np.arange(60, dtype=np.uint8), (50, 1)),
+        *(np.zeros(shape, np.uint8) for shape in ((1, 1), (2, 9), (3, 3))),
+    ],
+    ids=["flat", "of columns", "a pixel", "two rows", "tiny"],
 )
 def test_without_contrast_in_both_directions_nothing_is_known(image: NDArray[Any]) -> None:
-    assert math.isnan(motion_between_frames(image, image, 1.0))
-
-
-@pytest.mark.parametrize("shape", [(1, 1), (2, 9), (3, 3)])
-def test_tiny_pictures_tell_nothing(shape: tuple[int, int]) -> None:
-    image = np.zeros(shape, np.uint8)
     assert math.isnan(motion_between_frames(image, image, 1.0))
 
 
@@ -290,15 +288,6 @@ def test_contrast_is_seen_above_the_noise_and_a_tenth_of_a_grey_level_a_pixel(
     square: float, noise: float, seen: bool
 ) -> None:
     assert math.isnan(_solve(square, 0, square, 0.1, 0, 100, noise=noise)) != seen
-
-
-def test_a_frame_of_the_very_instant_of_the_command_counts() -> None:
-    bursts = list(average_bursts([small(i) for i in range(6)], 2, not_before=small(2).t))
-    assert [b.first_index for b in bursts] == [2, 4]
-
-
-def test_the_longest_burst_has_65536_frames() -> None:
-    assert list(average_bursts([], 65536)) == []
 
 
 def test_a_pixel_is_useless_below_a_twentieth_of_the_median_of_the_flat() -> None:

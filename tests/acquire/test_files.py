@@ -121,21 +121,6 @@ def test_a_limit_of_size(tmp_path: Path) -> None:
         read_bytes(path, 99)
 
 
-@pytest.mark.parametrize(
-    ("text", "shown"),
-    [
-        ("plain, µm/m ± 1\n\tnext", "plain, µm/m ± 1\n\tnext"),
-        ("\x1b]0;title\x07\x1b[2J", "\\x1b]0;title\\x07\\x1b[2J"),
-        ("a\rb\x9bc\x7f\x00", "a\\x0db\\x9bc\\x7f\\x00"),
-        ("right\u202eleft\u2028end", "right\\u202eleft\\u2028end"),
-        ("file\udcff", "file\\xff"),
-    ],
-)
-def test_words_of_others_are_harmless(text: str, shown: str) -> None:
-    assert printable(text) == shown
-    printable(text).encode()
-
-
 def test_the_folder_of_a_run_is_its_session(tmp_path: Path) -> None:
     """It also holds mask.png, which is no picture of a test."""
     run, shots = tmp_path / "run", tmp_path / "shots"

@@ -41,10 +41,6 @@ from tests.live.ui.waiting import until
 ROOT = Path(__file__).parents[2]
 
 
-def test_free_bytes_of_what_does_not_exist_yet(tmp_path: Path) -> None:
-    assert free_bytes(tmp_path / "a" / "b" / "session.h5") > 0
-
-
 def test_two_files_of_one_name_are_made_at_once(tmp_path: Path) -> None:
     """As two cameras do: each has its strain.h5, in a folder of its own."""
     for name in ("front", "back"):
@@ -141,28 +137,27 @@ server:/lab /mnt/lab nfs4 rw 0 0
 """
 
 
+@pytest.mark.parametrize("turned", [False, True], ids=["", "in another order"])
+def test_network_shares_are_known_by_the_innermost_mount(tmp_path: Path, turned: bool) -> None:
+    mounts, lines = tmp_path / "mounts", MOUNTS.splitlines(keepends=True)
+    mounts.write_text("".join(reversed(lines)) if turned else MOUNTS)
+    kinds = {
+        "/home/me/runs": None, "/mnt/lab": "nfs4", "/mnt/lab/runs/session.h5": "nfs4", "/mnt/laboratory/runs": None,
+        "/mnt/my share/x": "cifs", "/mnt/lab/local/x": None,
+    }  # fmt: skip
+    assert {path: network_share(path, mounts) for path in kinds} == kinds
+    assert network_share(tmp_path, tmp_path / "nothing") is None, "where nobody tells the mounts"
+
+
 @pytest.mark.parametrize(
-    ("path", "kind"),
-    [
-        ("/home/me/runs", None),
-        ("/mnt/lab", "nfs4"),
-        ("/mnt/lab/runs/session.h5", "nfs4"),
-        ("/mnt/laboratory/runs", None),
-        ("/mnt/my share/x", "cifs"),
-        ("/mnt/lab/local/x", None),
-    ],
+    "kind", ["nfs", "nfs4", "cifs", "smb3", "smbfs", "fuse.sshfs", "9p", "afs", "ceph", "davfs"]
 )
-def test_network_shares_are_known(tmp_path: Path, path: str, kind: str | None) -> None:
+def test_kinds_of_network_shares(tmp_path: Path, kind: str) -> None:
     mounts = tmp_path / "mounts"
-    mounts.write_text(MOUNTS)
-    assert network_share(path, mounts) == kind
-
-
-def test_the_innermost_mount_counts_in_whatever_order_they_stand(tmp_path: Path) -> None:
-    mounts = tmp_path / "mounts"
-    mounts.write_text("".join(reversed(MOUNTS.splitlines(keepends=True))))
-    assert network_share("/mnt/lab/runs/session.h5", mounts) == "nfs4"
-    assert network_share("/mnt/lab/local/x", mounts) is None
+    mounts.write_text(f"short line\nx / {kind} rw 0 0\n")
+    assert network_share("/a", mounts) == kind
+    mounts.write_text(f"x / {kind}x rw 0 0\n")
+    assert network_share("/a", mounts) is None
 
 
 def test_a_flush_is_due_once_something_has_waited_and_not_before() -> None:
@@ -181,16 +176,20 @@ def test_a_flush_is_due_once_something_has_waited_and_not_before() -> None:
     assert timer.left_s() == 0.0
 
 
-def test_where_nobody_tells_the_mounts_nothing_is_known(tmp_path: Path) -> None:
-    assert network_share(tmp_path, tmp_path / "nothing") is None
-
-
 SIZES = [(1, 1), (3, 5), (12, 16), (37, 101), (360, 512), (363, 1025)]
 
 
 def new_stack(file: h5py.File, name: str, shape: tuple[int, ...], dtype: Any, **more: Any) -> h5py.Dataset:
     more = {"chunks": (1, *shape), "fletcher32": True} | more
     return file.create_dataset(name, (0, *shape), dtype, maxshape=(None, *shape), **more)
+
+
+def stored(file: h5py.File, name: str, rows: list[NDArray[Any]], **more: Any) -> h5py.Dataset:
+    """A stack as the library writes it."""
+    dataset = new_stack(file, name, rows[0].shape, rows[0].dtype, **more)
+    dataset.resize(len(rows), axis=0)
+    dataset[:] = rows
+    return dataset
 
 
 def pictures(shape: tuple[int, ...], dtype: Any) -> list[NDArray[Any]]:
@@ -205,12 +204,10 @@ def pictures(shape: tuple[int, ...], dtype: Any) -> list[NDArray[Any]]:
 @pytest.mark.parametrize("shape", SIZES, ids=str)
 def test_the_bytes_are_those_of_hdf5(tmp_path: Path, shape: tuple[int, ...], dtype: Any) -> None:
     with h5py.File(tmp_path / "both.h5", "w") as file:
-        ours, theirs = new_stack(file, "ours", shape, dtype), new_stack(file, "theirs", shape, dtype)
-        stack = PictureStack(ours)
-        for k, picture in enumerate(pictures(shape, dtype)):
+        stored(file, "theirs", pictures(shape, dtype))
+        stack = PictureStack(new_stack(file, "ours", shape, dtype))
+        for picture in pictures(shape, dtype):
             stack.append(picture)
-            theirs.resize(k + 1, axis=0)
-            theirs[k] = picture
     with h5py.File(tmp_path / "both.h5") as file:
         for k, picture in enumerate(pictures(shape, dtype)):
             at = (k, *(0 for _ in shape))
@@ -288,9 +285,7 @@ class _Library:
 def test_what_is_read_is_what_was_written(tmp_path: Path, shape: tuple[int, ...], dtype: Any) -> None:
     compile_loops()
     with h5py.File(tmp_path / "theirs.h5", "w") as file:
-        dataset = new_stack(file, "image", shape, dtype)
-        dataset.resize(4, axis=0)
-        dataset[:] = pictures(shape, dtype)
+        stored(file, "image", pictures(shape, dtype))
     with h5py.File(tmp_path / "theirs.h5") as file:
         reader = PictureReader(library := _Library(file["image"]))
         for k, picture in enumerate(pictures(shape, dtype)):
@@ -301,13 +296,9 @@ def test_what_is_read_is_what_was_written(tmp_path: Path, shape: tuple[int, ...]
 def test_what_is_not_as_we_write_it_is_read_by_the_library(tmp_path: Path) -> None:
     picture = pictures((12, 16), np.uint16)[0]
     with h5py.File(tmp_path / "others.h5", "w") as file:
-        for name, more in (("plain", {"fletcher32": False}), ("small", {"compression": "gzip"})):
-            dataset = new_stack(file, name, (12, 16), np.uint16, **more)
-            dataset.resize(1, axis=0)
-            dataset[0] = picture
-        two = new_stack(file, "two", (12, 16), np.uint16, chunks=(2, 12, 16))
-        two.resize(1, axis=0)
-        two[0] = picture
+        stored(file, "plain", [picture], fletcher32=False)
+        stored(file, "small", [picture], compression="gzip")
+        stored(file, "two", [picture], chunks=(2, 12, 16))
         unfiltered = new_stack(file, "unfiltered", (12, 16), np.uint16)
         unfiltered.resize(2, axis=0)
         unfiltered.id.write_direct_chunk((0, 0, 0), picture.tobytes(), filter_mask=1)
@@ -319,16 +310,21 @@ def test_what_is_not_as_we_write_it_is_read_by_the_library(tmp_path: Path) -> No
             PictureReader(file["unfiltered"])[2]
 
 
-def test_it_is_brought_again_and_again_and_at_the_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path, brought, plain = tmp_path / "a", list[int](), os.fdatasync
+@pytest.fixture
+def brought(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The size of the file each time it is brought to the disk."""
+    sizes, plain = list[int](), os.fdatasync
 
     def bring(file: int) -> None:
-        brought.append(os.fstat(file).st_size)
+        sizes.append(os.fstat(file).st_size)
         plain(file)
 
     monkeypatch.setattr(os, "fdatasync", bring)
+    return sizes
+
+
+def test_it_is_brought_again_and_again_and_at_the_end(tmp_path: Path, brought: list[int]) -> None:
+    path = tmp_path / "a"
     path.write_bytes(b"1")
     to_disk = DiskSync(path, every_s=0.02)
     until(lambda: len(brought) > 2)
@@ -340,14 +336,10 @@ def test_it_is_brought_again_and_again_and_at_the_end(
     assert len(brought) == count and to_disk.failure is None
 
 
-def test_what_grows_fast_is_brought_sooner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path, brought, plain = tmp_path / "a", list[int](), os.fdatasync
-
-    def bring(file: int) -> None:
-        brought.append(os.fstat(file).st_size)
-        plain(file)
-
-    monkeypatch.setattr(os, "fdatasync", bring)
+def test_what_grows_fast_is_brought_sooner(
+    tmp_path: Path, brought: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a"
     monkeypatch.setattr(pace_module, "SYNC_BYTES", 1000)
     path.write_bytes(b"1")
     to_disk = DiskSync(path, every_s=1e6)
@@ -383,13 +375,9 @@ def test_a_disk_that_fails_ends_the_recording_and_one_that_cannot_is_let_be(
     session = writer(tmp_path / "session.h5")
     monkeypatch.setattr(os, "fdatasync", refuse)
 
-    def failed() -> bool:
-        session.write_frame(frame(0))
-        return False
-
     if fails:
         with pytest.raises(DataError, match=r"session\.h5: "):
-            until(failed)
+            until(lambda: session.write_frame(frame(0)) < 0)
     else:
         until(lambda: tried)
         for number in range(5):
@@ -410,17 +398,6 @@ def test_the_nearest_folder_that_is_there_counts(tmp_path: Path, monkeypatch: py
         assert free_bytes(tmp_path / name) == 7
     assert free_bytes("/no such folder/a") == 7
     assert asked == [tmp_path / "there.h5", tmp_path, tmp_path, Path("/")]
-
-
-@pytest.mark.parametrize(
-    "kind", ["nfs", "nfs4", "cifs", "smb3", "smbfs", "fuse.sshfs", "9p", "afs", "ceph", "davfs"]
-)
-def test_kinds_of_network_shares(tmp_path: Path, kind: str) -> None:
-    mounts = tmp_path / "mounts"
-    mounts.write_text(f"short line\nx / {kind} rw 0 0\n")
-    assert network_share("/a", mounts) == kind
-    mounts.write_text(f"x / {kind}x rw 0 0\n")
-    assert network_share("/a", mounts) is None
 
 
 def test_what_is_recorded_is_on_the_disk_within_a_second() -> None:

@@ -9,7 +9,54 @@ from typing import Any
 import pytest
 
 from acquire import opening
-from acquire.opening import LOOK_S, Reopening, close_within
+from acquire.opening import LOOK_S, Opening, Reopening, close_within
+
+
+class Slow:
+    """Opens when it is let, and tells what was closed."""
+
+    def __init__(self, error: Exception | None = None) -> None:
+        self.let, self.closed, self._error = threading.Event(), threading.Event(), error
+
+    def __call__(self) -> str:
+        self.let.wait(60)
+        if self._error is not None:
+            raise self._error
+        return "open"
+
+    def opening(self) -> Opening[str]:
+        return Opening(self, lambda opened: self.closed.set())
+
+
+def test_what_opens_before_it_is_given_up_is_closed_by_that() -> None:
+    slow = Slow()
+    slow.let.set()
+    opening = slow.opening()
+    assert opening.done(60) and not slow.closed.is_set()
+    opening.abandon()
+    assert slow.closed.is_set()
+    slow.closed.clear()
+    opening.abandon()
+    assert not slow.closed.is_set()
+
+
+def test_what_is_taken_is_not_closed() -> None:
+    slow = Slow()
+    slow.let.set()
+    opening = slow.opening()
+    assert opening.done(60) and opening.take() == "open"
+    opening.abandon()
+    assert not slow.closed.is_set()
+
+
+def test_an_error_comes_out_where_it_is_taken() -> None:
+    slow = Slow(OSError("gone"))
+    opening = slow.opening()
+    assert not opening.done(0.0)
+    slow.let.set()
+    assert opening.done(60)
+    with pytest.raises(OSError, match="gone"):
+        opening.take()
 
 
 def opened_again(again: Reopening[str], looks: int = 600) -> str | None:
@@ -66,19 +113,18 @@ def test_it_is_tried_twice_a_second_and_no_look_waits_long() -> None:
 
 
 def test_what_was_opened_too_late_is_closed() -> None:
-    go, begun, closed = threading.Event(), threading.Event(), threading.Event()
+    slow, begun = Slow(), threading.Event()
 
     def attempt() -> str:
         begun.set()
-        go.wait(60)
-        return "open"
+        return slow()
 
-    again = Reopening(attempt, lambda opened: closed.set(), (OSError,), lambda seconds: None)
+    again = Reopening(attempt, lambda opened: slow.closed.set(), (OSError,), lambda seconds: None)
     assert again.look() is None and begun.wait(60)
     again.abandon()
-    assert not closed.is_set()
-    go.set()
-    assert closed.wait(60)
+    assert not slow.closed.is_set()
+    slow.let.set()
+    assert slow.closed.wait(60)
 
 
 def test_a_close_that_blocks_is_left_to_its_thread() -> None:

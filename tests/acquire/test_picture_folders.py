@@ -162,20 +162,12 @@ def film(path: Path, code: str, frames: int = 6) -> Path:
 @pytest.mark.parametrize(
     ("name", "code", "inter_frame"),
     [
-        ("a.avi", "MJPG", False),
-        ("a.mkv", "MJPG", False),
-        ("a.avi", "FFV1", False),
-        ("a.mkv", "FFV1", False),
-        ("a.avi", "HFYU", False),
-        ("a.avi", "I420", False),
-        ("a.avi", "PNG ", False),
-        ("a.avi", "XVID", True),
-        ("a.mp4", "mp4v", True),
-        ("a.avi", "MPEG", True),
-        ("a.webm", "VP80", True),
+        *((name, code, False) for name in ("a.avi", "a.mkv") for code in ("MJPG", "FFV1")),
+        *(("a.avi", code, False) for code in ("HFYU", "I420", "PNG ")),
+        ("a.avi", "XVID", True), ("a.mp4", "mp4v", True), ("a.avi", "MPEG", True), ("a.webm", "VP80", True),
         ("a.mkv", "VP90", True),
     ],
-)
+)  # fmt: skip
 def test_which_codecs_hold_motion_back(tmp_path: Path, name: str, code: str, inter_frame: bool) -> None:
     with open_camera(f"video:{film(tmp_path / name, code)}") as camera:
         assert camera.info.controls["inter_frame"] is inter_frame

@@ -55,7 +55,7 @@ def test_mean_and_mask_have_the_bits_of_an_averaged_burst(n: int, bits: int, gla
 
 @pytest.mark.parametrize(
     ("n", "bits", "bytes_a_pixel"),
-    [(2, 8, 2), (257, 8, 2), (258, 8, 4), (16, 12, 2), (17, 12, 4), (2, 16, 4)],
+    [(2, 8, 2), (257, 8, 2), (258, 8, 4), (16, 12, 2), (17, 12, 4), (2, 16, 4), (2, 15, 2), (3, 15, 4)],
 )
 def test_what_waits_is_the_sum_and_the_bits_of_clipped_pixels(n: int, bits: int, bytes_a_pixel: int) -> None:
     pixels = SHAPE[0] * SHAPE[1]
@@ -84,13 +84,6 @@ def test_a_gap_begins_the_sum_anew_and_is_counted() -> None:
     assert [(burst.first_index, burst.last_index, burst.n) for burst in made] == [(2, 3, 2)]
     brief = made[0].without_pictures()
     assert (brief.nbytes, brief.first_index, brief.lost) == (0, 2, 0)
-
-
-@pytest.mark.parametrize(
-    ("bits", "n", "itemsize"), [(1, 65535, 2), (1, 65536, 4), (16, 1, 2), (15, 2, 2), (15, 3, 4)]
-)
-def test_a_sum_takes_two_bytes_up_to_65535(bits: int, n: int, itemsize: int) -> None:
-    assert sum_kind(bits, n).itemsize == itemsize
 
 
 SMALL = (6, 7)

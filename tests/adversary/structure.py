@@ -29,43 +29,12 @@ TYPES: dict[str, Any] = {
     "enumeration": h5py.enum_dtype({"a": 0, "b": 1}, basetype="u1"),
 }
 VALUES = (
-    0,
-    1,
-    -1,
-    2,
-    255,
-    256,
-    65_535,
-    2**31,
-    -(2**31),
-    2**62,
-    -(2**63),
-    1e300,
-    -1e300,
-    1e12,
-    np.inf,
-    -np.inf,
+    0, 1, -1, 2, 255, 256, 65_535, 2**31, -(2**31), 2**62, -(2**63), 1e300, -1e300, 1e12, np.inf, -np.inf,
     np.nan,
-)
+)  # fmt: skip
 ODD_JSON = (
-    None,
-    True,
-    -1,
-    0,
-    1,
-    3,
-    17,
-    2**70,
-    1.5,
-    1e999,
-    "",
-    "x",
-    "\x1b[2J",
-    [],
-    [1, "a"],
-    {},
-    {"a": {"b": []}},
-)
+    None, True, -1, 0, 1, 3, 17, 2**70, 1.5, 1e999, "", "x", "\x1b[2J", [], [1, "a"], {}, {"a": {"b": []}},
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,15 +102,9 @@ def relength(p: Place) -> None:
 def reshape(p: Place) -> None:
     values = np.asarray(p.item[()])
     shapes = [
-        (),
-        (1,),
-        (values.size,),
-        (1, values.size),
-        (values.size, 1),
-        (1, 1, 1, values.size),
-        (0,),
+        (), (1,), (values.size,), (1, values.size), (values.size, 1), (1, 1, 1, values.size), (0,),
         (0, 0, 0),
-    ]
+    ]  # fmt: skip
     shape = p.rng.choice(shapes)
     p.put(np.resize(values, shape) if values.size else np.zeros(shape, values.dtype))
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis import PhaseKernel
-from analysis.evaluate import REGION, AreaGauge, AreaStrain, ExtensionGauge, GaugeSet, load_axis
+from analysis.evaluate import AreaStrain
 from analysis.evaluate.affine import Places, covariance_of
 from analysis.field import CommonError, Roi, StrainField, ZoiGrid, profile
 from tests.accuracy.truth import Speckle
@@ -208,24 +208,3 @@ def test_shear_of_a_finite_strain() -> None:
     expected = g["du_dy"] + g["dv_dx"] + g["du_dx"] * g["du_dy"] + g["dv_dx"] * g["dv_dy"]
     assert area.value("gamma_xy") == pytest.approx(expected, rel=1e-6)
     assert area.value("exy") == pytest.approx(expected / 2, rel=1e-6)
-
-
-def test_strips_and_areas_are_gauges() -> None:
-    field = affine(grid(12, 7))
-    assert GaugeSet(REGION).read(field)["extension_y"].value == pytest.approx(1e-3, rel=1e-4)
-    assert GaugeSet(REGION).read(field)["extension_x"].value == pytest.approx(-3e-4, rel=1e-3)
-    box = (10.0, 13.0, 30.0, 49.0)
-    assert ExtensionGauge("s", box, "y").measure(field).value == pytest.approx(1e-3, rel=1e-4)
-    assert AreaGauge("a", box).measure(field).value == pytest.approx(1e-3, abs=1e-12)
-    assert AreaGauge("a", box, statistic="mean").measure(field).value == pytest.approx(1e-3, abs=1e-12)
-
-
-def test_few_pictures_show_the_axis_where_the_ratio_is_clear() -> None:
-    def axis(exx: float, eyy: float, sigma: float = 1e-6) -> tuple[str, bool, bool]:
-        found = load_axis(np.array([exx]), np.array([eyy]), np.zeros(1), sigma=np.array([sigma]))
-        return found.axis, found.found, found.assumed
-
-    assert axis(24_812e-6, -7_236e-6) == ("x", True, False)
-    assert axis(-3e-4, 1e-3) == ("y", True, False)
-    assert axis(1.2e-3, -1e-3) == ("y", False, True)
-    assert axis(24e-3, -7e-3, sigma=2e-3) == ("y", False, True)

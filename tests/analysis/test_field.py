@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -46,21 +46,6 @@ def test_impossible_regions_are_refused(roi: tuple) -> None:
         Roi(*roi)
 
 
-def test_mask_counts_window_weight_not_pixels() -> None:
-    mask = np.ones((64, 64), bool)
-    mask[:, :3] = False  # the flank of the Gaussian: 9 % of the pixels, under 1 % of the weight
-    grid = ZoiGrid.cover(Roi(0, 0, 64, 64), 32, 32, mask)
-    assert grid.active.all()
-    assert not ZoiGrid.cover(Roi(0, 0, 64, 64), 32, 32, mask, window="uniform").active[:, 0].any()
-    mask[:, :10] = False
-    assert not ZoiGrid.cover(Roi(0, 0, 64, 64), 32, 32, mask).active[:, 0].any()
-
-
-def test_mask_must_reach_over_the_region() -> None:
-    with pytest.raises(ValueError, match="mask"):
-        ZoiGrid.cover(Roi(0, 0, 64, 64), 32, 32, np.ones((60, 64), bool))
-
-
 def test_subset_keeps_shape_and_only_takes_away() -> None:
     grid = ZoiGrid.cover(Roi(0, 0, 100, 100), 20, 20)
     half = grid.subset(every=2)
@@ -90,6 +75,7 @@ def test_small_strain_is_the_symmetric_part() -> None:
     assert np.allclose(field.exx, 0.01) and np.allclose(field.eyy, -0.003)
     assert np.allclose(field.exy, 0.003) and np.allclose(field.gamma_xy, 0.006)
     assert np.allclose(field.omega, -0.001)
+    assert np.array_equal(field.principal, field.strain("small").principal)
 
 
 @pytest.mark.parametrize("measure", ["engineering", "green", "hencky"])
@@ -117,14 +103,9 @@ def test_the_engineering_strain_is_that_of_an_extensometer() -> None:
     assert np.allclose(strain.exy, (np.pi / 2 - angle) / 2)
 
 
-def test_known_values_of_the_measures() -> None:
-    field = uniform(du_dx=0.1)
-    assert np.allclose(field.strain("green").exx, 0.105)
-    assert np.allclose(field.strain("hencky").exx, np.log(1.1))
-    first, second, angle = field.principal
-    assert np.allclose(first, 0.1) and np.allclose(second, 0) and np.allclose(angle, 0)
+def test_an_unknown_measure_is_refused() -> None:
     with pytest.raises(ValueError, match="unknown strain measure"):
-        field.strain("true")  # type: ignore[arg-type]
+        uniform().strain("true")  # type: ignore[arg-type]
 
 
 def test_mean_leaves_out_rejected_zois() -> None:
@@ -195,12 +176,6 @@ def test_the_parts_of_an_uncertainty_add_up() -> None:
         assert np.allclose(whole**2, first**2 + second**2)
 
 
-def test_a_field_cannot_be_changed() -> None:
-    field = uniform()
-    with pytest.raises(FrozenInstanceError):
-        field.noise = 1.0  # type: ignore[misc]
-
-
 def test_the_numbers_of_a_status_are_those_in_files() -> None:
     names = [
         "OK",
@@ -242,12 +217,19 @@ def test_a_field_and_a_grid_are_described_in_one_line() -> None:
     assert repr(grid) == "<ZoiGrid 29 x 39 ZOIs of 32 px, 16 px apart, in x,y,w,h = 4,8,640,480; 1131 active>"
 
 
-@pytest.mark.parametrize("window", WINDOWS)
-@pytest.mark.parametrize("size", [32, 33])
-def test_windows_are_symmetric_positive_and_at_most_one(window, size: int) -> None:
-    line = profile(window, size)
-    assert line.shape == (size,)
-    assert np.allclose(line, line[::-1]) and line.min() >= 0 and 0.9 < line.max() <= 1
+@pytest.mark.parametrize("size", [40, 33])
+def test_the_windows(size: int) -> None:
+    x = np.abs(np.arange(size) - (size - 1) / 2)
+    # Tukey's has two cosine flanks that take 30 % of the side together.
+    flat, flank = 0.35 * size, 0.15 * size
+    expected = {
+        "gaussian": np.exp(-(x**2) / 2 / (size / 6) ** 2),
+        "uniform": np.ones(size),
+        "bi-triangular": 1 - x / ((size + 1) / 2),
+        "tukey": np.where(x <= flat, 1, 0.5 + 0.5 * np.cos(np.pi * (x - flat) / flank)),
+    }
+    for window in WINDOWS:
+        assert profile(window, size) == pytest.approx(expected[window]), window
 
 
 def test_an_unknown_window_is_refused_with_the_known_ones() -> None:

@@ -85,6 +85,7 @@ def test_a_common_error_is_part_of_what_the_later_picture_adds() -> None:
     field = replace(StrainField.from_values(GRID, {}, 4e-3), common=common)
     for part in ("all", "current"):
         assert field.sigma("u", part) == pytest.approx(np.hypot(4e-3, 6e-3))  # type: ignore[arg-type]
+    assert field.sigma("u", "reference") == pytest.approx(replace(field, common=None).sigma("u", "reference"))
     assert field.mean("u")[1] == pytest.approx(np.hypot(replace(field, common=None).mean("u")[1], 6e-3))
 
 
@@ -150,7 +151,7 @@ def test_zois_of_a_part_that_are_off_have_no_value() -> None:
     assert own.roi == Roi(20 + 32, 40 + 16, 64, 48) and own.shape == (2, 3)
     common = CommonError(np.arange(6.0 * 15).reshape(1, 6, *GRID.shape), np.eye(1))
     field = replace(
-        StrainField.from_values(GRID, {"u": 1.0}, 1e-3),
+        StrainField.from_values(GRID, {"u": np.arange(15.0).reshape(GRID.shape)}, 1e-3),
         blur=np.ones((2, *GRID.shape), np.float32),
         common=common,
     )
@@ -160,4 +161,5 @@ def test_zois_of_a_part_that_are_off_have_no_value() -> None:
     assert np.array_equal(part.common.variance("u"), common.variance("u")[1:3, 2:5])
     for values in (part.u, part.sigma_u, part.residual, part.blur[0], part.blur[1]):
         assert np.array_equal(np.isfinite(values), off.active)
-    assert part.status[0, 2] == Status.NOT_MEASURED and part.n_valid == 5
+    assert np.array_equal(part_of(field, block).u, [[7, 8, 9], [12, 13, 14]])
+    assert part.status[0, 2] == Status.NOT_MEASURED and part.n_valid == 5 and part.refused == {}

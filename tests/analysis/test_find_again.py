@@ -55,6 +55,16 @@ def test_a_mirrored_picture_and_a_blank_one_share_no_motion() -> None:
         assert not list(feature_motions(first, np.ascontiguousarray(other), WHOLE))
 
 
+def test_what_lies_beside_the_region_moves_nothing() -> None:
+    """The left part moves, and only the right one is asked for."""
+    reference = finding.picture(SPECKLE.at(*pixels(SHAPE)), 0).astype(np.float32)
+    later, half = reference.copy(), SHAPE[1] // 2
+    later[:, :half] = np.roll(reference, 12, axis=1)[:, :half]
+    region = Roi(half + 8, 0, SHAPE[1] - half - 8, SHAPE[0])
+    motions = [m[:, 2] for m in feature_motions(reference, later, region)]
+    assert motions and all(np.abs(m).max() < 1 for m in motions)
+
+
 @pytest.mark.parametrize("leap_px", [10.0, 60.0])
 def test_a_block_that_leaps_is_found_in_the_same_picture(leap_px: float) -> None:
     found = finding.leaping(leap_px, 32, 16)
@@ -103,11 +113,6 @@ def test_the_period_of_each_zoi_is_known() -> None:
     random, regular = (x < -90 - 24) & (y < -70 - 24), (x > -90 + 24) | (y > -70 + 24)
     assert np.isinf(period[random]).all()
     assert np.allclose(period[regular], PERIOD, atol=0.02)
-
-
-def test_random_patterns_do_not_repeat() -> None:
-    picture = finding.picture(SPECKLE.at(*pixels(SHAPE)), 0)
-    assert np.isinf(PhaseKernel(picture, finding.grid(32, 32), noise=NOISE_GL).period).all()
 
 
 def test_side_peaks_are_those_of_the_lattice() -> None:
@@ -187,12 +192,6 @@ def test_a_mean_over_a_map_that_lost_a_block_stands_for_the_rest() -> None:
 ])  # fmt: skip
 def test_it_stands_for_all_where_no_block_was_lost(field: StrainField) -> None:
     assert area_share(field) == 1.0
-
-
-def test_a_small_area_has_small_blocks() -> None:
-    few = np.zeros(GRID.shape, bool)
-    few[2:4, 2:4] = True
-    assert area_share(with_lost(np.s_[2:3], np.s_[2:3]), few) == 0.75
 
 
 def test_a_block_is_what_lies_side_by_side() -> None:

@@ -10,19 +10,11 @@ from analysis.field import profile
 from analysis.field.grid import WINDOWS, Window
 from analysis.fit.assembly import RUN, ExpectedNoise, clipped_share, expect, scale, weigh, weigh_blur
 from analysis.fit.kernel_args import (
-    CONVERGED,
-    LEFT_IMAGE,
     NUISANCES,
-    RUNNING,
-    OutArgs,
-    PooledError,
-    ReferenceArgs,
-    VerdictArgs,
 )
 from analysis.fit.noise_bias import noise_bias
 from analysis.fit.shapes import shapes_of
-from analysis.fit.validity import has_pattern
-from analysis.fit.verdict import judge, squared_stretch
+from analysis.fit.verdict import squared_stretch
 from analysis.kernel.images import as_model
 from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.solve import Solution
@@ -233,100 +225,6 @@ def test_the_estimator_by_phases_has_the_overlap_alone() -> None:
     assert kernel.measure(image, noise=1.0).mean("exx")[1] > 0
 
 
-def verdict(
-    left=1.0, expected=1.0, signal=900.0, gain=1.0, state=CONVERGED, known=True, bending=0.0, unit=1e-4, values=None,
-    limit=0.05, beyond=1.0, common=None,
-) -> int:  # fmt: skip
-    one, out = np.ones(1), np.zeros(1, np.uint8)
-    found = OutArgs.starting(np.zeros((1, 6)) if values is None else values)
-    found.state[0], found.bending[0], found.nuisance[0, 0] = state, bending, gain
-    zoi, rule = (
-        ReferenceArgs(
-            one * signal,
-            one * 350,
-            np.full((1, 2), unit),
-            one * np.sqrt(unit * beyond),
-            np.ones(2),
-            1.5,
-            1.0,
-            one * 1e3,
-            0.5,
-        ),
-        VerdictArgs(known, np.array([1.5, 0.5]), 5.0, limit, 4.0, 6.0),
-    )
-    judge(found, one * left, one * expected, common or PooledError.none(1), zoi, rule, out)
-    return int(out[0])
-
-
-def test_verdicts() -> None:
-    assert verdict() == Status.OK
-    assert verdict(left=8.0) == Status.POOR_MATCH
-    assert verdict(left=4.5, known=False) == Status.OK
-    assert verdict(gain=0.05) == Status.POOR_MATCH
-    assert verdict(state=RUNNING) == Status.NOT_CONVERGED
-    assert verdict(left=800.0) == Status.LOST
-    assert verdict(left=800.0, state=LEFT_IMAGE) == Status.OUTSIDE
-    assert verdict(left=np.nan) != Status.OK
-
-
-@pytest.mark.parametrize(
-    ("bending", "unit", "uneven"),
-    [
-        (0.002, 1e-4, False),
-        (0.02, 1e-4, True),
-        (0.048**2, 1e-8, False),
-        (0.052**2, 1e-8, True),
-        (np.nan, 1e-4, True),
-    ],
-)
-def test_bending_beyond_its_noise_and_the_limit(bending: float, unit: float, uneven: bool) -> None:
-    assert (verdict(bending=bending, unit=unit) == Status.UNEVEN) == uneven
-    assert verdict(bending=bending, unit=unit, state=RUNNING) == Status.NOT_CONVERGED
-    if np.isfinite(bending):
-        strained = np.array([[0.0, 0.3, 0.0, 0.0, 0.0, 0.0]])
-        assert verdict(bending=bending, unit=unit, values=strained) == Status.OK
-        assert verdict(bending=bending, unit=unit, limit=np.inf) == Status.OK
-
-
-def test_bending_counts_in_the_contrast_of_the_picture_and_beside_its_like() -> None:
-    """Noise of 1 GL makes 1.5 * 2 * unit of it, 1 of its deviations 1.41 * unit."""
-    unit = 1e-3
-    noise, spread = 3 * unit, 2**0.5 * unit
-    edge = noise + 6 * spread + 0.05**2
-    assert verdict(bending=0.98 * edge, unit=unit) == Status.OK
-    assert verdict(bending=1.02 * edge, unit=unit) == Status.UNEVEN
-    dim = 4 * (noise + 6 * spread) + 0.05**2  # at half of the contrast
-    assert verdict(bending=0.98 * dim, unit=unit, gain=0.5) == Status.OK
-    assert verdict(bending=1.02 * dim, unit=unit, gain=0.5) == Status.UNEVEN
-    like = PooledError.none(1)._replace(bent=1.5)
-    alike = 1.5 * (noise + 6 * spread) + 0.05**2
-    assert verdict(bending=0.98 * alike, unit=unit, common=like) == Status.OK
-    assert verdict(bending=1.02 * alike, unit=unit, common=like) == Status.UNEVEN
-    # No more of what all bend is forgiven than the limit itself.
-    most, all_bend = 1 + 0.05**2 / noise, PooledError.none(1)._replace(bent=50.0)
-    beyond = most * (noise + 6 * spread) + 0.05**2
-    assert verdict(bending=0.98 * beyond, unit=unit, common=all_bend) == Status.OK
-    assert verdict(bending=1.02 * beyond, unit=unit, common=all_bend) == Status.UNEVEN
-
-
-def test_a_little_in_both_residual_and_bending_is_too_much() -> None:
-    half_left, more_left, half_bent, more_bent = 2.0, 2.6, 0.0015, 0.0018
-    assert verdict(left=half_left) == verdict(bending=more_bent, unit=1e-8) == Status.OK
-    assert verdict(left=half_left, bending=0.001, unit=1e-8) == Status.OK
-    assert verdict(left=half_left, bending=more_bent, unit=1e-8) == Status.UNEVEN
-    assert verdict(left=more_left, bending=half_bent, unit=1e-8) == Status.POOR_MATCH
-    assert verdict(left=half_left, bending=more_bent, unit=1e-8, limit=np.inf) == Status.OK
-    assert verdict(left=4.5, bending=more_bent, unit=1e-8, known=False) == Status.OK
-    assert verdict(left=6.5, bending=more_bent, unit=1e-8, known=False) != Status.OK
-
-
-def test_a_centre_beyond_the_pattern_shows_in_its_uncertainty() -> None:
-    doubtful = {"left": 1.0, "bending": 0.0015, "unit": 1e-8}
-    assert verdict(**doubtful, beyond=3.9) == Status.OK
-    assert verdict(**doubtful, beyond=8.0) == Status.UNEVEN
-    assert verdict(beyond=8.0) == Status.OK
-
-
 def test_noise_is_expected_with_the_gain_within_its_limits_and_not_below_rounding() -> None:
     gain, out = np.array([[2.0, 0], [9.0, 0], [0.1, 0], [np.nan, 0]])[:, 0], ExpectedNoise(*np.empty((2, 4)))
     expect(gain, (1.0, 1.0), np.full(4, 3.0), np.full(4, 0.01), 0.08, out)
@@ -348,11 +246,6 @@ def test_the_stretch_of_a_strain_is_free_of_rotation() -> None:
     c, s, stretched = np.cos(0.5), np.sin(0.5), 1.1
     turned = np.array([[3.0, stretched * c - 1, -s, -2.0, stretched * s, c - 1]])
     assert squared_stretch(turned, 0, 5.0) == pytest.approx((5.0 * (stretched**2 - 1) / 2) ** 2)
-
-
-def test_a_zoi_of_noise_has_no_pattern() -> None:
-    energy, variance = np.array([[100.0, 100.0], [0.3, 0.3], [100.0, 0.3]]), np.full((3, 2), 1e-4)
-    assert has_pattern(energy, variance, 1.0, 0.2).tolist() == [True, False, False]
 
 
 @pytest.mark.slow

@@ -186,8 +186,3 @@ def test_a_short_hold_says_what_is_lacking() -> None:
     found = Creep.of(crept(LAWS["steady"], 5e-6, 4, n=18))
     assert found is not None and not found.rate.known
     assert found.rate.why == "12 bursts in the last half of the hold are needed"
-
-
-def test_a_strain_that_does_not_move_clearly_has_no_times() -> None:
-    found = Creep.of(crept(lambda t: 1e-9 * t, 2e-5, 5))
-    assert found is None or not found.times

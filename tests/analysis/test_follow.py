@@ -7,7 +7,7 @@ import pytest
 
 from analysis import PhaseKernel, Roi, Status, ZoiGrid
 from analysis.field.grid import Motion
-from analysis.follow.prediction import AGE_MOVED, MAX_AGE, motion_after
+from analysis.follow.prediction import MAX_AGE, motion_after
 from analysis.follow.search import Blocks, find_blocks, global_shift, search
 from tests.analysis.speckle import SHAPE, picture
 
@@ -58,15 +58,6 @@ def test_a_lost_zoi_is_forgotten_and_begins_anew() -> None:
     assert after.age.tolist() == [1, 10]
     assert not after.change[0].any() and not after.ahead[0].any()
     assert np.array_equal(after.change[1], np.ones(6))
-
-
-def test_news_beyond_noise_reset_the_age() -> None:
-    motion = Motion(np.arange(1), np.zeros((1, 6)), np.zeros((1, 6)), np.full(1, 9, np.uint8))
-    values = np.zeros((1, 6))
-    values[0, 5] = 10 * SIGMA / LEVER
-    after = motion_after(motion, values, np.zeros((1, 6)), np.full(1, SIGMA), LEVER)
-    assert after.age[0] == AGE_MOVED
-    assert after.ahead[0, 5] == after.change[0, 5] == pytest.approx(0.4 * values[0, 5])
 
 
 def test_it_is_of_the_same_zois_or_of_none() -> None:

@@ -179,7 +179,6 @@ def test_a_point_is_one_zoi_and_what_is_off_is_none() -> None:
     assert np.argwhere(ZoiGauge("p", (40.0, 66.0)).zois(GRID)[0]).tolist() == [[3, 2]]
     off = GRID.subset(active=np.indices(GRID.shape)[0] > 1)
     assert AreaGauge("a", (0.0, 0.0, 200.0, 64.0)).zois(off)[0].sum() == 2 * 11
-    assert ZoiGauge.of("p", {"at": (1, 2), "value": None}, "x") == ZoiGauge("p", (1, 2), "exx")
 
 
 def test_drawn_at_the_rim_of_the_picture_or_without_a_way() -> None:
@@ -190,23 +189,13 @@ def test_drawn_at_the_rim_of_the_picture_or_without_a_way() -> None:
         assert (lines[:, 1].min(), lines[:, 1].max()) == pytest.approx((9 - 16, 9 + 16), abs=0.2)
 
 
-@pytest.mark.parametrize(
-    ("kind", "arguments"),
-    [
-        (CircleGauge, {"centre": (9, 9), "radius_px": 0.0}),
-        (StripGauge, {"start": (9, 9), "end": (9, 9)}),
-        (StripGauge, {"start": (9, 9), "end": (19, 9), "width_px": 0.0}),
-        (TransverseGauge, {"box": (0, 0, 5, 0)}),
-    ],
-)
-def test_gauges_without_a_size_are_refused(kind: Any, arguments: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match=r"gauge g: (the radius|the width|the two ends|width and height)"):
-        kind("g", **arguments)
-
-
 @pytest.mark.parametrize(("axis", "value"), [("x", "exx"), ("y", "eyy")])
 def test_a_gauge_is_along_the_load_where_nothing_else_is_given(axis: Axis, value: str) -> None:
     box: dict[str, Any] = {"box": (1, 2, 3, 4)}
+    across: Axis = "y" if axis == "x" else "x"
+    assert TransverseGauge.of("g", box, axis) == TransverseGauge("g", (1, 2, 3, 4), across)
+    assert ZoiGauge.of("g", {"at": (1, 2), "value": "exy"}, axis) == ZoiGauge("g", (1, 2), "exy")
+    assert ZoiGauge.of("g", {"at": (1, 2), "value": None}, axis) == ZoiGauge("g", (1, 2), value)
     assert ExtensionGauge.of("g", box, axis) == ExtensionGauge("g", (1, 2, 3, 4), axis)
     assert AreaGauge.of("g", box, axis) == AreaGauge("g", (1, 2, 3, 4), value=value)
     assert CircleGauge.of("g", {"centre": (9, 9), "radius_px": 5.0}, axis).value == value  # type: ignore[attr-defined]

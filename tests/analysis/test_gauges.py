@@ -115,6 +115,10 @@ def test_a_gauge_beside_the_grid_names_where_the_grid_is() -> None:
         (lambda: LineGauge("a", (3, 3), (3, 3)), "one point"),
         (lambda: LineGauge("a", (3, 3), (3, 9), 0), "radius must be positive"),
         (lambda: TransverseGauge("a", (0, 0, 0, 5)), "must be positive"),
+        (lambda: TransverseGauge("a", (0, 0, 5, 0)), "must be positive"),
+        (lambda: CircleGauge("a", (9, 9), 0.0), "gauge a: the radius"),
+        (lambda: StripGauge("a", (9, 9), (9, 9)), "gauge a: the two ends"),
+        (lambda: StripGauge("a", (9, 9), (19, 9), 0.0), "gauge a: the width"),
         (lambda: TransverseGauge("a", (0, 0, 5, 5), "z"), "along is x or y"),  # type: ignore[arg-type]
     ],
 )
@@ -189,15 +193,6 @@ class TestEveryKind:
         assert kind.gesture in ("click", "line", "box")
 
 
-def test_what_follows_from_the_axis_of_the_load() -> None:
-    for axis, value, along in (("y", "eyy", "x"), ("x", "exx", "y")):
-        assert ZoiGauge.of("g", {"at": (1, 2)}, axis) == ZoiGauge("g", (1, 2), value)
-        assert TransverseGauge.of("g", {"box": (1, 2, 3, 4)}, axis) == TransverseGauge(
-            "g", (1, 2, 3, 4), along
-        )
-    assert ZoiGauge.of("g", {"at": (1, 2), "value": "exy"}, "y") == ZoiGauge("g", (1, 2), "exy")
-
-
 def test_a_box_is_drawn_in_whole_px_within_the_picture() -> None:
     assert AreaGauge.from_handles([(30.4, 20.2), (-3.0, 10.6)]) == {"box": (0, 11, 30, 9)}
     assert AreaGauge.from_handles([(5, 5), (5, 5)]) == {"box": (5, 5, 1, 1)}
@@ -218,3 +213,19 @@ def test_the_ends_of_a_strip_are_thirds_across_the_load_and_sixths_along_it(alon
         np.testing.assert_array_equal(first, inside & (place >= 20) & (place <= 20 + end))
         np.testing.assert_array_equal(last, inside & (place >= 140 - end) & (place <= 140))
     assert ExtensionGauge("e", box, along).length == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize(("statistic", "value"), [("smallest", -3e-3), ("largest", 2e-3), ("mean", 0.0)])
+def test_the_extremes_of_an_area(statistic: str, value: float) -> None:
+    """Where a ZOI has no value it is neither."""
+    grid = ZoiGrid.cover(Roi(0, 0, 96, 64), 32, 16)
+    strain, status = np.zeros(grid.shape), np.zeros(grid.shape, int)
+    strain[0, 1], strain[1, 2], strain[2, 0], strain[2, 4] = -3e-3, 2e-3, 1e-3, 9.0
+    status[2, 4] = Status.POOR_MATCH
+    sigmas = np.arange(15.0).reshape(grid.shape) * 1e-6 + 1e-6
+    field = StrainField.from_values(grid, {"du_dx": strain}, sigmas, status)
+    gauge = AreaGauge("", (0, 0, 96, 64), value="exx", statistic=statistic)  # type: ignore[arg-type]
+    found = gauge.measure(field)
+    assert found.value == pytest.approx(value, abs=1e-12)
+    place = {"smallest": (0, 1), "largest": (1, 2)}.get(statistic)
+    assert place is None or found.sigma == pytest.approx(field.sigma("exx")[place])

@@ -1,4 +1,4 @@
-"""A verdict by value: slow fits, nothing to fit, noise, and patterns."""
+"""A verdict by value: slow fits, nothing to fit, noise, patterns, and displacements that bend."""
 
 from __future__ import annotations
 
@@ -9,30 +9,11 @@ import numpy as np
 import pytest
 
 from analysis.field import Status, profile
-from analysis.fit.kernel_args import CONVERGED, NUISANCES, OutArgs, PooledError, ReferenceArgs, VerdictArgs
+from analysis.fit.kernel_args import NUISANCES, RUNNING, PooledError
 from analysis.fit.validity import has_pattern, information, least_information
-from analysis.fit.verdict import judge
+from tests.analysis.one_zoi import EXPECTED, FORGIVING, PIXELS, SIGNAL, verdict
 
-PIXELS, SIGNAL, EXPECTED, UNIT = 200.0, 1e4, 4.0, 1e-6
 SPREAD = math.sqrt(2 / PIXELS)
-BY_NOISE = 1.05 + 4 * SPREAD
-
-
-def verdict(
-    left: float = EXPECTED, *, iterations: int = 3, known: bool = True, gain: float = 1.0, bending: float = 0.0,
-    common: PooledError | None = None, **of_reference: Any,
-) -> Status:  # fmt: skip
-    """Of one ZOI; ``of_reference`` are other values than those of an even pattern."""
-    found, one = OutArgs.starting(np.zeros((1, 6))), np.ones(1)
-    found.left[:], found.bending[:], found.nuisance[:] = left, bending, (gain, 0, 0)
-    found.state[:], found.iterations[:] = CONVERGED, iterations
-    even = ReferenceArgs(
-        SIGNAL * one, PIXELS * one, np.full((1, 2), UNIT), 1e-3 * one, np.ones(2), 1.0, 1.0, 1e3 * one, 0.5
-    )
-    args = even._replace(**{name: np.asarray(value) for name, value in of_reference.items()})
-    rule, out = VerdictArgs(known, np.array([1.0, 1.0]), 5.0, 0.05, 4.0, 6.0), np.zeros(1, np.uint8)
-    judge(found, found.left, EXPECTED * one, common or PooledError.none(1), args, rule, out)
-    return Status(int(out[0]))
 
 
 @pytest.mark.parametrize(
@@ -100,7 +81,7 @@ def test_what_all_leave_is_forgiven_with_its_scatter(scatter: float, spread: flo
 
 @pytest.mark.parametrize(("gain", "share"), [(0.5, 0.25), (2.0, 1.0)])
 def test_a_pattern_of_less_contrast_excuses_less(gain: float, share: float) -> None:
-    edge = BY_NOISE * EXPECTED + 0.5 * SIGNAL * share
+    edge = FORGIVING * EXPECTED + 0.5 * SIGNAL * share
     assert verdict(0.99 * edge, gain=gain) == Status.POOR_MATCH
     assert verdict(1.01 * edge, gain=gain) == Status.LOST
 
@@ -159,3 +140,69 @@ def test_the_information_of_an_even_pattern_is_one(order: int) -> None:
 )
 def test_small_zois_need_less_information(size: int, order: int, least: float) -> None:
     assert least_information(size, order) == pytest.approx(least)
+
+
+def bent(left: float = 1.0, *, unit: float = 1e-4, beyond: float = 1.0, **given: Any) -> Status:
+    """Of a ZOI whose displacement may bend; its centre is ``beyond`` as uncertain, squared, as by its pattern alone."""
+    pattern = {"signal": [900.0], "pixels": [350.0], "bends": 1.5, "unit": [[unit, unit]]}
+    return verdict(
+        left, expected=1.0, noise=(1.5, 0.5), centre=[math.sqrt(unit * beyond)], **pattern, **given
+    )
+
+
+@pytest.mark.parametrize(
+    ("bending", "unit", "uneven"),
+    [
+        (0.002, 1e-4, False),
+        (0.02, 1e-4, True),
+        (0.048**2, 1e-8, False),
+        (0.052**2, 1e-8, True),
+        (np.nan, 1e-4, True),
+    ],
+)
+def test_bending_beyond_its_noise_and_the_limit(bending: float, unit: float, uneven: bool) -> None:
+    assert (bent(bending=bending, unit=unit) == Status.UNEVEN) == uneven
+    assert bent(bending=bending, unit=unit, state=RUNNING) == Status.NOT_CONVERGED
+    if np.isfinite(bending):
+        strained = np.array([[0.0, 0.3, 0.0, 0.0, 0.0, 0.0]])
+        assert bent(bending=bending, unit=unit, values=strained) == Status.OK
+        assert bent(bending=bending, unit=unit, limit=np.inf) == Status.OK
+
+
+def test_bending_counts_in_the_contrast_of_the_picture_and_beside_its_like() -> None:
+    """Noise of 1 GL makes 1.5 * 2 * unit of it, 1 of its deviations 1.41 * unit."""
+    unit = 1e-3
+    noise, spread = 3 * unit, 2**0.5 * unit
+    edge = noise + 6 * spread + 0.05**2
+    assert bent(bending=0.98 * edge, unit=unit) == Status.OK
+    assert bent(bending=1.02 * edge, unit=unit) == Status.UNEVEN
+    dim = 4 * (noise + 6 * spread) + 0.05**2  # at half of the contrast
+    assert bent(bending=0.98 * dim, unit=unit, gain=0.5) == Status.OK
+    assert bent(bending=1.02 * dim, unit=unit, gain=0.5) == Status.UNEVEN
+    like = PooledError.none(1)._replace(bent=1.5)
+    alike = 1.5 * (noise + 6 * spread) + 0.05**2
+    assert bent(bending=0.98 * alike, unit=unit, common=like) == Status.OK
+    assert bent(bending=1.02 * alike, unit=unit, common=like) == Status.UNEVEN
+    # No more of what all bend is forgiven than the limit itself.
+    most, all_bend = 1 + 0.05**2 / noise, PooledError.none(1)._replace(bent=50.0)
+    beyond = most * (noise + 6 * spread) + 0.05**2
+    assert bent(bending=0.98 * beyond, unit=unit, common=all_bend) == Status.OK
+    assert bent(bending=1.02 * beyond, unit=unit, common=all_bend) == Status.UNEVEN
+
+
+def test_a_little_in_both_residual_and_bending_is_too_much() -> None:
+    half_left, more_left, half_bent, more_bent = 2.0, 2.6, 0.0015, 0.0018
+    assert bent(left=half_left) == bent(bending=more_bent, unit=1e-8) == Status.OK
+    assert bent(left=half_left, bending=0.001, unit=1e-8) == Status.OK
+    assert bent(left=half_left, bending=more_bent, unit=1e-8) == Status.UNEVEN
+    assert bent(left=more_left, bending=half_bent, unit=1e-8) == Status.POOR_MATCH
+    assert bent(left=half_left, bending=more_bent, unit=1e-8, limit=np.inf) == Status.OK
+    assert bent(left=4.5, bending=more_bent, unit=1e-8, known=False) == Status.OK
+    assert bent(left=6.5, bending=more_bent, unit=1e-8, known=False) != Status.OK
+
+
+def test_a_centre_beyond_the_pattern_shows_in_its_uncertainty() -> None:
+    doubtful = {"left": 1.0, "bending": 0.0015, "unit": 1e-8}
+    assert bent(**doubtful, beyond=3.9) == Status.OK
+    assert bent(**doubtful, beyond=8.0) == Status.UNEVEN
+    assert bent(beyond=8.0) == Status.OK

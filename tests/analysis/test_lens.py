@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from analysis import Roi, ZoiGrid
 from analysis.evaluate import AreaStrain
@@ -16,12 +15,11 @@ from analysis.optics import LensCorrection, LensModel, PlateLayout, lens_of_shif
 from hw_mocks.deformation import Affine, Deformation
 from hw_mocks.optics import Lens as TrueLens
 from hw_mocks.optics import Optics, PlaneMotion, Seen
+from tests.analysis.planes import seen_between
 
-Floats = NDArray[np.float64]
 WIDTH, HEIGHT = 640, 480
 MIDDLE = (WIDTH - 1) / 2, (HEIGHT - 1) / 2
 GRID = ZoiGrid.cover(Roi(40, 30, 560, 420), 40, 40)
-NAMES = ("u", "du_dx", "du_dy", "v", "dv_dx", "dv_dy")
 FOCAL = math.hypot(WIDTH, HEIGHT) / 2
 DISTORTION = -0.004  # 0.4 % at the corner: an ordinary lens
 TRUE = np.array([FOCAL, *MIDDLE, DISTORTION * (FOCAL / math.hypot(*MIDDLE)) ** 2, 0, 0, 0, 0])
@@ -32,26 +30,11 @@ def seen(
     deformation: Deformation, grid: ZoiGrid = GRID, motion: PlaneMotion | None = None,
     middle: tuple[float, float] = MIDDLE,
 ) -> StrainField:  # fmt: skip
-    """What a perfect kernel measures: ``deformation`` in the plane, by the lens of the simulated camera."""
+    """``deformation`` in the plane, by the lens of the simulated camera."""
     optics = Optics(500.0, DISTORTION)
     still = TrueLens.of(optics, PlaneMotion(), middle, 20.0)
     moved = TrueLens.of(optics, motion or PlaneMotion(), middle, 20.0)
-    before, after = Seen(Affine(), still), Seen(deformation, moved)
-    x, y = np.meshgrid(grid.x, grid.y)
-    flat_x, flat_y = x.copy(), y.copy()
-    for _ in range(12):
-        u, v = before.displacement(flat_x, flat_y)
-        flat_x, flat_y = x - u, y - v
-    u, v = after.displacement(flat_x, flat_y)
-    first, last = (_matrix(one.gradient(flat_x, flat_y)) for one in (before, after))
-    gradient = np.moveaxis(last @ np.linalg.inv(first) - np.eye(2), (-2, -1), (0, 1))
-    values = (flat_x + u - x, gradient[0, 0], gradient[0, 1], flat_y + v - y, gradient[1, 0], gradient[1, 1])
-    return StrainField.from_values(grid, dict(zip(NAMES, values, strict=True)), 1e-3)
-
-
-def _matrix(gradient: tuple[Floats, ...]) -> Floats:
-    a, b, c, d = gradient
-    return np.moveaxis(np.array([[1 + a, b], [c, 1 + d]]), (0, 1), (-2, -1))
+    return seen_between(Seen(Affine(), still), Seen(deformation, moved), grid)
 
 
 def test_a_lens_is_turned_round_with_its_derivatives() -> None:

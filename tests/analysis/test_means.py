@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -70,22 +67,6 @@ def test_a_mean_over_some_leaves_the_others_out() -> None:
     )
 
 
-def test_the_pattern_of_the_zois_of_a_mean_decides_its_noise() -> None:
-    class Pattern:
-        """Twice the noise of the overlap where row 1 is measured alone."""
-
-        @staticmethod
-        def factor(_: str, gauge: np.ndarray) -> float:
-            return 2.0 if gauge[1].all() and gauge.sum() == 6 else 1.0
-
-    plain = StrainField.from_values(GRID, {"u": np.zeros(GRID.shape)}, 0.1)
-    field = dataclasses.replace(plain, sums=Pattern())  # type: ignore[arg-type]
-    row = np.zeros(GRID.shape, bool)
-    row[1] = True
-    assert field.mean("u", row)[1] == pytest.approx(2 * plain.mean("u", row)[1])
-    assert field.mean("u")[1] == pytest.approx(plain.mean("u")[1])
-
-
 def test_what_zois_take_of_each_pixel_is_the_sum_of_their_channels_and_monomials() -> None:
     """Of two that overlap; the squares of their sum are added row by row."""
     rng, size, origins = np.random.default_rng(5), 8, np.array([(3, 2), (5, 4)])
@@ -129,22 +110,6 @@ def test_two_errors_beside_each_other_add_their_variances() -> None:
         one.variance_of_sum(weights) + other.variance_of_sum(weights)
     )
     assert one.beside(None) is one
-
-
-def test_a_part_has_the_error_of_its_rows_and_columns() -> None:
-    whole = error(2)
-    part = whole.part(slice(0, 2), slice(1, 4))
-    assert np.array_equal(part.variance("exx"), whole.variance("exx")[0:2, 1:4])
-
-
-def test_a_common_error_is_no_part_of_that_of_the_reference() -> None:
-    field = StrainField.from_values(OVERLAPPING, {"u": 1.0}, 1e-3)
-    more = replace(field, common=error(1))
-    assert np.array_equal(more.sigma("u", "reference"), field.sigma("u", "reference"))
-    variance = (
-        np.asarray(more.common.variance("u")) if more.common is not None else np.zeros(OVERLAPPING.shape)
-    )
-    assert more.sigma("u") ** 2 == pytest.approx(field.sigma("u") ** 2 + variance)
 
 
 @pytest.mark.parametrize("colour", [(4.0, 1.0), (1.0, 4.0)])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from analysis import Roi, ZoiGrid
 from analysis.evaluate import AreaStrain, LineGauge
-from analysis.field import PAIR_INDEX, Block, CommonError, Status, StrainField, part_of, profile
+from analysis.field import PAIR_INDEX, Status, StrainField, part_of, profile
 from analysis.optics import (
     ApparentMotion,
     Model,
@@ -21,17 +21,16 @@ from analysis.optics import (
     choose_model,
     keystones,
     trouble,
-    without_plates,
 )
 from hw_mocks.optics import Optics, PlaneMotion
 from hw_mocks.specimen import VirtualSpecimen
+from tests.analysis.planes import NAMES, seen_between
 
 SPECIMEN = VirtualSpecimen(width=640, height=480)
 AXIS, FOCAL = (319.5, 239.5), 500 * 20.0
 TWO = {"left": (20.0, 40.0, 100.0, 400.0), "right": (520.0, 40.0, 100.0, 400.0)}
 ONE = {"left": (20.0, 40.0, 240.0, 400.0)}
 GRID = ZoiGrid.cover(Roi(280, 40, 160, 400), 64, 16)
-NAMES = ("u", "du_dx", "du_dy", "v", "dv_dx", "dv_dy")
 END = SPECIMEN.duration_s
 AXIAL, ACROSS = float(SPECIMEN.axial_strain(END)), float(SPECIMEN.transverse_strain(END))
 
@@ -41,29 +40,12 @@ def fit_of(boxes: dict[str, tuple[float, float, float, float]]) -> PlateFit:
 
 
 def seen(
-    fit: PlateFit,
-    boxes: dict[str, tuple[float, float, float, float]],
-    optics: Optics,
+    fit: PlateFit, boxes: dict[str, tuple[float, float, float, float]], optics: Optics,
     specimen: VirtualSpecimen = SPECIMEN,
-) -> StrainField:
-    """What a perfect kernel measures on a specimen that looks as ``optics`` show it at rest."""
+) -> StrainField:  # fmt: skip
+    """On a specimen that looks as ``optics`` show it at rest."""
     optics = replace(optics, plates=tuple(boxes.values()))
-    before, after = optics.seen(specimen, 0.0), optics.seen(specimen, END)
-    x, y = np.meshgrid(fit.layout.whole.x, fit.layout.whole.y)
-    flat_x, flat_y = x.copy(), y.copy()  # places of the plane that are seen at the ZOIs
-    for _ in range(6):
-        u, v = before.displacement(flat_x, flat_y)
-        flat_x, flat_y = x - u, y - v
-    u, v = after.displacement(flat_x, flat_y)
-    first, last = (_matrix(one.gradient(flat_x, flat_y)) for one in (before, after))
-    gradient = np.moveaxis(last @ np.linalg.inv(first) - np.eye(2), (-2, -1), (0, 1))
-    values = (flat_x + u - x, gradient[0, 0], gradient[0, 1], flat_y + v - y, gradient[1, 0], gradient[1, 1])
-    return StrainField.from_values(fit.layout.whole, dict(zip(NAMES, values, strict=True)), 1e-3)
-
-
-def _matrix(gradient: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
-    a, b, c, d = gradient
-    return np.moveaxis(np.array([[1 + a, b], [c, 1 + d]]), (0, 1), (-2, -1))
+    return seen_between(optics.seen(specimen, 0.0), optics.seen(specimen, END), fit.layout.whole)
 
 
 def corrected(fit: PlateFit, field: StrainField, model: Model) -> tuple[float, float]:
@@ -174,23 +156,6 @@ def test_the_error_of_the_plates_is_common_to_all_zois() -> None:
     assert after == pytest.approx(math.hypot(before, 5e-6), rel=1e-6)
 
 
-def test_a_part_of_a_field_has_its_values_and_no_others() -> None:
-    grid = ZoiGrid.cover(Roi(10, 20, 100, 80), 20, 10)
-    u = np.arange(grid.shape[0] * grid.shape[1], dtype=float).reshape(grid.shape)
-    common = CommonError(np.ones((1, 6, *grid.shape)), np.ones((1, 1)))
-    field = replace(StrainField.from_values(grid, {"u": u}), common=common)
-    block = Block(slice(1, 4), slice(2, 5))
-    part = part_of(field, block)
-    np.testing.assert_array_equal(part.u, u[1:4, 2:5])
-    np.testing.assert_array_equal([part.grid.x, part.grid.y], [grid.x[2:5], grid.y[1:4]])
-    assert part.common is not None
-    assert part.common.shapes.shape == (1, 6, 3, 3)
-    fewer = part_of(field, block, part.grid.subset(active=np.eye(3, dtype=bool)))
-    assert np.isnan(fewer.u).sum() == 6
-    assert fewer.refused == {}
-    assert fewer.status[0, 1] == Status.NOT_MEASURED
-
-
 def test_the_model_follows_from_the_uncertainty_it_leaves() -> None:
     both, one = fit_of(TWO), fit_of(ONE)
     quiet, coarse = (
@@ -218,13 +183,6 @@ def test_a_rigid_plate_is_no_trouble_even_where_it_tilts() -> None:
     assert trouble(fit, seen(fit, TWO, settling(0.5, 0.5))) == ("", False)
 
 
-def test_a_loaded_plate_is_named() -> None:
-    fit = fit_of(TWO)
-    words, not_rigid = trouble(fit, seen(fit, TWO, replace(settling(0.1, 0.1), plate_strain=0.3)))
-    assert not_rigid
-    assert "plate left is loaded" in words
-
-
 @pytest.mark.parametrize(("sigmas", "loaded"), [(6.0, True), (3.5, False)])
 def test_a_plate_is_loaded_beyond_four_sigmas(sigmas: float, loaded: bool) -> None:
     fit = fit_of(TWO)
@@ -243,17 +201,6 @@ def test_a_plate_is_loaded_beyond_four_sigmas(sigmas: float, loaded: bool) -> No
     assert trouble(fit, noisier)[1] == loaded
 
 
-def test_a_lost_plate_is_named_and_may_come_back() -> None:
-    fit = fit_of(TWO)
-    field = seen(fit, TWO, settling(0.1, 0.1))
-    status = field.status.copy()
-    status[fit.layout.plates["right"].at][:12] = Status.POOR_MATCH
-    parameters = np.where(status == Status.OK, field.parameters, np.nan)
-    words, not_rigid = trouble(fit, replace(field, status=status, parameters=parameters))
-    assert "plate right is lost or shaded: 30 of 66" in words
-    assert not not_rigid
-
-
 def test_half_of_the_zois_of_a_plate_give_the_same_motion() -> None:
     fit = fit_of(TWO)
     field = seen(fit, TWO, settling(0.1, 0.1))
@@ -264,34 +211,9 @@ def test_half_of_the_zois_of_a_plate_give_the_same_motion() -> None:
     assert corrected(fit, partly, "pose") == pytest.approx(corrected(fit, field, "pose"), abs=1e-6)
 
 
-def test_the_zois_of_plates_lie_on_the_lattice_of_the_test() -> None:
-    layout = PlateLayout.of(GRID, TWO)
-    assert layout.whole.roi == Roi(24, 40, 592, 400)
-    assert part_of(StrainField.from_values(layout.whole, {}), layout.here).grid.roi == GRID.roi
-    assert {name: block.of(layout.whole).shape for name, block in layout.plates.items()} == {
-        "left": (22, 3),
-        "right": (22, 3),
-    }
-    assert layout.whole.n_active == GRID.n_active + 2 * 66
-
-
-def test_zois_that_touch_a_plate_are_not_of_the_specimen() -> None:
-    grid = without_plates(GRID, {"over": (400.0, 0.0, 200.0, 100.0)})
-    assert not grid.active[:4, 4:].any()  # ZOIs from x = 344 on reach 400
-    assert grid.active[4:].all()
-    assert grid.active[:, :4].all()
-
-
-@pytest.mark.parametrize(
-    ("boxes", "words"),
-    [
-        ({"small": (0.0, 0.0, 70.0, 400.0)}, "plate small of 70 x 400 px has no room"),
-        ({"a": (0.0, 0.0, 200.0, 200.0), "b": (100.0, 0.0, 160.0, 200.0)}, "two plates overlap"),
-    ],
-)
-def test_impossible_plates(boxes: dict[str, tuple[float, float, float, float]], words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        PlateLayout.of(GRID, boxes)
+def test_plates_that_overlap() -> None:
+    with pytest.raises(ValueError, match="two plates overlap"):
+        PlateLayout.of(GRID, {"a": (0.0, 0.0, 200.0, 200.0), "b": (100.0, 0.0, 160.0, 200.0)})
 
 
 def risen(grid: ZoiGrid, k: float, *, bent: bool = False) -> StrainField:

@@ -20,7 +20,6 @@ from analysis.picture.pattern import (
     describe_pattern,
     gauge_length,
     l10_strain,
-    noise_of_picture,
     predicted_sigma,
     resolution_length,
 )
@@ -71,12 +70,6 @@ def test_speckle_size_of_a_single_blob() -> None:
 def test_nothing_but_noise_has_no_size() -> None:
     noise = np.random.default_rng(1).standard_normal((64, 64))
     assert math.isnan(autocorrelation_fwhm(noise, 1.1 * noise.std()))
-
-
-def test_noise_of_a_picture(speckle: Speckle) -> None:
-    light = speckle.reference() * FULL
-    picture = light + 20 * np.random.default_rng(3).standard_normal(light.shape)
-    assert noise_of_picture(picture) == pytest.approx(20, rel=0.05)
 
 
 def test_clipped_share() -> None:

@@ -69,12 +69,6 @@ def test_bands_move_with_the_displacement_across_them_alone(axis: int) -> None:
     np.testing.assert_allclose(found[inside], 3 * np.sin(2 * np.pi * lines[inside] / 12), atol=0.05)
 
 
-def test_bands_of_a_whole_field_are_found() -> None:
-    found, rows = profile(5.3), np.arange(ROWS)
-    inside = (rows > 8) & (rows < 130)
-    np.testing.assert_allclose(found[inside], 3 * np.sin(2 * np.pi * rows[inside] / 12), atol=0.05)
-
-
 @pytest.mark.parametrize("v", [
     np.array([0, 0, 0, 0, 0, 0, 0, 0, -70.0]), np.array([40.0, 30, 20, 10, 0, -10, -20, -30, -40]),
     np.array([0, 0, 0, 0, -16.0, -16, -16, -16, -16]), np.linspace(0, -128, 9), np.array([0.0, 60] * 4 + [0]),
@@ -109,22 +103,6 @@ def test_hot_and_dead_pixels_get_the_median_of_their_neighbours(wild: int) -> No
     for y, x in changed[:40]:
         around = np.delete(clean[y - 1 : y + 2, x - 1 : x + 2].ravel().astype(float), 4)
         assert out[y, x] == np.rint(np.median(around))
-
-
-def test_one_pixel_in_twelve_is_the_pattern() -> None:
-    image = picture().copy()
-    image[RNG.random(image.shape) < 1 / 12] = 4095
-    assert without_impulses(image) is None
-
-
-@pytest.mark.parametrize("axis", [0, 1])
-def test_blocks_along_either_axis_show(axis: int) -> None:
-    """Each block of eight rows, or columns, a little brighter or darker than its neighbours."""
-    image = picture().astype(np.float32)
-    blocks = np.arange(image.shape[axis]) // 8
-    brighter = RNG.normal(0, 100, blocks[-1] + 1)[blocks]
-    assert blockiness(image) < BLOCKS
-    assert blockiness(image + (brighter[:, None] if axis == 0 else brighter)) > BLOCKS
 
 
 @pytest.mark.parametrize(("down", "across", "wild"), [(6, 6, True), (4, 7, False)])

@@ -8,7 +8,6 @@ import pytest
 
 from analysis import KernelSettings, NoiseModel, PhaseKernel, Roi, Status, StrainField, ZoiGrid
 from analysis.field import mean_blur
-from analysis.field.uncertainty import PictureError
 from analysis.fit import pooling
 from analysis.fit.kernel_args import CONVERGED, OutArgs, ReferenceArgs
 from analysis.fit.pooling import pooled
@@ -458,10 +457,6 @@ def test_between_groups_holds_what_numpy_interpolates() -> None:
     x, at, values = np.linspace(-1, 6, 1001), np.array([0.0, 1.0, 1.0, 2.5, 5.0]), np.array([2.0, 1, 4, 4, 3])
     assert pooling._at(x, at, values) == pytest.approx(np.interp(x, at, values), rel=1e-14)
     assert pooling._at(x, at[:1], values[:1]).tolist() == [2.0] * len(x)
-
-
-def test_the_factor_of_a_picture_is_that_of_the_worse_of_u_and_v() -> None:
-    assert PictureError(2.0, (0.25, 4.0)).factor == PictureError(2.0, (4.0, 0.25)).factor == 4.0
 
 
 def test_quantisation_is_averaged_with_the_noise() -> None:

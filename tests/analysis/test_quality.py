@@ -204,15 +204,3 @@ def test_the_least_specimen(side: int, found: bool) -> None:
     picture = np.full((700, 900), 90.0)
     picture[300 : 300 + side, 400 : 400 + side] += 40 * speckle / speckle.std()
     assert (find_specimen(picture + rng.normal(0, 1, picture.shape)) is not None) == found
-
-
-def test_the_drift_is_that_from_the_first_to_the_last_value() -> None:
-    found = steadiness(TIMES, 3.0 + 0.25 * TIMES)
-    assert found.drift == pytest.approx(0.25 * (TIMES[-1] - TIMES[0])) and found.rms == pytest.approx(
-        0, abs=1e-9
-    )
-
-
-def test_a_frequency_beside_those_of_the_mains_is_none_of_them() -> None:
-    found = steadiness(TIMES, np.sin(2 * np.pi * 7 * TIMES))  # 100 Hz shows at 10, 120 Hz at 0 Hz
-    assert found.frequency == pytest.approx(7, abs=0.3) and mains_of(found, 2) is None

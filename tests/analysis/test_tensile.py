@@ -179,7 +179,7 @@ def test_without_enough_points_nothing_is_made_up() -> None:
         found = evaluate_test(curve)
         assert not known(found)
         assert (
-            "test in compression" if found.kind == "compression" else "have strain and a tensile force"
+            "test in compression" if found.kind == "compression" else "with strain and a tensile force"
         ) in found.E.why
     found = evaluate_test(Curve(np.zeros(0), np.zeros(0), np.zeros(0)))
     assert not known(found) and "0 measurements in all, 8 are needed: more pictures" in found.E.why
@@ -231,33 +231,6 @@ def test_the_zero_is_named_and_the_curve_stays() -> None:
     assert np.array_equal(curve.strain, before)
 
 
-def test_a_yield_point_that_falls_by_two_percent_is_one() -> None:
-    """The limit of the standard is half a percent; the undershoot after it is no part of ReL."""
-    found = evaluate_test(noisy(lueders(upper=306e6), 0))
-    assert found.ReH.value == pytest.approx(306e6, rel=2e-3)
-    assert found.ReL.value == pytest.approx(300e6, rel=2e-3)
-
-
-def test_the_undershoot_after_the_upper_yield_strength_is_no_lower_one() -> None:
-    """Clause 12 of the standard: what follows within 0.05 % strain does not count."""
-    truth = lueders()
-    dip = 15e6 * np.exp(-0.5 * ((truth.curve.strain - 330e6 / 205e9 - 2.5e-4) / 8e-5) ** 2)
-    curve = replace(truth.curve, stress=truth.curve.stress - np.nan_to_num(dip))
-    found = evaluate_test(noisy(replace(truth, curve=curve), 0))
-    assert found.ReL.value == pytest.approx(300e6, rel=2e-3)
-
-
-def test_the_strain_at_the_highest_force_is_the_middle_of_its_flat_top() -> None:
-    assert evaluate_test(noisy(lueders(), 0)).Agt.value == pytest.approx(0.12, abs=5e-4)
-
-
-def test_a_neck_is_no_yield_point() -> None:
-    truth = lueders(upper=300.5e6)
-    found = evaluate_test(noisy(truth, 0))
-    assert not found.ReH.known
-    assert found.Rm.value == pytest.approx(420e6, rel=2e-3)
-
-
 @pytest.mark.parametrize("make", [lambda: TensileOptions(zero="toes"), lambda: TensileOptions(zero="preload"),
                                   lambda: Interval("strain", 0.002, 0.001)])  # fmt: skip
 def test_impossible_options_are_refused(make) -> None:
@@ -295,11 +268,7 @@ def test_an_axis_that_the_strains_do_not_decide_is_y(degrees: float, most: float
 
 @pytest.mark.parametrize("degrees", [0.0, 2.5, 88.0, -40.0])
 def test_the_direction_of_the_load_is_found(degrees: float) -> None:
-    rng, c, s = np.random.default_rng(3), math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    along = np.linspace(0, 2e-3, 100)
-    across = -0.3 * along
-    true = (along * c * c + across * s * s, along * s * s + across * c * c, (along - across) * s * c)
-    found = [principal_direction(*(e + 3e-5 + rng.normal(0, 1e-5, 100) for e in true)) for _ in range(SEEDS)]
+    found = [principal_direction(*uniaxial(degrees, 2e-3, 3 * seed)) for seed in range(SEEDS)]
     inside = sum(f.low <= math.radians(degrees) <= f.high for f in found)
     assert inside >= 0.85 * SEEDS
     assert found[0].high - found[0].low < math.radians(0.5)

@@ -8,45 +8,15 @@ import pytest
 from analysis import KernelSettings, NoiseModel, PhaseKernel, Roi, Status, ZoiGrid
 from analysis.evaluate import AreaGauge
 from analysis.field import StrainField
-from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, PooledError, ReferenceArgs, VerdictArgs
-from analysis.fit.verdict import judge
+from analysis.fit.kernel_args import LEFT_IMAGE, PooledError
 from analysis.kernel.images import as_model
 from analysis.kernel.neighbours import Neighbours
 from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.solve import Solution
+from tests.analysis.one_zoi import EXPECTED, FORGIVING, SIGNAL, verdict
 from tests.analysis.speckle import SHAPE, picture
 
-PIXELS, SIGNAL, EXPECTED = 200.0, 1e4, 4.0
-ALLOWED = (1.05 + 4 * np.sqrt(2 / PIXELS)) * EXPECTED
-"""What noise alone may leave: 5 %, and 4 standard deviations of a variance of so many pixels, more; GL^2."""
-
-
-def verdict(
-    left: float, *, gain: float = 1.0, noise_known: bool = True, usual: float = 1.0, **changed: int
-) -> Status:
-    """The status of one ZOI that leaves a variance of ``left`` GL^2 where the noise has EXPECTED.
-
-    ``usual`` is what the ZOIs together leave of that.
-    """
-    found = OutArgs.starting(np.zeros((1, 6)))
-    found.left[:], found.bending[:], found.nuisance[:] = left, 0, (gain, 0, 0)
-    found.state[:], found.iterations[:] = changed.get("state", CONVERGED), changed.get("iterations", 3)
-    known = ReferenceArgs(
-        np.full(1, SIGNAL),
-        np.full(1, PIXELS),
-        np.full((1, 2), 1e-6),
-        np.full(1, 1e-3),
-        np.ones(2),
-        1.0,
-        1.0,
-        np.full(1, 1e3),
-        0.5,
-    )
-    rule = VerdictArgs(noise_known, np.array([1.0, 1.0]), 32 / 6, 0.05, 4.0, 6.0)
-    out = np.empty(1, np.uint8)
-    common = PooledError.none(1)._replace(forgiven=np.full(1, usual))
-    judge(found, found.left, np.full(1, EXPECTED), common, known, rule, out)
-    return Status(int(out[0]))
+ALLOWED = FORGIVING * EXPECTED
 
 
 @pytest.mark.parametrize(
@@ -64,19 +34,24 @@ def test_what_a_fit_may_leave(left: float, status: Status) -> None:
     assert verdict(left) == status
 
 
+def usual(share: float) -> PooledError:
+    """All ZOIs together leave that of what is expected."""
+    return PooledError.none(1)._replace(forgiven=np.full(1, share))
+
+
 def test_a_fit_that_leaves_more_than_its_like_stands_out_though_the_noise_would_allow_it() -> None:
     left = ALLOWED + 0.00196 * SIGNAL
-    assert verdict(left, usual=0.999) == Status.OK
-    assert verdict(left, usual=0.9) == Status.POOR_MATCH
-    assert verdict(0.9 * ALLOWED + 0.00196 * SIGNAL, usual=0.9) == Status.OK
+    assert verdict(left, common=usual(0.999)) == Status.OK
+    assert verdict(left, common=usual(0.9)) == Status.POOR_MATCH
+    assert verdict(0.9 * ALLOWED + 0.00196 * SIGNAL, common=usual(0.9)) == Status.OK
     # A noise given far too high is not taken for what it seems to be: colour would scatter more.
-    assert verdict(0.8 * ALLOWED + 0.00196 * SIGNAL, usual=0.3) == Status.OK
-    assert verdict(left, usual=0.9, noise_known=False) == Status.OK
+    assert verdict(0.8 * ALLOWED + 0.00196 * SIGNAL, common=usual(0.3)) == Status.OK
+    assert verdict(left, common=usual(0.9), known=False) == Status.OK
 
 
 def test_unknown_noise_may_be_five_times_what_it_is_taken_for() -> None:
-    assert verdict(5 * EXPECTED + 0.0019 * SIGNAL, noise_known=False) == Status.OK
-    assert verdict(5 * EXPECTED + 0.0021 * SIGNAL, noise_known=False) == Status.POOR_MATCH
+    assert verdict(5 * EXPECTED + 0.0019 * SIGNAL, known=False) == Status.OK
+    assert verdict(5 * EXPECTED + 0.0021 * SIGNAL, known=False) == Status.POOR_MATCH
 
 
 @pytest.mark.parametrize(
@@ -88,7 +63,8 @@ def test_a_contrast_from_a_fifth_to_five_times(gain: float, status: Status) -> N
 
 
 def test_a_fit_that_left_the_image_or_did_not_end() -> None:
-    assert verdict(EXPECTED, state=LEFT_IMAGE) == Status.OUTSIDE
+    for left in (EXPECTED, ALLOWED + 0.51 * SIGNAL):
+        assert verdict(left, state=LEFT_IMAGE) == Status.OUTSIDE
     assert verdict(EXPECTED, state=0) == Status.NOT_CONVERGED
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
@@ -47,29 +47,31 @@ def test_every_package_has_its_line(sources: Sources) -> None:
     assert set(LAYERS) <= set(sources), "a line without a package"
 
 
-def test_the_lines_make_no_circle() -> None:
-    none_of(imports.circles_of_packages(LAYERS))
+def crowded(sources: Sources) -> Iterable[str]:
+    counted = {name: module for name, module in sources.items() if name.rpartition(".")[0] not in MANY_FILES}
+    return modules.crowded(counted, MAX_FILES)
 
 
-def test_packages_import_what_their_line_allows(sources: Sources) -> None:
-    none_of(imports.forbidden(sources, LAYERS, EXCEPTIONS))
-
-
-def test_no_circle_of_modules(sources: Sources) -> None:
-    none_of(imports.circles(sources))
-
-
-def test_libraries_have_a_home(sources: Sources) -> None:
-    none_of(imports.libraries(sources, LAYERS, LIBRARIES))
-
-
-def test_what_packages_do_without(sources: Sources) -> None:
-    """Numerics and the measuring path: no thread, file, device or clock. Nothing from a file is executed."""
-    none_of(imports.never(sources, NEVER, EXCEPT))
-
-
-def test_numba_is_loaded_by_compiled_loops_alone(sources: Sources) -> None:
-    none_of(imports.numba_at_import(sources, COMPILED))
+@pytest.mark.parametrize(
+    "rule",
+    [
+        pytest.param(lambda _: imports.circles_of_packages(LAYERS), id="the lines make no circle"),
+        pytest.param(
+            lambda s: imports.forbidden(s, LAYERS, EXCEPTIONS), id="packages import what their line allows"
+        ),
+        pytest.param(imports.circles, id="no circle of modules"),
+        pytest.param(lambda s: imports.libraries(s, LAYERS, LIBRARIES), id="libraries have a home"),
+        # Numerics and the measuring path: no thread, file, device or clock. Nothing from a file is executed.
+        pytest.param(lambda s: imports.never(s, NEVER, EXCEPT), id="what packages do without"),
+        pytest.param(lambda s: imports.numba_at_import(s, COMPILED), id="compiled loops alone load numba"),
+        pytest.param(modules.interfaces, id="interfaces hold imports alone"),
+        pytest.param(crowded, id="no package is crowded"),
+        pytest.param(modules.homonyms, id="a public class name means one class"),
+        pytest.param(lambda s: modules.long_modules(s, MAX_LINES), id="no module is long"),
+    ],
+)
+def test_the_sources_keep_the_rule(rule: Callable[[Sources], Iterable[str]], sources: Sources) -> None:
+    none_of(rule(sources))
 
 
 def test_analysis_opens_no_file(sources: Sources) -> None:
@@ -81,23 +83,6 @@ def test_nothing_from_a_file_is_executed(sources: Sources) -> None:
     """A session of somebody else is data."""
     none_of(found for module in sources.values() for found in modules.calls(module, {"eval", "exec"}))
     none_of(found for module in sources.values() for found in modules.pickles(module))
-
-
-def test_interfaces_hold_imports_alone(sources: Sources) -> None:
-    none_of(modules.interfaces(sources))
-
-
-def test_no_package_is_crowded(sources: Sources) -> None:
-    counted = {name: module for name, module in sources.items() if name.rpartition(".")[0] not in MANY_FILES}
-    none_of(modules.crowded(counted, MAX_FILES))
-
-
-def test_a_public_class_name_means_one_class(sources: Sources) -> None:
-    none_of(modules.homonyms(sources))
-
-
-def test_no_module_is_long(sources: Sources) -> None:
-    none_of(modules.long_modules(sources, MAX_LINES))
 
 
 def test_private_means_private(sources: Sources) -> None:

@@ -182,19 +182,6 @@ def test_cameras_of_somebody_else_are_listed_with_ours(
     assert find_devices({}, TerminalScreen()).camera == "raw:good.raw"
 
 
-def test_a_list_that_fails_hides_no_other_camera(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    install_example(tmp_path, monkeypatch)
-
-    def broken() -> list[CameraListing]:
-        raise RuntimeError("no such library")
-
-    monkeypatch.setattr("acquire.v4l2.listing.list_cameras", lambda: [CameraListing("/dev/video7", "a")])
-    monkeypatch.setattr("own_devices.list_raw", broken)
-    good, bad = list_cameras()
-    assert (good.address, good.trouble) == ("/dev/video7", "")
-    assert bad.address == "raw:" and "no such library" in bad.trouble
-
-
 def test_frames_are_what_info_promised(camera: Camera) -> None:
     info = camera.info
     frames = take(camera, 4)

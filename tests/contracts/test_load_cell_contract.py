@@ -86,51 +86,39 @@ def events() -> list[Event]:
 
 
 @pytest.fixture
-def stack() -> Iterator[ExitStack]:
+def cell(name: str, tmp_path: Path, events: list[Event]) -> Iterator[LoadCell]:
+    """The load cell of this name."""
     with ExitStack() as stack:
-        yield stack
-
-
-def opened(name: str, folder: Path, stack: ExitStack, events: list[Event]) -> LoadCell:
-    cell = ALL[name](folder, stack, events)
-    stack.callback(cell.close)
-    return cell
+        made = ALL[name](tmp_path, stack, events)
+        stack.callback(made.close)
+        yield made
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_is_a_load_cell_and_tells_what_it_is(
-    name: str, tmp_path: Path, stack: ExitStack, events: list[Event]
-) -> None:
-    cell = opened(name, tmp_path, stack, events)
+def test_is_a_load_cell_and_tells_what_it_is(cell: LoadCell) -> None:
     assert isinstance(cell, LoadCell)
     assert cell.info.address and cell.info.name and cell.info.protocol
     assert cell.info.sign in (1, -1)
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_samples_come_in_order_of_time(
-    name: str, tmp_path: Path, stack: ExitStack, events: list[Event]
-) -> None:
-    with opened(name, tmp_path, stack, events) as cell:
+def test_samples_come_in_order_of_time(name: str, cell: LoadCell) -> None:
+    with cell:
         samples = list(islice(cell, 8))
     assert all(b.t >= a.t for a, b in pairwise(samples))
     assert len(samples) == 8 or name == "none"
 
 
 @pytest.mark.parametrize("name", SERIAL)
-def test_the_force_is_that_of_the_specimen_tension_positive(
-    name: str, tmp_path: Path, stack: ExitStack, events: list[Event]
-) -> None:
-    with opened(name, tmp_path, stack, events) as cell:
+def test_the_force_is_that_of_the_specimen_tension_positive(cell: LoadCell) -> None:
+    with cell:
         samples = [sample for sample in islice(cell, 8) if not math.isnan(sample.force)]
     assert samples and all(sample.force == pytest.approx(LOAD_N, abs=0.051) for sample in samples)
     assert all(sample.raw for sample in samples)
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_stop_from_another_thread_ends_the_iteration(
-    name: str, tmp_path: Path, stack: ExitStack, events: list[Event]
-) -> None:
+def test_stop_from_another_thread_ends_the_iteration(name: str, cell: LoadCell) -> None:
     ended = threading.Event()
     begun = threading.Event()
 
@@ -140,7 +128,6 @@ def test_stop_from_another_thread_ends_the_iteration(
                 begun.set()
         ended.set()
 
-    cell = opened(name, tmp_path, stack, events)
     thread = threading.Thread(target=iterate)
     thread.start()
     assert name == "none" or begun.wait(LONG_S)
@@ -150,28 +137,23 @@ def test_stop_from_another_thread_ends_the_iteration(
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_stop_before_the_iteration(name: str, tmp_path: Path, stack: ExitStack, events: list[Event]) -> None:
-    with opened(name, tmp_path, stack, events) as cell:
+def test_stop_before_the_iteration(cell: LoadCell) -> None:
+    with cell:
         cell.stop()
         assert list(cell) == []
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_closing_twice_and_unentered(
-    name: str, tmp_path: Path, stack: ExitStack, events: list[Event]
-) -> None:
-    cell = opened(name, tmp_path, stack, events)
+def test_closing_twice_and_unentered(cell: LoadCell) -> None:
     cell.close()
     cell.close()
 
 
 @pytest.mark.parametrize("name", LIVE)
-def test_tare_makes_the_load_zero_and_is_an_event(
-    name: str, tmp_path: Path, stack: ExitStack, events: list[Event]
-) -> None:
+def test_tare_makes_the_load_zero_and_is_an_event(cell: LoadCell, events: list[Event]) -> None:
     """Asked again where a busy machine has let too few samples through, and it was refused."""
     until, asked = time.monotonic() + LONG_S, 0
-    with opened(name, tmp_path, stack, events) as cell:
+    with cell:
         for count, sample in enumerate(cell):
             told = any(event.kind is EventKind.TARE for event in events)
             if (told and abs(sample.force) < 6) or time.monotonic() > until:
@@ -203,15 +185,8 @@ def test_what_cannot_be_opened_says_why(address: str, error: type[PhasedicError]
     assert address.partition("?")[0].removeprefix("session:") in str(caught.value)
 
 
-def test_a_session_without_load_says_so(tmp_path: Path) -> None:
-    session_fixtures.writer(tmp_path / "run.h5", load=None).close()
-    with pytest.raises(DataError, match="without a load cell"):
-        open_load_cell(f"session:{tmp_path}/run.h5")
-
-
-def test_a_tare_of_a_recording_is_refused_in_words(
-    tmp_path: Path, stack: ExitStack, events: list[Event]
-) -> None:
-    with opened("session", tmp_path, stack, events) as cell:
+@pytest.mark.parametrize("name", ["session"])
+def test_a_tare_of_a_recording_is_refused_in_words(cell: LoadCell, events: list[Event]) -> None:
+    with cell:
         cell.tare()
     assert "cannot be tared" in events[0].text

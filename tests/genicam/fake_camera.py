@@ -19,20 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.genicam.packing import PACK, picture
+from tests.genicam.packing import PACK, PIXEL_FORMATS, picture
 
 FIRST = 65401  # the number of the first frame
-PIXEL_FORMATS = {
-    "Mono8": 0x01080001,
-    "Mono10": 0x01100003,
-    "Mono10p": 0x010A0046,
-    "Mono10Packed": 0x010C0004,
-    "Mono12": 0x01100005,
-    "Mono12p": 0x010C0047,
-    "Mono12Packed": 0x010C0006,
-    "Mono14": 0x01100025,
-    "Mono16": 0x01100007,
-}
 PAYLOAD = """<IntSwissKnife Name="PayloadSize" NameSpace="Standard">
 <pVariable Name="WIDTH">Width</pVariable><pVariable Name="HEIGHT">Height</pVariable>
 <pVariable Name="PIXELFORMAT">PixelFormatRegister</pVariable>

@@ -55,13 +55,15 @@ def packed_gige(bits: int) -> Callable[[Samples], bytes]:
 
 
 PACK: dict[str, Callable[[Any], bytes]] = {
+    **dict.fromkeys(("Mono10", "Mono12", "Mono14", "Mono16"), plain16),
     "Mono8": plain8,
-    "Mono10": plain16,
-    "Mono12": plain16,
-    "Mono14": plain16,
-    "Mono16": plain16,
     "Mono10p": packed_low_first(10),
     "Mono12p": packed_low_first(12),
     "Mono10Packed": packed_gige(10),
     "Mono12Packed": packed_gige(12),
 }
+PIXEL_FORMATS = {  # PFNC: the code has the bits of a pixel in its third byte
+    "Mono8": 0x01080001, "Mono10": 0x01100003, "Mono10p": 0x010A0046, "Mono10Packed": 0x010C0004,
+    "Mono12": 0x01100005, "Mono12p": 0x010C0047, "Mono12Packed": 0x010C0006, "Mono14": 0x01100025,
+    "Mono16": 0x01100007,
+}  # fmt: skip

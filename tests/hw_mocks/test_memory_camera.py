@@ -10,27 +10,19 @@ import pytest
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError
 from hw_mocks.scene import MemoryCamera, MemorySettings, glare, open_memory_camera, render
+from tests.clock import Clock
 
 SMALL = MemorySettings(64, 64, 8, 1000.0, seconds=0.1, pictures=4, buffers=8, saturated=0.05)
 
 
-class Clock:
-    """A clock that only moves when it is told to."""
-
-    def __init__(self) -> None:
-        self.now = 100.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
 def test_a_late_reader_loses_frames_and_the_numbers_say_so() -> None:
     clock = Clock()
+    clock.now_s = 100.0
     with MemoryCamera(SMALL, "bench:", clock) as camera:
         frames = iter(camera)
-        clock.now += 0.0021  # two frames are due
+        clock.now_s += 0.0021  # two frames are due
         assert [next(frames).index for _ in range(2)] == [0, 1]
-        clock.now += 0.020  # 22 are due, the ring holds the last eight
+        clock.now_s += 0.020  # 22 are due, the ring holds the last eight
         late = next(frames)
         assert (late.index, late.lost_before) == (14, 12)
         rest = [late, *(next(frames) for _ in range(7))]

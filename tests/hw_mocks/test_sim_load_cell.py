@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import itertools
-import math
 import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from acquire.addresses import Options, parse_address
+from acquire.addresses import parse_address
 from acquire.errors import ConfigError
-from acquire.events import Event, ignore_event
+from acquire.events import Event, EventKind, ignore_event
 from acquire.load_cell.contract import LoadCell
+from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
-from hw_mocks.indicator import AsciiIndicator, Sensing
-from hw_mocks.indicator_server import IndicatorServer, PtyPort
-from hw_mocks.sim_indicators import INDICATORS
-from hw_mocks.sim_load_cell import NominalLoadCell, SimLoadCell, open_sim_load
-from hw_mocks.sim_settings import SERIAL_FAULTS, SPECIMEN_KEYS
-from hw_mocks.specimen import VirtualSpecimen, specimen_from, take_specimen
+from hw_mocks.indicator import IndicatorReading
+from hw_mocks.indicator_server import PtyPort
+from hw_mocks.sim_indicators import HbmAedIndicator
+from hw_mocks.sim_load_cell import NominalLoadCell, SimLoadCell, SimLoadSettings, _indicator, open_sim_load
+from hw_mocks.sim_settings import SERIAL_FAULTS
+from hw_mocks.specimen import VirtualSpecimen, specimen_from
 
 
 def opened(text: str, on_event=ignore_event) -> tuple[LoadCell, VirtualSpecimen]:
@@ -83,35 +83,6 @@ def test_port_is_gone_after_close() -> None:
     assert not path.parent.exists()
 
 
-def test_unplugged_port_is_reached_again() -> None:
-    events: list[Event] = []
-    cell, _ = opened("sim:?rate=100&faults=unplug@0.1*0.2", events.append)
-    with cell:
-        samples = first(cell, 100)
-    assert max(np.diff([s.t for s in samples])) > 0.2
-    assert [event.level for event in events][:1] == ["error"]
-    assert any("again" in event.text for event in events)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("protocol", INDICATORS)
-def test_every_protocol_reads_the_force(protocol: str) -> None:
-    """Simulator and reader were written apart from the same descriptions; here they meet.
-
-    The force rises for a second, then stands still: what is read there depends on no delay. A reader that comes late
-    may find two answers in one (NaN), never a wrong force.
-    """
-    cell, specimen = opened(f"sim:?seconds=1&hold=0&noise_N=0&wait=1&protocol={protocol}")
-    top, forces = float(specimen.force(specimen.duration_s)), []
-    with cell:
-        for sample in itertools.islice(cell, 1000):
-            forces += [] if math.isnan(sample.force) else [sample.force]
-            if forces[-3:] == pytest.approx([top] * 3, abs=0.06):
-                break
-    assert forces[-3:] == pytest.approx([top] * 3, abs=0.06)
-    assert forces == sorted(forces) and forces[0] < top / 2
-
-
 @pytest.mark.parametrize("fault", SERIAL_FAULTS)
 def test_every_fault_is_survived_by_the_reader(fault: str) -> None:
     """While the force still rises there are readings again that fit their time; one that is late itself may not."""
@@ -142,17 +113,6 @@ def test_nominal_time_in_lock_step() -> None:
     assert np.std(force - specimen.force(t)) == pytest.approx(cell.noise_N, rel=0.25)
 
 
-def test_nominal_tare() -> None:
-    events: list[Event] = []
-    cell, _ = opened("sim:?lockstep=yes&seconds=1&hold=0&noise_N=0", events.append)
-    stream = iter(cell)
-    before = [next(stream) for _ in range(20)][-1]
-    cell.tare()
-    after = next(stream)
-    assert events[0].data["offset_N"] == pytest.approx(before.force)
-    assert after.force < before.force / 5
-
-
 @pytest.mark.parametrize(
     ("text", "word"),
     [
@@ -164,30 +124,6 @@ def test_nominal_tare() -> None:
 def test_bad_settings_are_refused(text: str, word: str) -> None:
     with pytest.raises(ConfigError, match=word):
         opened(text)
-
-
-@pytest.mark.parametrize(
-    ("text", "word"),
-    [
-        ("sim:?E_GPa=3", "E_GPa belongs to the camera"),
-        ("sim:hole", "specimen is uniform"),
-        ("sim:?lockstep=yes", "lock step"),
-    ],
-)
-def test_a_second_specimen_is_refused(text: str, word: str) -> None:
-    specimen = VirtualSpecimen()
-    specimen.clock.claimed = True
-    with pytest.raises(ConfigError, match=word):
-        open_sim_load(parse_address(text), ignore_event, specimen)
-
-
-def test_keys_of_the_specimen_are_all_listed() -> None:
-    known = set[str]()
-    for text in ("sim:", "sim:?programme=cyclic"):
-        options = Options(parse_address(text))
-        take_specimen(options)
-        known |= set(options._known)
-    assert known == SPECIMEN_KEYS
 
 
 def test_pty_outlives_its_reader_and_counts_what_nobody_reads() -> None:
@@ -209,21 +145,125 @@ def test_pty_outlives_its_reader_and_counts_what_nobody_reads() -> None:
     port.close()
 
 
-def test_server_writes_lines_at_its_rate() -> None:
-    sensing = Sensing(lambda t: 5.0, lambda t: t, rate=500, noise_N=0.0)
-    with IndicatorServer(AsciiIndicator(style="plain"), sensing) as server:
-        reader = os.open(server.path, os.O_RDWR | os.O_NOCTTY)
-        data = b""
-        while data.count(b"\n") < 20:
-            data += os.read(reader, 1000)
-        os.close(reader)
-    assert set(data.split(b"\r\n")[1:-1]) == {b"5.0 N"}
+def test_forces_fall_by_what_the_event_states_and_rise_when_it_is_undone() -> None:
+    events: list[Event] = []
+    cell, specimen = opened("sim:?lockstep=yes&seconds=4&hold=2&noise_N=0&rate=50", events.append)
+    stream = iter(cell)
+    before = [next(stream) for _ in range(150)][-1]
+    true = float(specimen.force(149 / 50))
+    assert before.force == pytest.approx(true, abs=0.1) and true > 10
+    cell.tare()
+    tared = next(stream)
+    assert tared.force == pytest.approx(float(specimen.force(150 / 50)) - before.force, abs=0.1)
+    assert events[-1].kind is EventKind.TARE
+    assert events[-1].data == {"offset_N": before.force, "step_N": before.force}
+    cell.undo_tare()
+    assert next(stream).force == pytest.approx(float(specimen.force(151 / 50)), abs=0.1)
+    assert events[-1].data["step_N"] == pytest.approx(-before.force)
+    log = LoadLog()
+    for event in events:
+        log.take_event(event)
+    assert log.zero_at(events[0].t) == pytest.approx(before.force)
+    assert log.zero_at(events[-1].t) == pytest.approx(0)
+    cell.close()
 
 
-def test_on_nominal_time_a_weight_hangs_on_the_cell_and_forces_are_rounded() -> None:
-    cell, specimen = opened("sim:?lockstep=yes&seconds=2&rate=50&noise_N=0&resolution_N=2&weight_N=37")
+def steps(events: list[Event]) -> list[float]:
+    """By how much each tare made the forces fall, N."""
+    return [event.data["step_N"] for event in events if event.kind is EventKind.TARE]
+
+
+def test_each_tare_is_undone_by_itself() -> None:
+    events: list[Event] = []
+    cell, _ = opened("sim:?lockstep=yes&seconds=4&hold=0&noise_N=0&rate=50", events.append)
+    stream = iter(cell)
+    for _ in range(2):
+        for _ in range(20):
+            next(stream)
+        cell.tare()
+    first, second = steps(events)
+    assert first > 0 and second > 0
+    for _ in range(3):
+        cell.undo_tare()
+    assert steps(events)[2:] == pytest.approx([-second, -first])
+    cell.close()
+
+
+def test_without_a_tare_there_is_nothing_to_undo() -> None:
+    events: list[Event] = []
+    cell, _ = opened("sim:?lockstep=yes&seconds=1&noise_N=0", events.append)
+    cell.undo_tare()
+    (told,) = events
+    assert (told.kind, told.level, told.text, told.data) == (
+        EventKind.DEVICE, "warning", "there is no tare to undo", {"tared": False},
+    )  # fmt: skip
+    assert told.source == cell.info.address
+    assert next(iter(cell)).force == pytest.approx(0)
+
+
+def test_on_nominal_time_a_weight_hangs_on_the_cell_beside_the_force() -> None:
+    cell, specimen = opened("sim:?lockstep=yes&seconds=2&rate=10&noise_N=0&resolution_N=0.5&weight_N=12.3")
     samples = list(cell)
-    assert cell.noise_N == pytest.approx(2 / math.sqrt(12))
-    assert {sample.force % 2 for sample in samples} == {0.0}
-    truth = specimen.force([sample.t for sample in samples]) + 37
-    assert np.abs(truth - [sample.force for sample in samples]).max() <= 1.0
+    assert [sample.t for sample in samples] == pytest.approx([k / 10 for k in range(21)])
+    assert samples[0].force == 12.5 and samples[0].raw == b"12.5 N"
+    true = [float(specimen.force(sample.t)) + 12.3 for sample in samples]
+    assert [sample.force for sample in samples] == pytest.approx(true, abs=0.26)
+
+
+LINES = {"baud": "9600", "bytesize": "8", "parity": "N"}
+TIMED = {"millis": "1", "column": "2"}
+READERS: dict[str, tuple[SimLoadSettings, dict[str, str]]] = {
+    "ascii": (SimLoadSettings(), LINES | {"baud": "115200"} | TIMED),
+    "ascii plain": (SimLoadSettings(line="plain"), LINES | {"baud": "115200"}),
+    "ascii label": (SimLoadSettings(line="label"), LINES | {"baud": "115200"}),
+    "ascii openscale": (SimLoadSettings(line="openscale"), LINES | {"baud": "115200"} | TIMED),
+    "mt-sics": (SimLoadSettings("mt-sics"), LINES),
+    "aed-standard": (SimLoadSettings("aed-standard"), {"baud": "2400", "bytesize": "7", "parity": "E"}),
+    "mark10": (SimLoadSettings("mark10"), LINES),
+    "sauter": (SimLoadSettings("sauter"), LINES | {"unit": "N"}),
+    "hbm-aed": (
+        SimLoadSettings("hbm-aed", range_N=500.0),
+        LINES | {"parity": "E", "unit": "N", "nominal": "500"},
+    ),
+    "modbus": (
+        SimLoadSettings("modbus", resolution_N=0.02),
+        LINES | {"unit": "N", "profile": "laumas-tlb", "scale": "0.02"},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_the_reader_is_told_what_the_indicator_does_not_say(name: str) -> None:
+    settings, expected = READERS[name]
+    indicator, told = _indicator(settings)
+    assert told == {"protocol": name.partition(" ")[0]} | expected
+    assert (indicator.name, indicator.resolution) == (settings.protocol, settings.resolution_N)
+    if isinstance(indicator, HbmAedIndicator):
+        assert indicator.render(IndicatorReading(250.0)).startswith(b" 0500000")
+
+
+@pytest.mark.parametrize(
+    ("query", "words"),
+    [
+        ("seconds=3", "seconds belongs to the camera's sim: address, say it there"),
+        ("E_GPa=3", "E_GPa belongs to the camera"),
+        ("lockstep=no", "camera and load must both be in lock step or neither"),
+        ("rate=5&lockstep=yes", ""),
+    ],
+)
+def test_the_specimen_is_that_of_the_camera(query: str, words: str) -> None:
+    specimen = specimen_from(parse_address("sim:?lockstep=yes"))
+    specimen.clock.claimed = True
+    if not words:
+        assert open_sim_load(parse_address(f"sim:?{query}"), print, specimen).info.settings["rate"] == 5
+        return
+    with pytest.raises(ConfigError, match=words):
+        open_sim_load(parse_address(f"sim:?{query}"), print, specimen)
+
+
+def test_a_second_specimen_is_refused() -> None:
+    specimen = VirtualSpecimen()
+    specimen.clock.claimed = True
+    for text, words in (("sim:hole", "specimen is uniform"), ("sim:?lockstep=yes", "lock step")):
+        with pytest.raises(ConfigError, match=words):
+            open_sim_load(parse_address(text), ignore_event, specimen)

@@ -1,4 +1,4 @@
-"""A cyclic test of a simulated specimen whose stiffness falls: run, replay, files, report, and alarms on its cycles."""
+"""A cyclic test of a simulated specimen whose stiffness falls: run, replay, report, alarms, and what is recorded."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ import pytest
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError
 from acquire.events import Event
+from acquire.record_mode import RecordMode
+from acquire.session import Session
 from live.cli import main
-from live.config.loading import from_dict
+from live.config.loading import from_dict, load_config
 from live.config.sections import AlarmConfig
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import ActiveAlarms
@@ -35,7 +37,7 @@ from live.ui.terminal.screen import TerminalScreen
 from live.ui.web.run_result import run_result
 from tests.live.made_run import CONFIG, UTC_START
 from tests.live.made_up import CAMERA, START, make_grid, make_measurement
-from tests.live.test_end_to_end import live_run
+from tests.live.test_end_to_end import assert_replay_is_bit_equal, live_run, replay, strains
 
 N, FALL, E = 8, 0.1, 70e9
 SIM = (
@@ -106,20 +108,7 @@ def test_channels_follow_while_the_test_goes_on(finished: tuple[Path, Outcome, A
 def test_a_replay_counts_the_same(finished: tuple[Path, Outcome, Any], tmp_path: Path) -> None:
     folder, _, _ = finished
     again = tmp_path / "again"
-    assert (
-        main(
-            [
-                "replay",
-                str(folder / "session.h5"),
-                "--as-measured",
-                "--out",
-                str(again),
-                "--no-view",
-                "--no-rrd",
-            ]
-        )
-        == 0
-    )
+    assert_replay_is_bit_equal(folder, again)
     assert (again / "cycles.csv").read_text() == (folder / "cycles.csv").read_text()
     (folder / "figures.json").rename(tmp_path / "figures.json")
     (folder / "cycles.csv").rename(tmp_path / "cycles.csv")
@@ -167,11 +156,8 @@ def test_of_cycle_is_for_figures_of_cycles() -> None:
     absolute = from_dict({"load": force, "alarm": [{"channel": "secant_modulus", "below": 1e9}]}, {}, "here")
     with pytest.raises(ConfigError, match="it needs the section"):
         check_alarms(absolute)
-    check_alarms(
-        from_dict(
-            {"load": force, "alarm": [{"channel": "secant_modulus", "below": 0.9, "of_cycle": 1}]}, {}, ""
-        )
-    )
+    share = {"channel": "secant_modulus", "below": 0.9, "of_cycle": 1}
+    check_alarms(from_dict({"load": force, "alarm": [share]}, {}, ""))
 
 
 def test_a_look_at_the_rig_begins_no_cycles() -> None:
@@ -204,3 +190,46 @@ def test_a_held_force_has_its_creep_in_figures_and_report(tmp_path: Path) -> Non
     part = html.partition("<h2>Creep</h2>")[2].partition("</section>")[0]
     assert "<polyline" in part or "<path" in part
     assert "mean strain rate" in part and "power of 10" in part
+
+
+def test_the_spacing_grows_with_the_number() -> None:
+    kept = [n for n in range(1, 400) if RecordMode.parse("cycles=3").keeps_cycle(n)]
+    assert kept == [1, 2, 3, 10, 20, 30, 100, 200, 300]
+    kept = [n for n in range(1, 2001) if RecordMode.parse("cycles=10").keeps_cycle(n)]
+    assert kept == [*range(1, 10), *range(10, 100, 10), *range(100, 1000, 100), 1000, 2000]
+    with pytest.raises(ConfigError, match="'cycles=K' with K from 1"):
+        load_config(None, {"record.mode": "cycles=0"})
+    assert load_config(None, {"record.mode": "cycles=7"}).record.mode == "cycles=7"
+
+
+def test_valleys_and_peaks_are_recorded_and_replayed(tmp_path: Path) -> None:
+    folder, n, hold_s, fps = tmp_path / "run", 12, 2, 16
+    camera = SIM.replace(f"n={N}&fall={FALL}", f"n={n}")
+    outcome = live_run(folder, camera, **SECTION, **{"record.mode": "cycles=2"})
+    counts, rows = outcome.run_state.frame_counts, rows_of(folder)
+    assert outcome.exit_code == 0 and len(rows["cycle"]) == n and counts.adds_up
+    with Session.open(folder / "session.h5") as session:
+        assert session.mode == RecordMode("bursts") and len(session) == 0
+        times = session.burst_column("monotonic_s") - session.start_monotonic
+        frames, loads = session.burst_column("n").tolist(), session.load_curve()[1]
+    assert counts.recorded == sum(frames) and counts.thinned == counts.grabbed - sum(frames)
+    assert counts.load_samples == len(loads) > 100 * n
+    # The reference, the hold at the valley before the first cycle, cycles 1, 2 and 10, the last one, and the end.
+    assert times[1] < hold_s + 0.1 and times[-1] > hold_s + n
+    begun = rows["time_s"][[0, 1, 9, 11]]
+    wanted = np.sort([*begun[1:], *(begun + 0.5)])
+    assert times[2:-1] == pytest.approx(wanted, abs=0.6 / fps)
+    with open_run(folder) as run:
+        measured = dict(zip(run.strain.time_s.tolist(), run.force.tolist(), strict=True))
+    peaks = [measured[t] for t in times.tolist() if np.abs(rows["time_s"] + 0.5 - t).min() < 0.1]
+    assert peaks == pytest.approx(rows["peak_N"][[0, 1, 9, 11]], rel=0.02)
+    again = tmp_path / "again"
+    assert replay(folder, again, "--as-measured") == 0
+    live, back = strains(folder), strains(again)
+    rows_again = np.searchsorted(live["time_s"], back["time_s"])
+    assert len(rows_again) == len(times) - 1
+    # The solution begins at that of the burst before, which is another one here.
+    for name in ("exx", "eyy", "exy"):
+        off = np.abs(back[name] - live[name][rows_again])
+        assert np.nanmax(off / back[f"sigma_{name}"]) < 0.1
+    np.testing.assert_array_equal(back["force_N"], live["force_N"][rows_again])

@@ -10,7 +10,6 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 
@@ -20,11 +19,10 @@ from examples.documents import SETTINGS, Documents
 from examples.finished_run import main as finished_run
 from examples.plain_loop import main as plain_loop
 from examples.stop_machine import NotAlive, values
-from hw_mocks.deformation import Affine
-from hw_mocks.speckle import Speckle
 from live.cli import main as phasedic
 from phasedic import run as phasedic_run
 from tests.live.made_run import PULLED, make_run
+from tests.live.shots import write_shots
 
 
 def test_a_finished_run_is_read_and_exported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -46,7 +44,6 @@ def test_the_notebook_runs_cell_by_cell(
     runpy.run_module("examples.notebook", run_name="__main__")
     printed = capsys.readouterr().out
     modulus = re.search(r"E = ([0-9.]+) GPa from 5 instants", printed)
-    assert modulus is not None
     assert float(modulus[1]) == pytest.approx(70, rel=0.01)
     assert re.search(r"<StrainField 11 x 15 ZOIs, 165 of 165 with a value; mean exx -0.0018", printed)
     assert "<Strain strain.h5: 5 instants of 11 x 15 ZOIs, engineering strain>" in printed
@@ -78,13 +75,8 @@ def test_a_batch_measures_all_compares_them_and_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     runs, out = tmp_path / "runs", tmp_path / "out"
-    speckle = Speckle((128, 160), radius=2.0, seed=3)
     for name in ("a", "b"):
-        shots = tmp_path / name
-        shots.mkdir()
-        for k in range(4):
-            picture = 255 * speckle.render(Affine(dv_dy=1e-3 * k, x0=80, y0=64), (128, 160))
-            cv2.imwrite(str(shots / f"{k}.png"), np.rint(picture).astype(np.uint8))
+        shots = write_shots(tmp_path / name, (128, 160), [1e-3 * k for k in range(4)])
         quiet = ["--zoi", "48", "--burst", "1", "--no-view", "--no-rrd", "--out", str(runs / name)]
         assert phasedic(["run", "--camera", str(shots), *quiet]) == 0
     (runs / "broken").mkdir()

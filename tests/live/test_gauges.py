@@ -15,9 +15,8 @@ import numpy as np
 import pytest
 
 from acquire.errors import ConfigError
-from acquire.text.message import share_text
 from analysis import Status, StrainField
-from analysis.evaluate import AreaGauge, Gauge, GaugeSet, GaugeValue
+from analysis.evaluate import AreaGauge, Gauge, GaugeSet
 from analysis.field import ZoiGrid
 from live.cli import main
 from live.commands.options import add_gauges
@@ -33,7 +32,7 @@ from live.results.summary import StatusCard, summary_lines
 from live.run.outcome import Outcome
 from live.ui.rerun.drawing.layout import paint
 from live.ui.rerun.messages import LargeFigures
-from live.ui.terminal.screen import gauge_texts, status_line
+from live.ui.terminal.screen import status_line
 from tests.live.made_run import finished
 from tests.live.made_up import START, make_grid, make_measurement
 from tests.live.test_end_to_end import live_run
@@ -100,13 +99,6 @@ def test_a_replay_is_bit_equal_and_takes_other_gauges(recorded: tuple[Path, Outc
     values = {name for name in other if not name.endswith("_errors")}  # NeXus' second names of the sigmas
     assert values == {"time_s", *NAMES, "late", *(f"sigma_{n}" for n in (*NAMES, "late"))}
     assert not np.array_equal(other["axial"], gauges_in(folder)["axial"])
-
-
-def test_the_status_line_shows_gauges() -> None:
-    found = make_measurement(0).time_step
-    gauges = {"axial": GaugeValue(1.234e-3, 3e-6), "hole": GaugeValue(float("nan"), float("nan"), "lost")}
-    words = gauge_texts(replace(found, gauges=gauges))
-    assert words == ["axial 1\u202f234 ± 3 µm/m", "hole lost"]
 
 
 @pytest.mark.parametrize(
@@ -216,12 +208,6 @@ def test_each_value_has_the_share_of_its_own_area() -> None:
     assert whole.area_share == whole.least_share == 1
 
 
-def test_the_share_in_words() -> None:
-    assert share_text(1.0) == ""
-    assert share_text(0.834) == "of 83 % of the area"
-    assert share_text(0.9995) == "of 99 % of the area"
-
-
 def test_it_is_kept_in_the_history() -> None:
     history = History()
     history.add(measured(0, lost=True).time_step)
@@ -246,12 +232,6 @@ def test_status_line_card_summary_and_view_are_marked(lost: bool) -> None:
     assert (least in card) == (least in summary) == lost
     shown, whole = (LargeFigures.of(one) for one in (now, replace(now, area_share=1.0)))
     assert (paint(shown).tobytes() != paint(whole).tobytes()) == lost
-
-
-def test_only_the_gauge_over_the_block_is_marked() -> None:
-    half, far = gauge_texts(measured(0, lost=True).time_step)
-    assert half.endswith(f"of {math.floor(100 * share_of(GRID, HALF))} % of the area")
-    assert "area" not in far
 
 
 def test_table_and_maps_have_the_shares(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from live.config.loading import from_dict, load_config
 from live.config.rig_file import write_rig
 from live.results.reader import Strain
 from live.setup.grid import grid_for, plates_for
+from tests.live.test_end_to_end import assert_replay_is_bit_equal
 
 VIEW = "width=400&height=240&seconds=6&fps=5&max_strain=0.001&hold=1&noise=0.2&lockstep=yes"
 LENS = "stand_off_mm=500&settle_mm=0.2&settle_x_deg=0.1&settle_y_deg=0.1&plates=20,20,90,200;290,20,90,200"
@@ -74,13 +75,7 @@ def test_all_strains_are_corrected_and_the_raw_ones_kept(good: Path) -> None:
 
 
 def test_a_replay_is_bit_equal(good: Path, tmp_path: Path) -> None:
-    out = tmp_path / "again"
-    assert main(["replay", str(good / "session.h5"), "--as-measured", "--out", str(out), *QUIET]) == 0
-    with Strain.open(good / "strain.h5") as live, Strain.open(out / "strain.h5") as again:
-        for name in set(live.values) - {"latency_s", "kernel_s"}:
-            np.testing.assert_array_equal(live.values[name], again.values[name], err_msg=name)
-        for name in live.names:
-            np.testing.assert_array_equal(live.maps(name), again.maps(name), err_msg=name)
+    assert_replay_is_bit_equal(good, tmp_path / "again")
 
 
 @pytest.mark.slow
@@ -133,16 +128,11 @@ def test_impossible_tables_are_refused(plates: object, words: str) -> None:
 
 
 def test_plates_that_do_not_fit_are_refused() -> None:
-    def plan(box: list[float], **measure: object) -> None:
-        table = {
-            "measure": {"roi": [130, 20, 140, 200], "zoi": 32} | measure,
-            "plate": {"left": {"box": box}},
-        }
+    def plan(box: list[float]) -> None:
+        table = {"measure": {"roi": [130, 20, 140, 200], "zoi": 32}, "plate": {"left": {"box": box}}}
         config = from_dict(table, {}, "rig.toml")
         plates_for(config, grid_for(config, 400, 240, None), 400, 240)
 
-    with pytest.raises(ConfigError, match=r"plate\.left: the box leaves the picture of 400 x 240 px"):
-        plan([380, 20, 40, 200])
     with pytest.raises(ConfigError, match="plate left of 40 x 200 px has no room"):
         plan([20, 20, 40, 200])
     with pytest.raises(ConfigError, match="the plates cover the whole region"):

@@ -57,14 +57,6 @@ def test_a_module_that_hides_ours_is_named(tmp_path: Path, theirs: str) -> None:
     assert done.stderr.splitlines()[-1] == wanted
 
 
-def test_the_module_is_the_command_also_beside_a_module_that_hides_ours(tmp_path: Path) -> None:
-    (tmp_path / "analysis.py").touch()
-    run = [sys.executable, "-m", "phasedic", "--version"]
-    surroundings = {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(run, cwd=tmp_path, env=surroundings, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout) == (0, f"phasedic {phasedic.VERSION}\n"), done.stderr
-
-
 def test_a_replay_needs_no_whole_configuration() -> None:
     with pytest.raises(TypeError, match="give a mapping"):
         phasedic.replay("shots", phasedic.load_config(None, {}))

@@ -9,29 +9,22 @@ import shutil
 import socket
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError
-from acquire.events import EventKind
 from acquire.session import Session
 from hw_mocks.specimen import specimen_from
 from live.cli import main
-from live.config.cameras import camera_configs
-from live.config.loading import load_config
 from live.config.sections import CameraConfig, LoadConfig
-from live.pipeline.consumer import Screen
 from live.pipeline.run_state import FrameCounts
 from live.results.reader import Strain
 from live.results.run_folder import open_run
-from live.results.sides import SidesOfTest, newest
-from live.results.writer import write_results
-from live.run.live_run import CameraOfTest, LiveRun, run_cameras
-from live.run.outcome import OutcomeOfTest
+from live.results.sides import SidesOfTest
 from live.setup.devices import open_rigs
+from tests.live.test_end_to_end import assert_bit_equal, replay
 
 BENDING = 0.04
 VIEW = (
@@ -40,20 +33,8 @@ VIEW = (
 )
 FRONT, BACK = f"sim:?{VIEW}", f"sim:?{VIEW}&seed=7&side=back"
 MOTION = 200e-6  # strain that 0.1 mm at 500 mm shows
-MEASURE = [
-    "--roi",
-    "all",
-    "--zoi",
-    "32",
-    "--step",
-    "16",
-    "--burst",
-    "2",
-    "--reference-burst",
-    "4",
-    "--axis",
-    "y",
-]
+MEASURE = ["--roi", "all", "--zoi", "32", "--step", "16", "--burst", "2", "--reference-burst", "4",
+           "--axis", "y"]  # fmt: skip
 QUIET = ["--no-view", "--no-rrd"]
 
 
@@ -115,17 +96,12 @@ def test_one_clock_and_one_load_cell(good: Path) -> None:
 
 
 def test_a_replay_of_both_is_bit_equal(good: Path, tmp_path: Path) -> None:
-    out = tmp_path / "again"
-    moved = tmp_path / "moved"
+    out, moved = tmp_path / "again", tmp_path / "moved"
     shutil.copytree(good, moved)
-    assert main(["replay", str(moved), "--as-measured", "--out", str(out), *QUIET]) == 0
+    assert replay(moved, out, "--as-measured") == 0
     assert (out / "strain.csv").read_bytes() == (good / "strain.csv").read_bytes()
     for side in ("front", "back"):
-        with Strain.open(good / side / "strain.h5") as live, Strain.open(out / side / "strain.h5") as again:
-            for name in set(live.values) - {"latency_s", "kernel_s"}:
-                np.testing.assert_array_equal(live.values[name], again.values[name], err_msg=name)
-            for name in live.names:
-                np.testing.assert_array_equal(live.maps(name), again.maps(name), err_msg=name)
+        assert_bit_equal(good / side, out / side)
 
 
 def test_the_report_has_both_sides(good: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -133,12 +109,7 @@ def test_the_report_has_both_sides(good: Path, tmp_path: Path, capsys: pytest.Ca
     shutil.copytree(good, folder)
     assert main(["report", str(folder)]) == 0
     text = (folder / "report.html").read_text()
-    for words in (
-        "Front minus mean",
-        "Budget of E of the mean",
-        'href="front/report.html"',
-        'href="back/report.html"',
-    ):
+    for words in ("Front minus mean", "Budget of E of the mean", "front/report.html", "back/report.html"):
         assert words in text
     assert (folder / "back" / "report.html").exists()
     assert main(["sides", str(folder)]) == 0
@@ -228,133 +199,24 @@ def test_a_camera_that_is_not_there_refuses_the_test(tmp_path: Path) -> None:
     assert not (tmp_path / "test").exists()
 
 
-class Commanding(Screen):
-    """Gives commands at the first status lines of the front."""
-
-    def __init__(self) -> None:
-        self.both: LiveRun | None = None
-        self.shown: list[dict[str, Any]] = []
-
-    @property
-    def is_due(self) -> bool:
-        return True
-
-    def snapshot(self, snapshot: Any, words: str = "") -> None:
-        if self.both is None or not snapshot.time_step:
-            return
-        runs = self.both.cameras
-        self.shown.append(newest({name: run.run_state for name, run in runs.items()}))
-        if len(self.shown) == 1:
-            self.both.command(EventKind.NOTE, "seen")
-
-
-def attended(folder: Path) -> tuple[OutcomeOfTest, Commanding]:
-    given = {"camera.address": FRONT, "camera.back": BACK, "load.address": "sim:", "output.dir": str(folder)}
-    measure = {"zoi": 32, "step": 16, "burst": 2, "reference_burst": 4, "roi": "all"}
-    given |= {f"measure.{key}": value for key, value in measure.items()}
-    screen = Commanding()
-    sides = {
-        name: CameraOfTest(config, screen if name == "front" else Screen(), write_results)
-        for name, config in camera_configs(load_config(None, given), given).items()
-    }
-    return run_cameras(sides, on_start=lambda both: setattr(screen, "both", both)), screen
-
-
-def test_mean_and_bending_while_it_runs(tmp_path: Path) -> None:
-    outcome, screen = attended(tmp_path / "test")
-    assert outcome.exit_code == 0
-    for one in outcome.cameras.values():
-        kinds = [event.kind for event in one.run_state.event_log.events()]
-        assert kinds.count(EventKind.NOTE) == 1
-    mean, bending, sigma, _ = next(values["axial"] for values in reversed(screen.shown) if values)
-    specimen = specimen_from(parse_address(FRONT))
-    assert 0 < sigma < 1e-5
-    assert 0 <= bending < 0.25 * float(specimen.axial_strain(6.0)) + 5 * sigma
-    assert -5 * sigma < mean < float(specimen.axial_strain(6.0)) + 5 * sigma
-
-
-def test_the_configuration_of_each_side(tmp_path: Path) -> None:
-    back = tmp_path / "back.toml"
-    back.write_text(
-        "[camera]\naddress = '/dev/video1'\ncrop = [1, 2, 300, 200]\n[measure]\nroi = [5, 6, 70, 80]\nzoi = 48\n"
-        "[gauges.behind]\nkind = 'area'\nbox = [1, 2, 3, 4]\n[load]\naddress = 'sim:'\n"
-    )
-    front = {
-        "camera.address": "/dev/video0", "camera.crop": [0, 0, 100, 100], "load.address": "/dev/ttyUSB0",
-        "measure.mask": "front.png", "measure.zoi": 24, "specimen.area_mm2": 7.0, "operate.orders": "9000",
-        "gauges.axial": {"kind": "line", "start": [1, 1], "end": [1, 50]},
-    }  # fmt: skip
-    given = {"measure.zoi": 32}
-    one, other = camera_configs(load_config(None, front | {"camera.back": str(back)}), given).values()
-    assert (one.camera.back, one.measure.mask, one.operate.orders) == (None, "front.png", "9000")
-    assert other.camera == CameraConfig(address="/dev/video1", crop=(1, 2, 300, 200))
-    assert (other.measure.roi, other.measure.zoi, list(other.gauges)) == ((5, 6, 70, 80), 32, ["behind"])
-    assert (other.load.address, other.specimen.area_mm2, other.operate.orders) == ("/dev/ttyUSB0", 7.0, None)
-    _, plain = camera_configs(load_config(None, front | {"camera.back": "/dev/video2"}), {}).values()
-    assert plain.camera == CameraConfig(address="/dev/video2")
-    assert (plain.measure.mask, plain.measure.zoi, list(plain.gauges)) == (None, 24, ["axial"])
-    back.write_text("[camera]\naddress = 'sim:'\nback = 'sim:'\n")
-    with pytest.raises(ConfigError, match=r"no camera\.back or camera\.beside"):
-        camera_configs(load_config(None, front | {"camera.back": str(back)}), {})
-
-
 FIELDS = ["--camera", FRONT, "--beside", FRONT.replace("?", "?seed=11&"), "--load", "sim:"]
-
-
-@pytest.fixture(scope="module")
-def fields(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("fields") / "test"
-    rig = folder.with_suffix(".toml")
-    rig.write_text(
-        "[specimen]\narea_mm2 = 40\nstandard = 'free'\nmodulus_between = [1e-4, 7e-4]\n"
-        "[[alarm]]\nchannel = 'axial'\nabove = 0.5\n"
-    )
-    assert (
-        main(["run", "--config", str(rig), *FIELDS, *MEASURE, *QUIET, "--report", "--out", str(folder)]) == 0
-    )
-    return folder
-
-
-def test_two_fields_have_one_clock_and_each_its_strains(
-    fields: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert not (fields / "strain.csv").exists()  # neither a mean nor bending
-    specimen = specimen_from(parse_address(FRONT))
-    with open_run(fields / "first") as first, open_run(fields / "second") as second:
-        assert first.start_monotonic == second.start_monotonic
-        assert first.load_samples == second.load_samples
-        for run in (first, second):
-            bent = specimen.axial_strain(np.asarray(run.strain.time_s)) * (1 + BENDING)
-            error = np.asarray(run.strain.values["eyy"]) - bent
-            assert 0.5 * MOTION < error[-1] < 1.5 * MOTION  # one camera alone has the motion
-        assert not np.array_equal(first.strain.values["eyy"], second.strain.values["eyy"])
-    text = (fields / "report.html").read_text()
-    assert all(
-        words in text for words in ("2 fields of view", "Budget of E, second", 'href="first/report.html"')
-    )
-    assert "Front minus mean" not in text
-    assert main(["show", str(fields)]) == 4
-    assert f"give the folder of one, {fields / 'first'}" in capsys.readouterr().err
-
-
-def test_a_replay_of_two_fields_is_bit_equal(fields: Path, tmp_path: Path) -> None:
-    out = tmp_path / "again"
-    assert main(["replay", str(fields), "--as-measured", "--out", str(out), *QUIET]) == 0
-    for name in ("first", "second"):
-        with Strain.open(fields / name / "strain.h5") as live, Strain.open(out / name / "strain.h5") as again:
-            for column in live.names:
-                np.testing.assert_array_equal(live.maps(column), again.maps(column), err_msg=column)
 
 
 @pytest.fixture(scope="module")
 def three(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("three") / "test"
-    more = ["--beside", FRONT.replace("?", "?seed=13&")]
-    assert main(["run", *FIELDS, *more, *MEASURE, *QUIET, "--report", "--out", str(folder)]) == 0
+    rig = folder.with_suffix(".toml")
+    rig.write_text("[specimen]\narea_mm2 = 40\nstandard = 'free'\nmodulus_between = [1e-4, 7e-4]\n"
+                   "[[alarm]]\nchannel = 'axial'\nabove = 0.5\n")  # fmt: skip
+    cameras = ["--config", str(rig), *FIELDS, "--beside", FRONT.replace("?", "?seed=13&")]
+    assert main(["run", *cameras, *MEASURE, *QUIET, "--report", "--out", str(folder)]) == 0
     return folder
 
 
-def test_three_cameras_have_one_clock_one_load_and_one_report(three: Path) -> None:
+def test_three_cameras_have_one_clock_one_load_and_one_report(
+    three: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """And neither a mean nor bending; each has the motion that it sees."""
     specimen = specimen_from(parse_address(FRONT))
     with contextlib.ExitStack() as opened:
         runs = [opened.enter_context(open_run(three / name)) for name in ("first", "second", "third")]
@@ -364,18 +226,17 @@ def test_three_cameras_have_one_clock_one_load_and_one_report(three: Path) -> No
         bent = specimen.axial_strain(np.asarray(runs[0].strain.time_s))[-1] * (1 + BENDING)
         assert ends == pytest.approx([bent + MOTION] * 3, abs=2e-5) and len(set(ends)) == 3
     text = (three / "report.html").read_text()
-    assert all(
-        words in text for words in ("3 fields of view", "Budget of E, third", 'href="third/report.html"')
-    )
+    for words in ("3 fields of view", "Budget of E, third", 'href="third/report.html"'):
+        assert words in text
+    assert "Front minus mean" not in text and not (three / "strain.csv").exists()
+    assert main(["show", str(three)]) == 4
+    assert f"give the folder of one, {three / 'first'}" in capsys.readouterr().err
 
 
 def test_a_replay_of_three_cameras_is_bit_equal(three: Path, tmp_path: Path) -> None:
-    out = tmp_path / "again"
-    assert main(["replay", str(three), "--as-measured", "--out", str(out), *QUIET]) == 0
+    assert replay(three, tmp_path / "again", "--as-measured") == 0
     for name in ("first", "second", "third"):
-        with Strain.open(three / name / "strain.h5") as live, Strain.open(out / name / "strain.h5") as again:
-            for column in live.names:
-                np.testing.assert_array_equal(live.maps(column), again.maps(column), err_msg=column)
+        assert_bit_equal(three / name, tmp_path / "again" / name)
 
 
 LIVE_FIELD = "sim:?width=224&height=192&seconds=4&fps=10&max_strain=0.001&hold=1&noise=0.2"
@@ -389,7 +250,6 @@ def test_live_cameras_all_give_frames_and_one_that_fails_leaves_the_others(tmp_p
     measured = {}
     for name in ("first", "second", "third"):
         with Session.open(folder / name / "session.h5") as session:
-            assert session.frame_counts is not None
             counts = FrameCounts(**{key: session.frame_counts[key] for key in FrameCounts().as_dict()})
             assert counts.adds_up and counts.grabbed == counts.recorded > 10
             measured[name] = counts.grabbed

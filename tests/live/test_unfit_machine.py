@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
 from analysis import self_test as machine
 from analysis.kernel import solve
 from analysis.picture.splines import tap_table
-from hw_mocks.deformation import Affine
-from hw_mocks.speckle import Speckle
 from live.cli import main
 from live.replay.batch.task import Task, perform
+from tests.live.shots import write_shots
 
 
 @pytest.fixture
@@ -39,13 +37,7 @@ def break_taps(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
 
 @pytest.fixture
 def shots(tmp_path: Path) -> Path:
-    folder = tmp_path / "shots"
-    folder.mkdir()
-    speckle = Speckle((128, 160), radius=2.0, seed=3)
-    for k in range(10):
-        seen = 255 * speckle.render(Affine(dv_dy=1e-4 * k, x0=80, y0=64), (128, 160))
-        cv2.imwrite(str(folder / f"{k:02}.png"), np.rint(seen).astype(np.uint8))
-    return folder
+    return write_shots(tmp_path / "shots", (128, 160), [1e-4 * k for k in range(10)])
 
 
 def refused(capsys: pytest.CaptureFixture[str], *words: str) -> None:
@@ -56,37 +48,26 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> None:
     assert "Traceback" not in printed
 
 
-QUIET = ("--no-view", "--no-rrd")
-
-
-@pytest.mark.parametrize("command", ["run", "replay"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        "run --camera SHOTS --zoi 48 --burst 1 --no-view --no-rrd --out OUT",
+        "replay SHOTS --zoi 48 --burst 1 --no-view --no-rrd --out OUT",
+        "check --camera SHOTS --zoi 48",
+        "study SHOTS --zoi 32,48 --static 0,2 --loaded 5,8 --out OUT",
+        "characterise --pattern SHOTS/a0.png --quick --out OUT",
+    ],
+)
 def test_nothing_is_measured(
-    command: str,
+    words: str,
     shots: Path,
     tmp_path: Path,
     break_taps: Callable[[], None],
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    source = ["--camera", str(shots)] if command == "run" else [str(shots)]
-    words = [command, *source, "--zoi", "48", "--burst", "1", *QUIET, "--out", str(tmp_path / "out")]
     break_taps()
-    refused(capsys, *words)
+    refused(capsys, *words.replace("SHOTS", str(shots)).replace("OUT", str(tmp_path / "out")).split())
     assert not list(tmp_path.rglob("strain.h5"))
-
-
-def test_a_check_is_not_go(
-    shots: Path, break_taps: Callable[[], None], capsys: pytest.CaptureFixture[str]
-) -> None:
-    break_taps()
-    refused(capsys, "check", "--camera", f"files:{shots}", "--zoi", "48")
-
-
-def test_nor_is_a_study(
-    shots: Path, tmp_path: Path, break_taps: Callable[[], None], capsys: pytest.CaptureFixture[str]
-) -> None:
-    break_taps()
-    times = ["--static", "0,2", "--loaded", "5,8"]
-    refused(capsys, "study", str(shots), "--zoi", "32,48", *times, "--out", str(tmp_path / "out"))
 
 
 def test_a_worker_of_a_batch(shots: Path, tmp_path: Path, break_taps: Callable[[], None]) -> None:
@@ -101,14 +82,3 @@ def test_warming_up(break_taps: Callable[[], None], capsys: pytest.CaptureFixtur
     assert "self-test: a known pattern is measured right" in capsys.readouterr().out
     break_taps()
     refused(capsys, "warm-up")
-
-
-def test_characterise(
-    tmp_path: Path, break_taps: Callable[[], None], capsys: pytest.CaptureFixture[str]
-) -> None:
-    pattern = tmp_path / "pattern.png"
-    cv2.imwrite(
-        str(pattern), np.rint(255 * Speckle((128, 160), radius=2.0, seed=3).render(Affine(), (128, 160)))
-    )
-    break_taps()
-    refused(capsys, "characterise", "--pattern", str(pattern), "--quick", "--out", str(tmp_path / "out"))

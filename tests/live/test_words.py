@@ -125,6 +125,14 @@ KEYWORDS: dict[str, Any] = {
     "bad_value": None, "WireError": None,
 }  # fmt: skip
 FIELDS = re.compile(r"\{(\w+)[:}]")
+PACKAGES = ("acquire", "analysis", "hw_mocks", "live")
+
+
+@cache
+def modules(*packages: str) -> dict[Path, ast.Module]:
+    """What is written in the modules of packages."""
+    paths = (path for package in packages for path in sorted((ROOT / package).rglob("*.py")))
+    return {path: ast.parse(path.read_text("utf-8")) for path in paths}
 
 
 def name_of(call: ast.Call) -> str:
@@ -143,9 +151,8 @@ def put_together(tree: ast.Module) -> list[int]:
 def test_no_error_is_put_together() -> None:
     found = [
         f"{path.relative_to(ROOT)}:{line}"
-        for package in ("acquire", "analysis", "hw_mocks", "live")
-        for path in sorted((ROOT / package).rglob("*.py"))
-        for line in put_together(ast.parse(path.read_text("utf-8")))
+        for path, tree in modules(*PACKAGES).items()
+        for line in put_together(tree)
     ]
     assert not found, 'as ConfigError("{path}: no such file", path)'
 
@@ -167,11 +174,10 @@ def test_errors_that_are_put_together_are_found(code: str, count: int) -> None:
 def templates() -> dict[str, str]:
     """All messages of the program, with the place of each."""
     found: dict[str, str] = {}
-    for package in ("acquire", "analysis", "hw_mocks", "live"):
-        for path in sorted((ROOT / package).rglob("*.py")):
-            with path.open("rb") as file:
-                for line, text, *_ in extract("python", file, KEYWORDS):
-                    found.setdefault(str(text), f"{path.relative_to(ROOT)}:{line}")
+    for path in modules(*PACKAGES):
+        with path.open("rb") as file:
+            for line, text, *_ in extract("python", file, KEYWORDS):
+                found.setdefault(str(text), f"{path.relative_to(ROOT)}:{line}")
     return {text: place for text, place in found.items() if re.search("[A-Za-z]{2}", FIELDS.sub("", text))}
 
 
@@ -208,11 +214,12 @@ def test_a_translation_has_the_fields_of_its_text_and_stands_for_one_that_is_the
 
 def nouns() -> set[str]:
     """What ``counted`` is given as a word; the nouns of consumers and levels come as variables."""
-    trees = (
-        ast.parse(path.read_text("utf-8"))
-        for path in [*(ROOT / "acquire").rglob("*.py"), *(ROOT / "live").rglob("*.py")]
+    calls = (
+        node
+        for tree in modules("acquire", "live").values()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call)
     )
-    calls = (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call))
     words = (call.args[1] for call in calls if name_of(call) == "counted" and len(call.args) == 2)
     return {str(word.value) for word in words if isinstance(word, ast.Constant)}
 
@@ -267,34 +274,22 @@ def test_the_help_of_a_command_speaks_the_language_of_the_terminal(
 
 def test_every_field_has_a_value() -> None:
     """Of each message that is written down with its values."""
-    for package in ("acquire", "analysis", "hw_mocks", "live"):
-        for path in sorted((ROOT / package).rglob("*.py")):
-            for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-                if not isinstance(node, ast.Call) or not node.args:
-                    continue
-                if any(isinstance(one, ast.Starred) for one in node.args):
-                    continue
-                name = name_of(node)
-                text = node.args[0].value if isinstance(node.args[0], ast.Constant) else None
-                if (
-                    name in KEYWORDS
-                    and isinstance(text, str)
-                    and not any(one.arg is None for one in node.keywords)
-                ):
-                    given = len(node.args) - 1 + len(node.keywords)
-                    want = len(fields(text)) if given or name == "Message" else 0
-                    assert given == want, f"{path}:{node.lineno}: {text}"
+    for path, tree in modules(*PACKAGES).items():
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.Call) or name_of(node) not in KEYWORDS or not node.args:
+                continue
+            text = getattr(node.args[0], "value", None)
+            spread = any(isinstance(one, ast.Starred) for one in node.args)
+            if isinstance(text, str) and not spread and not any(one.arg is None for one in node.keywords):
+                given = len(node.args) - 1 + len(node.keywords)
+                want = len(fields(text)) if given or name_of(node) == "Message" else 0
+                assert given == want, f"{path}:{node.lineno}: {text}"
 
 
 def practice_rows() -> list[tuple[str, str, str]]:
-    tree = ast.parse((ROOT / "live" / "results" / "report" / "record.py").read_text("utf-8"))
-    tables = [one for one in tree.body if isinstance(one, ast.FunctionDef)]
-    rows = (
-        node
-        for one in tables
-        for node in ast.walk(one)
-        if isinstance(node, ast.Tuple) and len(node.elts) == 3
-    )
+    tree = modules("live")[ROOT / "live" / "results" / "report" / "record.py"]
+    nodes = (node for one in tree.body if isinstance(one, ast.FunctionDef) for node in ast.walk(one))
+    rows = (node for node in nodes if isinstance(node, ast.Tuple) and len(node.elts) == 3)
     heads = [tuple(getattr(one, "value", "") for one in row.elts) for row in rows]
     found = [row for row in heads if isinstance(row[0], str) and row[0][:1].isupper()]
     assert len(found) > 20
@@ -302,23 +297,15 @@ def practice_rows() -> list[tuple[str, str, str]]:
 
 
 HOLD_MESSAGES = ("why", "words", "remark", "reason", "refused", "apart", "state", "doing", "trouble", "text")
-TAKE_APART = (
-    "partition",
-    "rpartition",
-    "split",
-    "startswith",
-    "endswith",
-    "removeprefix",
-    "removesuffix",
-    "replace",
-)
+TAKE_APART = ("partition", "rpartition", "split", "startswith", "endswith", "removeprefix", "removesuffix",
+              "replace")  # fmt: skip
 
 
 def test_no_text_for_people_is_taken_apart() -> None:
     found = [
         f"{path.relative_to(ROOT)}:{line}: {code}"
-        for path in sorted((ROOT / "live").rglob("*.py"))
-        for line, code in taken_apart(ast.parse(path.read_text("utf-8")))
+        for path, tree in modules("live").items()
+        for line, code in taken_apart(tree)
     ]
     assert not found, "give what is asked for a field of its own"
 

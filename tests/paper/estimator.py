@@ -85,17 +85,10 @@ class PaperSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PaperField:
-    """What the paper's estimator measures; NaN where a ZOI leaves the picture.
+    """What the paper's estimator measures, (R, C) each; NaN where a ZOI leaves the picture.
 
-    Attributes
-    ----------
-    grid : ZoiGrid
-    u, v : (R, C) float64, px
-        From the bi-triangular window (section 2.2).
-    du_dx, du_dy, dv_dx, dv_dy : (R, C) float64
-        From the Gaussian window (section 3.1).
-    frequencies : (R, C) int
-        Usable frequencies of the bi-triangular window.
+    u and v, px, and the number of usable frequencies are of the bi-triangular window (section 2.2), the gradients
+    of the Gaussian one (section 3.1).
     """
 
     grid: ZoiGrid
@@ -129,19 +122,7 @@ class PaperField:
 
 
 class PaperEstimator:
-    """The estimator for one reference picture and one grid.
-
-    Parameters
-    ----------
-    reference : (H, W) uint8, uint16 or float, GL
-    grid : ZoiGrid
-    settings : PaperSettings
-
-    Raises
-    ------
-    ValueError
-        A picture that does not cover the grid.
-    """
+    """The estimator for one reference picture (H, W), GL, that covers the grid."""
 
     def __init__(
         self, reference: NDArray[np.generic], grid: ZoiGrid, settings: PaperSettings | None = None
@@ -159,13 +140,7 @@ class PaperEstimator:
         self._windows = gaussian_windows(size)
 
     def measure(self, deformed: NDArray[np.generic]) -> PaperField:
-        """Displacement and strain of all active ZOIs against the reference.
-
-        Raises
-        ------
-        ValueError
-            A picture of another shape than the reference.
-        """
+        """Displacement and strain of all active ZOIs against the reference."""
         image = np.asarray(deformed, np.float64)
         if image.shape != self._reference.shape:
             raise ValueError(f"the deformed picture is {image.shape}, the reference {self._reference.shape}")

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,19 +27,13 @@ Floats = NDArray[np.float64]
 Program = Callable[[Any, Any], Floats]
 SUBSET, STEP, RIM = 33, 8, 32
 """px; the pictures are measured but for a rim."""
+OF_WORKERS = {"NUMBA_NUM_THREADS": "1", "RAY_USAGE_STATS_ENABLED": "0"}
+"""Of Ray's processes: one thread of Numba each, and no usage reports."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """Centres of a program's subsets and the displacement there.
-
-    Attributes
-    ----------
-    x, y : (R, C) float64, px
-        Column and row in the reference picture.
-    u : (R, C) float64, px
-        NaN where the program found nothing.
-    """
+    """Centres of a program's subsets in the reference and u there, (R, C) px; NaN where it found nothing."""
 
     x: Floats
     y: Floats
@@ -51,20 +46,7 @@ def pyvale(reference: Any, deformed: Any) -> Floats:
 
 
 def pyvale_points(reference: Any, deformed: Any, cores: int | None = None) -> Points:
-    """pyvale, affine, B-spline, its own defaults (filter included).
-
-    Parameters
-    ----------
-    reference, deformed : (H, W) uint8 | uint16, grey levels
-        No subset reaches into the outer ``RIM`` px of the reference.
-    cores : int, optional
-        Its threads; by default it decides itself.
-
-    Raises
-    ------
-    ImportError
-        It is not installed. pyvale may raise others.
-    """
+    """pyvale, affine, B-spline, its own defaults (filter included), with so many threads, or as many as it takes."""
     mask = np.zeros(reference.shape, bool)
     mask[RIM:-RIM, RIM:-RIM] = True
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
@@ -89,21 +71,10 @@ def sun_dic(reference: Any, deformed: Any) -> Floats:
 
 
 def sun_dic_points(reference: Any, deformed: Any, rim: int = RIM, cores: int = 1) -> Points:
-    """SUN-DIC, affine, its defaults with splines of order 5.
+    """SUN-DIC, affine, its defaults with splines of order 5; no centre of a subset lies in the outer ``rim`` px.
 
-    Parameters
-    ----------
-    reference, deformed : (H, W) uint8 | uint16, grey levels
-    rim : int, px
-        No centre of a subset lies in the outer ``rim`` px of the reference.
-    cores : int
-        Processes. With more than one it starts Ray (which takes some seconds and leaves its log in the folder
-        of temporary files), and each process is limited to one thread; by default each starts one a core.
-
-    Raises
-    ------
-    ImportError
-        It is not installed. SUN-DIC and Ray may raise others.
+    With more ``cores`` than one it starts Ray, which takes some seconds and leaves its log in the folder of temporary
+    files, and each process is limited to one thread; by default each starts one a core.
     """
     cv2 = load_cv2()
     import sundic.post_process as results
@@ -122,7 +93,7 @@ def sun_dic_points(reference: Any, deformed: Any, rim: int = RIM, cores: int = 1
         settings.CPUCount = cores
         height, width = reference.shape
         settings.ROI = [rim, rim, width - 2 * rim, height - 2 * rim]
-        with _worker_environment() if cores > 1 else _one_thread():
+        with patch.dict(os.environ, OF_WORKERS) if cores > 1 else _one_thread():
             program.planarDICLocal(settings, str(Path(folder) / "results.sdic"))
         values, rows, columns = results.getDisplacements(str(Path(folder) / "results.sdic"), 0)
     x, y, u = (values[:, c].reshape(rows, columns, order="F") for c in (0, 1, 3))
@@ -140,22 +111,6 @@ def _one_thread() -> Iterator[None]:
         yield
     finally:
         numba.set_num_threads(before)
-
-
-@contextlib.contextmanager
-def _worker_environment() -> Iterator[None]:
-    """The environment of Ray's processes: one Numba thread each, and no usage reports."""
-    wanted = {"NUMBA_NUM_THREADS": "1", "RAY_USAGE_STATS_ENABLED": "0"}
-    before = {name: os.environ.get(name) for name in wanted}
-    os.environ.update(wanted)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 def _inner(u: Floats) -> Floats:

@@ -19,16 +19,7 @@ WORDS: tuple[Word, ...] = ("better", "equal", "worse")
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Our result against another one.
-
-    Attributes
-    ----------
-    subject : str
-        The quantity, with both figures.
-    against : str
-        "the paper", "the paper's estimator", "the limit", the name of a peer ...
-    word : "better" | "equal" | "worse"
-    """
+    """Our result against another one: the paper, the limit or a peer; both figures are in the subject."""
 
     subject: str
     against: str
@@ -62,13 +53,7 @@ def colour_map(axes: Any, values: Any, title: str, unit: str, limits: Sequence[f
 
 
 def read_outcome(name: str, folder: Path, key: str) -> ExperimentOutcome | None:
-    """The outcome of an earlier run with the same key; None where there is none.
-
-    Raises
-    ------
-    DataError
-        The file is not an outcome.
-    """
+    """The outcome of an earlier run with the same key; None where there is none."""
     path = folder / f"{name}.json"
     if not path.exists():
         return None

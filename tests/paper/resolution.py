@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.opencv.images import read_image
 from analysis import Estimator, KernelSettings
 from analysis.field import Roi, ZoiGrid
 from analysis.picture.pattern import resolution_length
@@ -17,7 +18,7 @@ from hw_mocks.deformation import Affine, Wave
 from live.setup.pattern.imposed import LENGTH_OF_C
 from live.setup.pattern.outcome import ExperimentContext, ExperimentOutcome, ResultTable, figure, save_figure
 from tests.paper.outcomes import Comparison, verdict
-from tests.paper.truth import SensorModel, TrueScene, grey_picture, ours, papers
+from tests.paper.truth import SensorModel, TrueScene, ours, papers
 
 Floats = NDArray[np.float64]
 RADIUS = 2.0
@@ -103,7 +104,7 @@ def fitted_length(periods: Floats, kept: Floats) -> tuple[float, float]:
 
 def star_length(folder: Path, estimator: str, size: int) -> tuple[float, float]:
     """(l_10% px, std px at periods above 200 px) on the middle row of the DIC Challenge 2.0 Star."""
-    pair = grey_picture(folder / STAR[0] / STAR[1]), grey_picture(folder / STAR[0] / STAR[2])
+    pair = tuple(read_image(folder / STAR[0] / name, gray="luma") for name in STAR[1:3])
     top = STAR_ROW - size // 2
     grid = ZoiGrid.cover(Roi(0, top, pair[0].shape[1], size), size, 4 if estimator == "ours" else 8)
     field = measured(estimator, pair, grid, None)

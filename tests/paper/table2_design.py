@@ -34,14 +34,8 @@ SIGNIFICANT = 95.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DesignFit:
-    """A linear model on the coded factors, -1 and 1.
-
-    Attributes
-    ----------
-    beta, sigma : (11,) float64
-        Coefficients (``TERMS``) and their standard errors.
-    confidence : (11,) float64, %
-        That the coefficient is not zero, two-sided.
+    """A linear model on the coded factors, -1 and 1: coefficients (``TERMS``), (11,) each, their standard errors, and
+    the two-sided confidence in % that they are not zero.
     """
 
     beta: Floats
@@ -57,13 +51,7 @@ def model_matrix(corners: NDArray[Any]) -> Floats:
 
 
 def fitted(corners: NDArray[Any], response: Floats) -> DesignFit:
-    """Least squares with Student's confidence.
-
-    Parameters
-    ----------
-    corners : (N, 4) of -1 and 1
-    response : (N,); rows that are not finite are left out
-    """
+    """Least squares with Student's confidence; corners (N, 4) whose response is not finite are left out."""
     from scipy.special import stdtr
 
     good = np.isfinite(response)

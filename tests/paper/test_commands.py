@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import io
-import os
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -252,16 +251,6 @@ def test_empty_rim_is_cut_off() -> None:
     inner = others._inner(u)
     assert inner.shape == (3, 3)
     assert np.count_nonzero(np.isnan(inner)) == 1
-
-
-def test_what_the_workers_inherit_is_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("NUMBA_NUM_THREADS", "2")
-    monkeypatch.delenv("RAY_USAGE_STATS_ENABLED", raising=False)
-    with pytest.raises(RuntimeError, match="ray"), others._worker_environment():
-        assert os.environ["NUMBA_NUM_THREADS"] == "1"
-        raise RuntimeError("ray")
-    assert os.environ["NUMBA_NUM_THREADS"] == "2"
-    assert "RAY_USAGE_STATS_ENABLED" not in os.environ
 
 
 @pytest.mark.slow

@@ -14,7 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquire.errors import ConfigError, DataError
-from live.commands.map import for_display
 from live.setup.pattern.imposed import ExpectedErrors, Imposed, robust_std
 from live.setup.pattern.outcome import (
     ExperimentContext,
@@ -88,18 +87,6 @@ def test_classical_derivation() -> None:
     kept = derived(wave, 8, low_pass)[10, 8:-8] / (2 * np.pi / 128 * np.cos(2 * np.pi * x / 128))[8:-8]
     assert np.median(kept) == pytest.approx(math.exp(-2 * np.pi**2 * (100 - 36) / 128**2), rel=0.02)
     assert low_pass_for(5.0, 6.0, 8) == 0
-
-
-def test_filters_of_the_display_touch_neither_gaps_nor_the_input() -> None:
-    values = np.full((20, 30), 2.0)
-    values[4, 5] = 90.0
-    values[10:13, 10:13] = np.nan
-    before = values.copy()
-    shown = for_display(values, 8)
-    assert np.array_equal(values, before, equal_nan=True)
-    assert np.array_equal(np.isnan(shown), np.isnan(values))
-    assert np.nanmax(np.abs(shown - 2.0)) < 1e-9
-    assert np.array_equal(for_display(values, 8, 0, 1), values, equal_nan=True)
 
 
 def test_plane_of_a_gauge() -> None:

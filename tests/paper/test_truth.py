@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from acquire.errors import DataError
 from analysis.field.grid import Roi, ZoiGrid
 from analysis.picture.pattern import predicted_sigma
 from hw_mocks.deformation import Affine, Wave
@@ -16,7 +13,6 @@ from tests.paper.truth import (
     TiledStrain,
     Tiles,
     TrueScene,
-    grey_picture,
     limit,
     ours,
     papers,
@@ -93,13 +89,3 @@ def test_response_of_the_window(scene: TrueScene) -> None:
         / 0.1
     )
     assert kept == pytest.approx(np.exp(-2 * np.pi**2 * 64 / 96**2), abs=0.04)
-
-
-def test_pictures_from_files(tmp_path: Path) -> None:
-    import cv2
-
-    levels = np.arange(600, dtype=np.uint16).reshape(20, 30)
-    cv2.imwrite(str(tmp_path / "a.tif"), levels)
-    assert np.array_equal(grey_picture(tmp_path / "a.tif"), levels)
-    with pytest.raises(DataError, match=r"b\.tif"):
-        grey_picture(tmp_path / "b.tif")

@@ -1,7 +1,5 @@
-"""Known truth for the paper reproduced: rendered pictures, a camera model, and the noise limit.
-
-The analytic renderer of ``hw_mocks`` makes the pictures without interpolation. The limit follows from the
-renderer's own gradient by weighted least squares and shares no code with the kernel.
+"""Known truth for the paper reproduced: pictures that ``hw_mocks`` renders without interpolation, a camera model, and
+the noise limit by the renderer's own gradient.
 """
 
 from __future__ import annotations
@@ -9,18 +7,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from acquire.opencv.images import read_image
 from analysis import KernelSettings, PhaseKernel
 from analysis.field import Roi, StrainField, ZoiGrid
 from hw_mocks.deformation import Affine, Deformation, Gradient
 from hw_mocks.speckle import Speckle
 from live.setup.pattern.imposed import QUANTISATION
+from tests.accuracy.limit import Limit, least_squares
 from tests.paper.estimator import PaperEstimator, PaperField, PaperSettings
 
 Floats = NDArray[np.float64]
@@ -32,14 +29,7 @@ SLOPE_STEP = 0.05  # px, of the renderer's shifts for the gradient
 
 @dataclass(frozen=True, slots=True)
 class Tiles:
-    """Many single ZOIs in one picture, with space around each.
-
-    Attributes
-    ----------
-    pitch : int, px
-        Even; side of a tile.
-    columns, rows : int
-    """
+    """Many single ZOIs in one picture, each in the middle of a tile of an even side ``pitch`` px."""
 
     pitch: int
     columns: int = 10
@@ -83,14 +73,7 @@ class TiledStrain:
 
 @dataclass(frozen=True, slots=True)
 class SensorModel:
-    """A sensor: encoding and white noise.
-
-    Attributes
-    ----------
-    bits : int
-    noise : float, GL
-        Standard deviation, before rounding.
-    """
+    """A sensor: encoding, and white noise before rounding, standard deviation in GL."""
 
     bits: int
     noise: float = 0.0
@@ -114,14 +97,7 @@ class SensorModel:
 
 
 class TrueScene:
-    """A speckle pattern, its pictures and its exact gradient.
-
-    Parameters
-    ----------
-    shape : (H, W), px
-    radius : float, px
-    seed : int
-    """
+    """A speckle pattern (radius in px), its pictures of ``shape`` (H, W) and its exact gradient."""
 
     def __init__(self, shape: tuple[int, int], radius: float, seed: int) -> None:
         self.speckle = Speckle(shape, radius, seed=seed)
@@ -149,57 +125,15 @@ class TrueScene:
         return np.asarray(along_x, float), np.asarray(along_y, float)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Limit:
-    """The best that weighted least squares can do on a pattern, parameters u, du_dx, du_dy, v, dv_dx, dv_dy.
-
-    Attributes
-    ----------
-    sigma : (6, R, C) float64
-        Standard deviation for noise of 1 (in the unit of the slopes) in either picture.
-    response : (6, R, C) float64 or None
-        The result for noise-free pictures of a displacement field: the window's attenuation.
-    """
-
-    sigma: Floats
-    response: Floats | None = None
-
-
 def limit(
     slopes: tuple[Floats, Floats],
     grid: ZoiGrid,
     sigma_w: float,
     field: tuple[Floats, Floats] | None = None,
 ) -> Limit:
-    """Noise limit and window response of a Gaussian weight.
-
-    Parameters
-    ----------
-    slopes : two (H, W)
-    grid : ZoiGrid
-    sigma_w : float, px
-    field : two (H, W), px, optional
-        A displacement field on the pixels.
-
-    Notes
-    -----
-    covariance 2 (J'wJ)^-1 (J'w^2J)(J'wJ)^-1, response (J'wJ)^-1 J'w (f_x u + f_y v).
-    """
+    """Noise limit and window response of a Gaussian weight, sigma_w in px."""
     x = np.arange(grid.size) - (grid.size - 1) / 2
-    weight = np.outer(*[np.exp(-0.5 * (x / sigma_w) ** 2)] * 2).ravel()
-    sigma, response = np.empty((6, *grid.shape)), np.empty((6, *grid.shape))
-    for row, top in enumerate(grid.first_y):
-        for column, left in enumerate(grid.first_x):
-            cut = np.s_[top : top + grid.size, left : left + grid.size]
-            fx, fy = slopes[0][cut], slopes[1][cut]
-            j = np.stack([fx, fx * x, fx * x[:, None], fy, fy * x, fy * x[:, None]]).reshape(6, -1)
-            jw = j * weight
-            inverse = np.linalg.inv(jw @ j.T)
-            sigma[:, row, column] = np.sqrt(2 * np.diag(inverse @ (jw * weight @ j.T) @ inverse))
-            if field is not None:
-                change = (fx * field[0][cut] + fy * field[1][cut]).ravel()
-                response[:, row, column] = inverse @ (jw @ change)
-    return Limit(sigma, None if field is None else response)
+    return least_squares(slopes, grid.first_x, grid.first_y, np.exp(-0.5 * (x / sigma_w) ** 2), field)
 
 
 def ours(
@@ -212,14 +146,3 @@ def ours(
 def papers(pair: tuple[Image, Image], grid: ZoiGrid, settings: PaperSettings | None = None) -> PaperField:
     """The field of the paper's estimator, by default without iteration."""
     return PaperEstimator(pair[0], grid, settings).measure(pair[1])
-
-
-def grey_picture(path: Path) -> Image:
-    """A grey picture from a file, (H, W) uint8 or uint16.
-
-    Raises
-    ------
-    DataError
-        Missing, not a picture, or damaged.
-    """
-    return read_image(path, gray="luma")

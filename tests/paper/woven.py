@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.opencv.images import read_image
 from analysis.field import Roi, StrainField, ZoiGrid
 from hw_mocks.deformation import SpecimenDeformation, StrainModes
 from live.commands.map import PAPER_LOW_PASS, for_display
@@ -25,7 +26,7 @@ from live.setup.pattern.outcome import (
 )
 from tests.paper.estimator import PaperSettings
 from tests.paper.outcomes import Comparison, colour_map, verdict
-from tests.paper.truth import SensorModel, TrueScene, grey_picture, ours, papers
+from tests.paper.truth import SensorModel, TrueScene, ours, papers
 
 Floats = NDArray[np.float64]
 CELL, OVER, MEAN_STRAIN, NU = 160.0, 0.6, 1e-3, 0.3
@@ -144,7 +145,7 @@ def open_hole(context: ExperimentContext) -> ExperimentOutcome:
     if context.data is None or not (context.data / HOLE).is_dir():
         text = "Left out: give the folder of the DIC Challenge image sets with `--data DIR`."
         return ExperimentOutcome("open-hole", "Section 4.2: a real composite with a hole", text)
-    pictures = [grey_picture(context.data / HOLE / name) for name in HOLE_FRAMES]
+    pictures = [read_image(context.data / HOLE / name, gray="luma") for name in HOLE_FRAMES]
     step = 16 if context.quick else 8
     mask = _specimen(pictures[0])
     grids = {size: ZoiGrid.cover(HOLE_ROI, size, step, mask) for size in (48, 32)}

@@ -177,7 +177,7 @@ def test_from_the_devices_to_the_replay(
     assert main(["init", "rig.toml", "--camera", camera, "--load", "none:", "--zoi", "32"]) == 0
     assert main(["check", "--config", "rig.toml"]) in (0, 6)
     assert "saturated pixels" in capsys.readouterr().out
-    measured = (
+    measured = [
         "--step",
         "16",
         "--burst",
@@ -188,7 +188,7 @@ def test_from_the_devices_to_the_replay(
         "all",
         "--no-view",
         "--no-rrd",
-    )
+    ]
     code = main(["run", "--config", "rig.toml", *measured, "--seconds", "4", "--out", "run", "--report"])
     with Session.open(Path("run/session.h5")) as session:
         counts = session.frame_counts

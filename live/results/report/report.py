@@ -10,6 +10,7 @@ import numpy as np
 
 from acquire.hdf5 import storable
 from acquire.text import Amount, Message, counts
+from acquire.text.message import counted
 from acquire.text.message import joined as joined_texts
 from analysis.evaluate import AT_LEAST, CONFIDENCE
 from live.pipeline.consumer import Screen
@@ -180,9 +181,9 @@ def _head(run: RunFolder, curve: EvaluatedCurve, test: FinishedTest) -> Html:
     now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
     seconds = float(run.strain.time_s[-1])
     words = Message(
-        "Test of {start}: {n} measurements in {seconds:.4g} s.",
+        "Test of {start}: {measurements} in {seconds:.4g} s.",
         run.strain.start_utc,
-        *counts(run.strain.n),
+        counted(run.strain.n, "measurement"),
         seconds,
     )
     made = Message(" Report made by phasedic on {now}.", now)

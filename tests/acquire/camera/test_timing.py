@@ -1,10 +1,13 @@
-"""Pauses, gaps at the end, numbers that begin again."""
+"""Pauses, gaps at the end, and numbers of frames: of 32 bits, of 16, and of none."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from acquire.camera import (
     FrameCounter,
@@ -43,6 +46,79 @@ def test_frames_that_a_camera_owes_at_the_end(camera: CameraInfo, silent_s: floa
 def test_the_longest_pause() -> None:
     assert longest_pause_s(100, None) == longest_pause_s(None, None) == 0.5
     assert longest_pause_s(5, 0.1) == pytest.approx(1.1)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "lost"),
+    [
+        (2**32 - 1, 0, 0),
+        (2**32 - 3, 2, 4),
+        (2**31 - 1, 2**31, 0),
+        (10, 10 + 2**30 + 5, 2**30 + 4),  # more than a quarter of the range is still a gap
+        (10, 10 + 2**31 - 1, 2**31 - 2),
+    ],
+)
+def test_a_gap_anywhere_in_the_range(before: int, after: int, lost: int) -> None:
+    counter = FrameCounter()
+    counter.count(before, 1.0, None)
+    assert counter.count(after, 2.0, None) == lost
+    assert counter.index == before + 1 + lost and counter.counts_itself
+
+
+def test_a_number_that_goes_back_is_no_gap() -> None:
+    counter = FrameCounter()
+    counter.count(1000, 1.0, 10.0)
+    assert counter.count(990, 1.1, 10.0) == 0
+    assert not counter.counts_itself and counter.index == 1001
+
+
+def test_half_the_range_is_no_gap_any_more() -> None:
+    counter = FrameCounter()
+    counter.count(10, 1.0, 10.0)
+    assert counter.count(10 + 2**31, 1.3, 10.0) == 2
+    assert not counter.counts_itself and counter.index == 13
+
+
+@pytest.mark.parametrize(
+    ("numbers", "indices"),
+    [
+        pytest.param((7, 8, 12), [7, 8, 12], id="it begins with the number of the driver"),
+        pytest.param((2**32 - 1, 0, 2), [2**32 - 1, 2**32, 2**32 + 2], id="32 bits run over"),
+    ],
+)
+def test_gaps_are_those_of_the_drivers_numbers(numbers: tuple[int, ...], indices: list[int]) -> None:
+    counter, found, lost = FrameCounter(), [], []
+    for k, number in enumerate(numbers):
+        lost.append(counter.count(number, 0.1 * k, 10.0))
+        found.append(counter.index)
+    assert found == indices and lost == [0, *(b - a - 1 for a, b in pairwise(indices))]
+
+
+def test_a_driver_that_does_not_count_is_noticed() -> None:
+    """And its gaps are those of the rate that comes, 10, not the 20 that it says."""
+    counter = FrameCounter()
+    times = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.9, 1.0)
+    assert [counter.count(0, t, 20.0) for t in times] == [0] * 7 + [2, 0]
+    assert not counter.counts_itself
+    assert counter.index == 10
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 2**32 - 1), st.floats(-1e3, 1e6), st.booleans()), max_size=40),
+    st.sampled_from([None, 1.0, 60.0]),
+)
+def test_numbers_always_increase_and_agree_with_the_losses(
+    stamps: list[tuple[int, float, bool]], fps: float | None
+) -> None:
+    counter = FrameCounter()
+    last = None
+    for sequence, t, restart in stamps:
+        if restart:
+            counter.restart()
+        lost = counter.count(sequence, t, fps)
+        if last is not None:
+            assert counter.index == last + 1 + lost
+        last = counter.index
 
 
 def test_numbers_from_1_to_65535_begin_again() -> None:
@@ -92,15 +168,7 @@ def test_the_bounds_of_a_setting_hold_what_is_in_force() -> None:
 
 @pytest.mark.parametrize(
     ("seconds", "fps", "missing"),
-    [
-        (0.1, 10.0, 0),
-        (0.14, 10.0, 0),
-        (0.16, 10.0, 1),
-        (1.0, 10.0, 9),
-        (-1.0, 10.0, 0),
-        (1.0, None, 0),
-        (1.0, 0.0, 0),
-    ],
+    [(0.1, 10, 0), (0.14, 10, 0), (0.16, 10, 1), (1.0, 10, 9), (-1.0, 10, 0), (1.0, None, 0), (1.0, 0, 0)],
 )
 def test_frames_missing_between_two_stamps(seconds: float, fps: float | None, missing: int) -> None:
     assert missing_between(100.0, 100.0 + seconds, fps) == missing

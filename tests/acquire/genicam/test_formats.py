@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from acquire.errors import DataError
 from acquire.genicam.formats import FORMATS, decode, preferred, readable
-from tests.genicam.packing import PACK, bits_of, picture
+from tests.genicam.packing import PACK, PIXEL_FORMATS, bits_of, picture
 
 
 @pytest.mark.parametrize("name", FORMATS)
-@pytest.mark.parametrize("size", [(64, 48), (3, 5), (5, 1), (1, 1)])
+@pytest.mark.parametrize("size", [(64, 48), (5, 1), (1, 1)])
 def test_every_format_bit_for_bit(name: str, size: tuple[int, int]) -> None:
     width, height = size
     sent = picture(7, width, height, name)
@@ -23,12 +21,6 @@ def test_every_format_bit_for_bit(name: str, size: tuple[int, int]) -> None:
     assert np.array_equal(image, sent)
     assert image.dtype == (np.uint8 if FORMATS[name].bits == 8 else np.uint16)
     assert not image.flags.writeable
-
-
-@given(st.sampled_from(sorted(FORMATS)), st.lists(st.integers(0, 2**16 - 1), min_size=1, max_size=40))
-def test_any_grey_levels(name: str, levels: list[int]) -> None:
-    sent = np.array(levels, np.uint16) & np.uint16(2 ** bits_of(name) - 1)
-    assert decode(PACK[name](sent), FORMATS[name], len(sent), 1)[0].tolist() == sent.tolist()
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -50,24 +42,16 @@ def test_rows_with_padding(name: str, width: int, last: int) -> None:
         decode(content[: len(content) - last - 1], FORMATS[name], width, 6, 7)
 
 
-def test_twelve_bits_are_preferred() -> None:
-    assert preferred(["Mono8", "Mono12Packed", "Mono16"]) == "Mono12Packed"
-    assert preferred(["BayerRG8"]) is None
-
-
-NAMED = {  # PFNC: the code has the bits of a pixel in its third byte
-    "Mono8": (0x01080001, 8), "Mono10": (0x01100003, 10), "Mono12": (0x01100005, 12), "Mono14": (0x01100025, 14),
-    "Mono16": (0x01100007, 16), "Mono10p": (0x010A0046, 10), "Mono12p": (0x010C0047, 12),
-    "Mono10Packed": (0x010C0004, 10), "Mono12Packed": (0x010C0006, 12),
-}  # fmt: skip
-
-
 def test_codes_and_significant_bits_are_those_of_the_naming_convention() -> None:
-    assert {name: (one.code, one.bits) for name, one in FORMATS.items()} == NAMED
+    wanted = {name: (code, bits_of(name)) for name, code in PIXEL_FORMATS.items()}
+    assert {name: (one.code, one.bits) for name, one in FORMATS.items()} == wanted
     assert all(one.size(16) == 2 * (one.code >> 16 & 0xFF) for one in FORMATS.values())
 
 
 def test_twelve_bits_come_first_then_more_than_eight_and_eight_last() -> None:
-    assert readable([*reversed(NAMED), "BayerRG8"]) == [
+    assert readable([*reversed(PIXEL_FORMATS), "BayerRG8"]) == [
         "Mono12p", "Mono12Packed", "Mono12", "Mono14", "Mono10p", "Mono10Packed", "Mono10", "Mono16", "Mono8",
     ]  # fmt: skip
+    assert (
+        preferred(["Mono8", "Mono12Packed", "Mono16"]) == "Mono12Packed" and preferred(["BayerRG8"]) is None
+    )

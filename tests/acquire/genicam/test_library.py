@@ -15,7 +15,7 @@ from acquire.genicam import library
 from acquire.genicam.camera import FoundCamera
 from acquire.genicam.device import STATUS, GenicamDevice
 from acquire.genicam.library import _ERROR, CALLS, GenicamError, has_aravis
-from tests.acquire.genicam.test_features import Able
+from tests.acquire.genicam.test_setup import Able
 
 
 class Library:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Any, ClassVar
+from typing import Any
 
 import pytest
 
@@ -12,8 +12,6 @@ from acquire.camera.contract import open_camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.genicam import library
 from acquire.genicam.camera import list_cameras, name_of
-from acquire.genicam.device import GenicamDevice
-from acquire.genicam.formats import FORMATS, decode
 from acquire.genicam.library import CALLS, load_aravis
 from acquire.genicam.settings import GenicamSettings
 from acquire.pylon import list_cameras as list_basler_cameras
@@ -51,6 +49,9 @@ def test_which_camera_is_meant() -> None:
         named("Modern", "1", "2")
     with pytest.raises(DeviceError, match="Cameras here: none"):
         named("")
+    for part in ("Maker", "Mod", "maker-1"):
+        with pytest.raises(DeviceError, match=r"Cameras here: genicam:Maker-1  x Modern \(1, x x\)"):
+            named(part, "1")
 
 
 def test_settings_and_features() -> None:
@@ -59,36 +60,11 @@ def test_settings_and_features() -> None:
     assert (settings.format, settings.fps, settings.stamp) == ("Mono12p", 30, "end")
     assert settings.waits_for_trigger and not settings.fires_triggers
     assert settings.features == {"BlackLevel": "64"}
-
-
-class OneBuffer:
-    """A library with one open camera and one buffer of 3x2 pixels, four bytes after each row."""
-
-    content_of_it = bytes([1, 2, 3, 0, 0, 0, 0, 4, 5, 6])
-    values: ClassVar[dict[str, Any]] = {
-        "arv_buffer_get_status": 0,
-        "arv_buffer_get_image_width": 3,
-        "arv_buffer_get_image_height": 2,
-    }
-
-    def call(self, name: str, *arguments: Any) -> Any:
-        return self.values.get(name, 1)
-
-    def on_signal(self, instance: int, signal: str, action: object) -> None: ...
-
-    def content(self, buffer: int) -> memoryview:
-        return memoryview(self.content_of_it)
-
-    def row_padding(self, buffer: int) -> int:
-        return 4
-
-
-def test_a_buffer_is_taken_with_the_padding_of_its_rows() -> None:
-    device = GenicamDevice(OneBuffer(), "any")  # type: ignore[arg-type]
-    device.start(1)
-    received = device.fetch(0.1, lambda content, padding: decode(content, FORMATS["Mono8"], 3, 2, padding))
-    assert received is not None
-    assert received.taken.tolist() == [[1, 2, 3], [4, 5, 6]]
+    plain = read_settings(GenicamSettings, parse_address("genicam:1"))
+    assert plain == GenicamSettings() and (plain.trigger, plain.buffers, plain.stamp) == ("no", 16, "")
+    software = read_settings(GenicamSettings, parse_address("genicam:1?trigger=Software"))
+    assert software.fires_triggers and not software.waits_for_trigger
+    assert not (plain.fires_triggers or plain.waits_for_trigger)
 
 
 def test_pylon_without_pypylon_is_named_and_lists_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -234,38 +234,35 @@ def test_nor_beside_milliseconds(value: Decimal, places: int, notation: Notation
 
 
 FORCES = {
-    "N": 1.0,
-    "kN": 1e3,
-    "mN": 1e-3,
-    "kgf": 9.80665,
-    "lbf": 4.4482216153,
-    "lbF": 4.4482216153,
-    "gf": 9.80665e-3,
-}
-MASSES = {"kg": 9.80665, "g": 9.80665e-3, "t": 9806.65, "lb": 4.4482216153}
+    "N": 1.0, "kN": 1e3, "mN": 1e-3, "kgf": 9.80665, "kp": 9.80665, "gf": 9.80665e-3, "lbf": 4.4482216153,
+    "lbF": 4.4482216153, "ozf": 0.2780138509, "klbf": 4448.2216153,
+}  # fmt: skip
+KILOGRAMS = {
+    "kg": 1.0, "g": 1e-3, "mg": 1e-6, "t": 1e3, "lb": 0.45359237, "lbs": 0.45359237, "oz": 0.028349523125,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(("unit", "newtons"), FORCES.items())
-def test_forces(unit: str, newtons: float) -> None:
-    assert newtons_per(unit) == pytest.approx(newtons, rel=1e-9)
+def test_forces_in_newtons(unit: str, newtons: float) -> None:
+    assert newtons_per(unit) == newtons_per(unit.lower()) == pytest.approx(newtons, rel=1e-9)
     assert is_unit(unit) and not is_mass(unit)
 
 
-@pytest.mark.parametrize(("unit", "newtons"), MASSES.items())
-def test_masses_need_leave(unit: str, newtons: float) -> None:
-    assert newtons_per(unit, mass_reads_force=True) == pytest.approx(newtons, rel=1e-9)
-    with pytest.raises(ConfigError, match="mass_reads_force=yes"):
+@pytest.mark.parametrize(("unit", "kg"), KILOGRAMS.items())
+def test_masses_need_leave_and_weigh_as_under_standard_gravity(unit: str, kg: float) -> None:
+    assert newtons_per(unit, mass_reads_force=True) == pytest.approx(9.80665 * kg, rel=1e-9)
+    with pytest.raises(ConfigError, match=rf"mass_reads_force=yes .*1 {unit} is then"):
         newtons_per(unit)
 
 
-@pytest.mark.parametrize("unit", ["", "stone", "Pa", "N m"])
-def test_other_units_are_refused(unit: str) -> None:
-    assert not is_unit(unit)
-    with pytest.raises(ConfigError, match="not known"):
-        newtons_per(unit)
-
-
-@pytest.mark.parametrize("unit", ["MN", "Mn", "MG", "Mg"])
-def test_mega_is_never_taken_for_milli(unit: str) -> None:
-    with pytest.raises(ConfigError, match="milli or mega"):
+@pytest.mark.parametrize(
+    ("unit", "words"),
+    [
+        *((unit, "not known") for unit in ("", "stone", "Pa", "N m")),
+        *((unit, "milli or mega") for unit in ("MN", "Mn", "MG", "Mg")),
+    ],
+)
+def test_other_units_are_refused(unit: str, words: str) -> None:
+    assert not is_unit(unit) or words != "not known"
+    with pytest.raises(ConfigError, match=words):
         newtons_per(unit, mass_reads_force=True)

@@ -7,12 +7,14 @@ from typing import Any
 
 from acquire.addresses import parse_address
 from acquire.errors import DeviceError
-from acquire.events import Event
-from acquire.load_sample import LoadSample
+from acquire.events import Event, EventKind
+from acquire.load_sample import LoadFlag, LoadSample
 from acquire.serial_line.cell import SerialCell
 from acquire.serial_line.ports import LineSettings
 from acquire.serial_line.settings import read_settings
 
+FIRST = b"partial\r\n"
+"""The first line, which may have lost its beginning."""
 SILENCE = b""
 STALL = b"stall"
 """Nothing for four seconds."""
@@ -127,7 +129,32 @@ class FakeLine:
             yield from self.cell._pass()
             quiet += isinstance(last, FakePort) and last.finished
 
+    def passes(self, count: int) -> list[LoadSample]:
+        """The samples of so many rounds."""
+        return [sample for _ in range(count) for sample in self.cell._pass()]
+
+    @property
+    def port(self) -> FakePort:
+        """The first port."""
+        first = self.ports[0]
+        assert isinstance(first, FakePort)
+        return first
+
     @property
     def told(self) -> list[str]:
         """The sentences of the events."""
         return [event.text for event in self.events]
+
+    @property
+    def tares(self) -> list[Event]:
+        return [event for event in self.events if event.kind is EventKind.TARE]
+
+
+def samples_of(*chunks: bytes, address: str = "") -> list[LoadSample]:
+    """What is read of these bytes behind a first line."""
+    return FakeLine([FIRST, *chunks], address=address).run()
+
+
+def flagged(samples: list[LoadSample], flag: LoadFlag) -> list[bool]:
+    """Which of them have the flag."""
+    return [flag in sample.flags for sample in samples]

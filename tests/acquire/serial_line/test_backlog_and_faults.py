@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 import pytest
 
 from acquire.addresses import parse_address
-from acquire.clock import DeviceClock
 from acquire.events import Event
 from acquire.load_cell.contract import open_load_cell
 from acquire.load_sample import LoadFlag, LoadSample
@@ -80,18 +79,6 @@ def test_what_waited_before_the_test_is_not_taken_for_a_flood_nor_for_a_restart(
     assert not [event.text for event in told if event.level == "warning" and "check digit" not in event.text]
     assert min(sample.force for sample in samples) >= 0, "a reading from before the test"
     assert not any(LoadFlag.STALE in sample.flags for sample in samples[2:])
-
-
-def test_first_messages_that_waited_together_do_not_make_the_clock_jump() -> None:
-    clock = DeviceClock()
-    waited = [
-        (1000.0 + 12.5 * k, 51.0 + 0.001 * k) for k in range(80)
-    ]  # ms; all came in the moment they were read
-    clock.begin(waited)
-    stamps = [clock.stamp(ms, t) for ms, t in waited]
-    later = [clock.stamp(2000.0 + 12.5 * k, 51.0876 + 0.0125 * k) for k in range(400)]
-    assert clock.jumps == 0 and not any(stamp.doubtful for stamp in stamps + later)
-    assert abs(later[-1].t - stamps[0].t - (2.000 + 399 * 0.0125 - 1.0)) < 0.01
 
 
 RATE, AT_S, SECONDS = 80.0, 1.6, 3.2  # twenty devices at once are opened before the fault comes

@@ -18,7 +18,7 @@ from acquire.serial_line.identify import Finding, guess, listen, pattern_of, pro
 from acquire.serial_line.ports import LineSettings
 from live.commands import identify
 from tests.acquire.serial_line.fake_port import FakePort
-from tests.acquire.serial_line.test_ports import Ports
+from tests.acquire.serial_line.test_identify import Ports
 
 LINE = LineSettings("/dev/ttyUSB0", 9600)
 VALUES = [12.5, -0.25, 3.0, 100.75, 7.5, 8.25, 9.0, 12.25, 13.5, 14.75]

@@ -11,34 +11,37 @@ from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Reading
 from acquire.serial_line.scaling import Scaling, TareZero
 from acquire.serial_line.settings import read_settings
-from tests.acquire.serial_line.fake_port import FakeLine
-
-FIRST = b"partial\r\n"
+from tests.acquire.serial_line.fake_port import samples_of
 
 
 @pytest.mark.parametrize(
     ("address", "force"),
     [
+        ("unit=N", 5.0),
+        ("unit=N&sign=-1", -5.0),
         ("unit=N&zero=3", 2.0),
         ("unit=N&zero=3&sign=-1", -2.0),
         ("gain=0.5&zero=3", 1.0),
         ("unit=kN&zero=3", 2000.0),
     ],
 )
-def test_the_zero_is_one_of_the_line(address: str, force: float) -> None:
-    (sample,) = FakeLine([FIRST, b"5\r\n"], address=f"/dev/fake?{address}").run()
+def test_sign_and_zero_are_of_the_line(address: str, force: float) -> None:
+    (sample,) = samples_of(b"5\r\n", address=f"/dev/fake?{address}")
     assert sample.force == pytest.approx(force)
 
 
 @pytest.mark.parametrize(
-    ("value", "flag"),
-    [(b"101", LoadFlag.OVERLOAD), (b"-101", LoadFlag.UNDERLOAD), (b"99", None), (b"-99", None)],
+    ("value", "flags"),
+    [
+        (101, LoadFlag.OVERLOAD | LoadFlag.OUT_OF_RANGE),
+        (-101, LoadFlag.UNDERLOAD | LoadFlag.OUT_OF_RANGE),
+        (99, LoadFlag.NONE),
+        (-99, LoadFlag.NONE),
+    ],
 )
-def test_beyond_the_capacity_there_is_no_force(value: bytes, flag: LoadFlag | None) -> None:
-    (sample,) = FakeLine([FIRST, value + b"\r\n"], address="/dev/fake?unit=N&capacity=100").run()
-    assert math.isnan(sample.force) == (flag is not None)
-    assert (LoadFlag.OUT_OF_RANGE in sample.flags) == (flag is not None)
-    assert flag is None or flag in sample.flags
+def test_beyond_the_capacity_there_is_no_force(value: int, flags: LoadFlag) -> None:
+    (sample,) = samples_of(b"%d\r\n" % value, address="/dev/fake?unit=N&capacity=100")
+    assert (sample.flags, math.isnan(sample.force)) == (flags, bool(flags))
 
 
 def seen(period_s: float, seconds: float, step_s: float = 0.0) -> TareZero:
@@ -69,36 +72,42 @@ def test_a_tare_takes_the_mean_of_half_a_second() -> None:
     assert zero.load() == 12.0
 
 
-def test_the_last_digit_is_the_smallest_that_the_display_has_shown() -> None:
-    """In newtons: a hundredth of a kilonewton, also while the value ends in a zero."""
-    scaling = Scaling(read_settings(parse_address("/dev/fake?unit=kN")), lambda level, text: None)
-    for value in (12.3, 12.25, 12.0):
-        scaling.sample(Reading(value, None, b"", 0), 0.0)
-    assert scaling.zero.step_N == pytest.approx(10.0)
-
-
-def test_where_zero_moved_the_next_force_is_no_step() -> None:
-    """Whatever it is: an undone tare brings the load of before back."""
-    scaling = Scaling(read_settings(parse_address("/dev/fake?unit=N&max_step=10")), lambda level, text: None)
-
-    def steps(value: float) -> bool:
-        return LoadFlag.STEP in scaling.sample(Reading(value, None, b"", 0), 0.0).flags
-
-    assert [steps(50.0), steps(59.0), steps(70.0)] == [False, False, True]
-    scaling.tared()
-    assert [steps(300.0), steps(311.0)] == [False, True]
-
-
 def scaling(address: str) -> tuple[Scaling, list[tuple[str, str]]]:
     told: list[tuple[str, str]] = []
     settings = read_settings(parse_address(f"/dev/fake?{address}"))
     return Scaling(settings, lambda level, text: told.append((level, text))), told
 
 
-def test_a_last_digit_has_no_sign() -> None:
-    made, _ = scaling("gain=-2")
-    made.sample(Reading(12.34, None, b"", 0), 0.0)
-    assert made.zero.step_N == pytest.approx(0.02)
+def reading(value: float, unit: str | None = None, flags: LoadFlag = LoadFlag.NONE) -> Reading:
+    return Reading(value, unit, b"", 0, flags=flags)
+
+
+@pytest.mark.parametrize(
+    ("address", "values", "step_N"),
+    [
+        pytest.param("unit=kN", (12.3, 12.25, 12.0), 10.0, id="also while the value ends in a zero"),
+        pytest.param("gain=-2", (12.34,), 0.02, id="without a sign"),
+    ],
+)
+def test_the_last_digit_is_the_smallest_that_the_display_has_shown(
+    address: str, values: tuple[float, ...], step_N: float
+) -> None:
+    made, _ = scaling(address)
+    for value in values:
+        made.sample(reading(value), 0.0)
+    assert made.zero.step_N == pytest.approx(step_N)
+
+
+def test_a_step_is_one_beyond_the_greatest_but_where_zero_moved() -> None:
+    """Whatever it is then: an undone tare brings the load of before back."""
+    made, _ = scaling("unit=N&max_step=10")
+
+    def steps(*values: float) -> list[bool]:
+        return [LoadFlag.STEP in made.sample(reading(value), 0.0).flags for value in values]
+
+    assert steps(50.0, 60.0, 70.001, 60.0, 50.0) == [False, False, True, True, False]
+    made.tared()
+    assert steps(300.0, 311.0) == [False, True]
 
 
 def test_the_tares_of_a_test_are_undone_one_by_one_each_by_what_it_took() -> None:
@@ -148,17 +157,17 @@ def test_a_second_tare_looks_at_the_gross_load() -> None:
     made, _ = scaling("unit=N")
     made.zero.offset = 100.0
     for k in range(3):
-        made.sample(Reading(130.0, None, b"", 0), 0.1 * k)
+        made.sample(reading(130.0), 0.1 * k)
     assert made.zero.load() == 130.0
-    assert made.sample(Reading(130.0, None, b"", 0), 0.4).force == 30.0
+    assert made.sample(reading(130.0), 0.4).force == 30.0
 
 
 def test_a_reading_that_waited_is_none_to_tare_on() -> None:
     made, _ = scaling("unit=N")
-    made.sample(Reading(500.0, None, b"", 0), 0.0, LoadFlag.STALE)
-    made.sample(Reading(math.nan, None, b"", 0, flags=LoadFlag.ERROR), 0.0)
+    made.sample(reading(500.0), 0.0, LoadFlag.STALE)
+    made.sample(reading(math.nan, flags=LoadFlag.ERROR), 0.0)
     assert math.isnan(made.zero.load())
-    made.sample(Reading(7.0, None, b"", 0), 0.1)
+    made.sample(reading(7.0), 0.1)
     assert made.zero.load() == 7.0
 
 
@@ -166,7 +175,7 @@ def test_beyond_the_range_is_told_once_and_its_end_too() -> None:
     """Of a device that marks its own overload the force beyond the capacity stays."""
     made, told = scaling("protocol=mt-sics&capacity=100")
     values = (99.0, 100.0, -100.5, 120.0, math.nan, 99.0)
-    flags = [made.sample(Reading(value, "N", b"", 0), 0.0).flags for value in values]
+    flags = [made.sample(reading(value, "N"), 0.0).flags for value in values]
     assert [LoadFlag.OUT_OF_RANGE in one for one in flags] == [False, False, True, True, False, False]
     assert told == [
         ("error", "load alarm: out of range; last valid sample −100.5 N"),
@@ -176,21 +185,14 @@ def test_beyond_the_range_is_told_once_and_its_end_too() -> None:
 
 def test_an_alarm_before_any_force_says_so() -> None:
     made, told = scaling("unit=N&capacity=100")
-    made.sample(Reading(-200.0, None, b"", 0), 0.0)
+    made.sample(reading(-200.0), 0.0)
     assert told == [("error", "load alarm: underload, out of range; no valid sample before")]
-
-
-@pytest.mark.parametrize(("step", "flagged"), [(10.0, False), (10.001, True), (-10.001, True)])
-def test_a_step_is_one_beyond_the_greatest(step: float, flagged: bool) -> None:
-    made, _ = scaling("unit=N&max_step=10")
-    made.sample(Reading(50.0, None, b"", 0), 0.0)
-    assert (LoadFlag.STEP in made.sample(Reading(50.0 + step, None, b"", 0), 0.1).flags) == flagged
 
 
 def test_a_unit_that_changes_is_told_each_time() -> None:
     made, told = scaling("")
     for unit in ("N", "N", "kN", "kN", "N"):
-        made.sample(Reading(1.0, unit, b"", 0), 0.0)
+        made.sample(reading(1.0, unit), 0.0)
     assert told == [
         ("warning", "the unit on the line changed from N to kN"),
         ("warning", "the unit on the line changed from kN to N"),

@@ -1,19 +1,13 @@
-"""When a port is tried again, and when silence and floods are told."""
+"""When silence and floods are told."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
-import threading
 
 import pytest
 
-from acquire.errors import DeviceError
 from acquire.load_sample import LoadFlag, LoadSample
-from acquire.serial_line import link as link_module
-from acquire.serial_line.link import FloodWatch, Link, LinkContext, LoadWatch
-from acquire.serial_line.ports import LineSettings
-from tests.acquire.serial_line.fake_port import FakePort, FakeTime
+from acquire.serial_line.link import FloodWatch, LoadWatch
 
 
 class Told(list[tuple[str, str]]):
@@ -105,79 +99,3 @@ def test_a_flood_that_comes_again_within_ten_seconds_is_not_told_again(
         assert guard.too_late(t + 0.3)
         guard.skip(True, t + 0.3)
     assert len(told) == times
-
-
-class Tries:
-    """A link whose port opens for as many reads as ``lives`` says; -1: it does not open."""
-
-    def __init__(self, *lives: int) -> None:
-        self.time, self.told, self._lives = FakeTime(), Told(), list(lives)
-        self.at: list[float] = []
-        self.urls: list[str] = []
-        context = LinkContext(self._open, self.time, threading.Event(), self.time.sleep)
-        self.link = Link(LineSettings("/dev/fake"), context, self.told, lambda: "no sample")
-
-    def _open(self, line: LineSettings) -> FakePort:
-        self.at.append(self.time.now)
-        self.urls.append(line.url)
-        lives = self._lives.pop(0) if self._lives else 10_000
-        if lives < 0:
-            raise DeviceError("gone")
-        return FakePort(self.time, [b"1"] * lives + [OSError(5, "out")], pace=0.1)
-
-    def steps(self, count: int) -> list[float]:
-        """Seconds between so many openings."""
-        while len(self.at) <= count:
-            if self.link.connected or self.link.again():
-                self.link.receive(100)
-        return [later - earlier for earlier, later in zip(self.at, self.at[1:], strict=False)]
-
-
-def test_a_port_that_is_lost_at_once_is_tried_after_twice_as_long_each_time() -> None:
-    assert Tries(*[0] * 8).steps(7) == pytest.approx([0.5, 1, 2, 4, 8, 8, 8], abs=0.02)
-
-
-def test_one_that_has_lasted_is_tried_after_half_a_second() -> None:
-    tries = Tries(60, 60, 60)
-    assert tries.steps(3) == pytest.approx([6.5] * 3, abs=0.02)
-    assert [level for level, _ in tries.told][:3] == ["error", "info", "error"]
-    assert tries.told[0][1] == "lost (out); no sample; trying to reach it again"
-
-
-def test_one_that_does_not_open_is_tried_twice_a_second() -> None:
-    assert Tries(0, -1, -1, -1, 9).steps(4) == pytest.approx([0.5] * 4, abs=0.02)
-
-
-def test_looking_for_a_lost_port_takes_a_tenth_of_a_second() -> None:
-    tries = Tries(0)
-    tries.link.receive(1)
-    before = tries.time.now
-    assert not tries.link.again()
-    assert tries.time.now - before == pytest.approx(0.1)
-
-
-def test_a_port_that_came_back_under_another_name_is_opened_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link_module, "identity_of", lambda url: "0403:6001:A1")
-    monkeypatch.setattr(
-        link_module, "find_again", lambda url, identity: "/dev/fake7" if identity == "0403:6001:A1" else url
-    )
-    tries = Tries(0)
-    tries.steps(1)
-    tries.link.receive(1)
-    assert tries.urls == ["/dev/fake", "/dev/fake7"]
-    assert tries.told[-1] == ("info", "connected again as /dev/fake7")
-
-
-def test_what_is_opened_again_has_the_line_it_had() -> None:
-    lines: list[LineSettings] = []
-    time, first = FakeTime(), LineSettings("/dev/fake", 2400, 7, "E", 2, 0.05)
-
-    def opened(line: LineSettings) -> FakePort:
-        lines.append(line)
-        return FakePort(time, [OSError(5, "out")])
-
-    link = Link(first, LinkContext(opened, time, threading.Event(), time.sleep), Told())
-    link.receive(1)
-    while len(lines) < 2:
-        link.again()
-    assert lines == [first, dataclasses.replace(first)]

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from acquire.burst.accumulate import BurstAccumulator
 from acquire.clock import ClockPair
-from acquire.frame import CameraInfo, Frame, frozen
+from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.session import SessionInfo, SessionWriter
 
@@ -29,16 +30,8 @@ def frame(number: int, camera: CameraInfo = CAMERA, **changes: Any) -> Frame:
     dtype = np.uint8 if camera.bits <= 8 else np.uint16
     image = rng.integers(0, 2**camera.bits, (camera.height, camera.width)).astype(dtype)
     t = START.monotonic + number / 60 + 1 / 3
-    plain: dict[str, Any] = {
-        "image": frozen(image),
-        "index": 5 + number,
-        "t": t,
-        "clock": camera.clock,
-        "lost_before": 0,
-        "bits": camera.bits,
-        "raw_t": t + 0.004,
-    }
-    return Frame(**{**plain, **changes})
+    plain = Frame(frozen(image), 5 + number, t, camera.clock, 0, camera.bits, t + 0.004)
+    return dataclasses.replace(plain, **changes)
 
 
 def sample(number: int) -> LoadSample:
@@ -69,3 +62,22 @@ def writer(
 ) -> SessionWriter:
     """A new session of the test camera."""
     return SessionWriter(path, info(camera, **changes), now=now)
+
+
+def recorded(
+    path: Path, frames: int = 1, *, loads: bool = True, camera: CameraInfo = CAMERA, **changes: Any
+) -> Path:
+    """A closed session of so many frames, each with a load sample."""
+    with writer(path, camera, **changes) as session:
+        for k in range(frames):
+            if loads:
+                session.write_load(sample(k))
+            session.write_frame(frame(k, camera))
+    return path
+
+
+def bursts_of(n: int, count: int, camera: CameraInfo = CAMERA) -> list[Burst]:
+    """Bursts of the test camera."""
+    accumulator = BurstAccumulator(n)
+    found = [accumulator.add(frame(k, camera)) for k in range(n * count)]
+    return [burst for burst in found if burst is not None]

@@ -19,7 +19,7 @@ from acquire.session import RotatingWriter, Session
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import FrameCounts
 from live.run.recorder import Recorder
-from tests.acquire.session.fixtures import frame, info, writer
+from tests.acquire.session.fixtures import frame, info, recorded, writer
 
 
 def renamed(path: Path) -> None:
@@ -77,15 +77,6 @@ def test_it_is_noticed_at_the_end_where_nothing_came_any_more(path: Path) -> Non
         session.close()
 
 
-def test_a_session_that_nobody_touches_is_whole(path: Path) -> None:
-    with writer(path) as session:
-        for number in range(40):
-            session.write_frame(frame(number))
-            session.flush()
-    with Session.open(path) as back:
-        assert len(back) == 40
-
-
 def test_the_recorder_counts_each_frame_once(path: Path) -> None:
     counts, log = FrameCounts(), EventLog()
     recorder = Recorder(writer(path), counts, log, 10**7)
@@ -103,8 +94,7 @@ def test_the_recorder_counts_each_frame_once(path: Path) -> None:
 
 
 def test_a_locked_session_is_not_called_damaged(path: Path) -> None:
-    with writer(path) as session:
-        session.write_frame(frame(0))
+    recorded(path)
     with path.open("rb") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         with pytest.raises(DataError, match="is locked: another program has it open") as found:
@@ -113,8 +103,7 @@ def test_a_locked_session_is_not_called_damaged(path: Path) -> None:
 
 
 def test_a_file_system_without_locks_is_read_without(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with writer(path) as session:
-        session.write_frame(frame(0))
+    recorded(path)
     opened, asked = h5py.File, []
 
     def no_locks(*given: Any, **options: Any) -> Any:

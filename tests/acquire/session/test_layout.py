@@ -37,18 +37,8 @@ def test_what_a_whole_session_has_at_its_top(path: Path) -> None:
         assert entry["frames/time_s"].fletcher32 and entry["bursts/sum"].chunks == (1, 12, 16)
 
 
-TIME = ("f8", "s", -1e12, 1e12)
-
-
-COUNT = ("u4", "none", 0, np.inf)
-
-
-INDEX = ("i8", "none", 0, np.inf)
-
-
-CLOCK = ("u1", "none", 0, 2)
-
-
+TIME, COUNT = ("f8", "s", -1e12, 1e12), ("u4", "none", 0, np.inf)
+INDEX, CLOCK = ("i8", "none", 0, np.inf), ("u1", "none", 0, 2)
 COLUMNS = {
     "frames": {
         "time_s": TIME, "monotonic_s": TIME, "raw_monotonic_s": TIME, "index": INDEX, "lost_before": COUNT,

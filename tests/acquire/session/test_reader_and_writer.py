@@ -25,8 +25,7 @@ from acquire.session import rows as loads
 from acquire.session.devices import open_session_camera, open_session_load
 from acquire.session.layout import FORMAT_VERSION, image_dtype
 from acquire.session.stored import read_column
-from acquire.session.writer import FLUSH_S
-from tests.acquire.session.fixtures import CAMERA, LOAD, START, frame, sample, writer
+from tests.acquire.session.fixtures import CAMERA, LOAD, START, frame, recorded, sample, writer
 from tests.clock import Clock
 
 
@@ -42,14 +41,17 @@ def assert_same_sample(a: LoadSample, b: LoadSample) -> None:
     assert dataclasses.replace(a, force=0.0) == dataclasses.replace(b, force=0.0)
 
 
-def test_frames_come_back_bit_equal(path: Path) -> None:
-    frames = [
-        frame(0),
-        frame(1, lost_before=2, index=8),
-        frame(2, damaged=True, clock="host", index=9),
-        frame(3, index=2**40),
-    ]
-    with writer(path) as session:
+@pytest.mark.parametrize("bits", [8, 12])
+def test_frames_come_back_bit_equal(path: Path, bits: int) -> None:
+    camera = dataclasses.replace(CAMERA, bits=bits)
+    changes = (
+        {},
+        {"lost_before": 2, "index": 8},
+        {"damaged": True, "clock": "host", "index": 9},
+        {"index": 2**40},
+    )
+    frames = [frame(k, camera, **change) for k, change in enumerate(changes)]
+    with writer(path, camera) as session:
         assert [session.write_frame(f) for f in frames] == [0, 1, 2, 3]
     with Session.open(path) as back:
         assert len(back) == 4 and back.recovered is None
@@ -63,7 +65,7 @@ def test_frames_come_back_bit_equal(path: Path) -> None:
 @pytest.mark.parametrize("size", [1, 4, 5, 100])
 def test_load_samples_are_read_by_the_piece(path: Path, monkeypatch: pytest.MonkeyPatch, size: int) -> None:
     monkeypatch.setattr(loads, "PIECE", size)
-    samples = [sample(k) for k in range(23)]
+    samples = [*(sample(k) for k in range(22)), dataclasses.replace(sample(22), raw=b"a\nb")]
     with writer(path) as session:
         for one in samples:
             session.write_load(one)
@@ -118,44 +120,16 @@ def test_a_load_curve_is_no_list_of_objects(path: Path) -> None:
     assert curve < objects / 4 and one_by_one < objects / 1.3
 
 
-def test_eight_bit_frames(path: Path) -> None:
-    camera = dataclasses.replace(CAMERA, bits=8)
-    with writer(path, camera) as session:
-        session.write_frame(frame(0, camera))
-    with Session.open(path) as back:
-        assert_same_frame(frame(0, camera), back.frame(0))
-
-
-def test_load_samples_come_back_with_their_lines(path: Path) -> None:
-    samples = [sample(n) for n in range(40)] + [LoadSample(START.monotonic + 1, 1.0, raw=b"a\nb")]
-    with writer(path) as session:
-        for number, s in enumerate(samples):
-            session.write_load(s)
-            if number % 10 == 0:
-                session.write_frame(frame(number))
-    with Session.open(path) as back:
-        for a, b in zip(samples, back.load_samples(), strict=True):
-            assert_same_sample(a, b)
-
-
 def test_what_was_said_once_comes_back(path: Path) -> None:
     writer(path).close()
     with Session.open(path) as back:
-        assert {f.name: getattr(back.camera, f.name) for f in dataclasses.fields(CAMERA)} == {
-            f.name: getattr(CAMERA, f.name) for f in dataclasses.fields(CAMERA)
-        }
+        assert dataclasses.asdict(back.camera) == dataclasses.asdict(CAMERA)
         assert back.load_cell is not None and back.load_cell.name == LOAD.name and back.load_cell.sign == -1
         assert back.config == {"measure": {"zoi": 64}}
         assert back.metadata == {"operator": "Zoé"}
         assert back.start_utc == START.utc and back.start_monotonic == START.monotonic
         assert back.frame_counts is None
         assert len(back) == 0 and back.load_samples() == [] and back.events() == []
-
-
-def test_without_a_load_cell(path: Path) -> None:
-    writer(path, load=None).close()
-    with Session.open(path) as back:
-        assert back.load_cell is None
 
 
 @pytest.mark.parametrize("length", [0, 300, 512, 5000], ids=lambda n: f"{n} characters")
@@ -167,15 +141,10 @@ def test_events_of_any_length(path: Path, length: int) -> None:
     with writer(path) as session:
         for event in events:
             session.write_event(event)
+        session.write_event(Event(1003.0, EventKind.TARE, "x", "y", data={"force_N": math.nan}))
     with Session.open(path) as back:
-        assert back.events() == events
-
-
-def test_not_a_number_in_an_event_becomes_null(path: Path) -> None:
-    with writer(path) as session:
-        session.write_event(Event(1001.0, EventKind.TARE, "x", "y", data={"force_N": math.nan}))
-    with Session.open(path) as back:
-        assert back.events()[0].data == {"force_N": None}
+        assert back.events()[:2] == events
+        assert back.events()[2].data == {"force_N": None}
 
 
 def test_ledger_and_clock_pairs(path: Path) -> None:
@@ -193,11 +162,6 @@ def test_an_existing_file_is_never_overwritten(path: Path) -> None:
     with pytest.raises(DataError, match="not overwritten"):
         writer(path)
     assert path.read_bytes() == b"precious"
-
-
-def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="choose a folder"):
-        writer(tmp_path / "no" / "session.h5")
 
 
 def test_a_frame_that_does_not_fit_is_refused_and_leaves_the_rest(path: Path) -> None:
@@ -254,15 +218,15 @@ def test_what_comes_fast_is_flushed_together_and_on_time(path: Path) -> None:
     with writer(path, now=clock) as session:
         clock.now_s = 1.0
         session.write_frame(frame(0))
-        clock.now_s += FLUSH_S / 2
+        clock.now_s += 0.025
         session.write_frame(frame(1))
         session.write_load(sample(0))
         session.write_event(Event(1001.0, EventKind.NOTE, "operator", "x"))
-        assert session.flush_when_due() == pytest.approx(FLUSH_S / 2)
+        assert session.flush_when_due() == pytest.approx(0.025)
         assert session.unflushed_frames == 1
         with Session.open(path) as back:
             assert (len(back), back.load_samples(), back.events()) == (1, [], [])
-            clock.now_s += FLUSH_S
+            clock.now_s += 0.05
             assert session.flush_when_due() == math.inf
             assert session.unflushed_frames == 0
             back.refresh()
@@ -293,26 +257,19 @@ def test_foreign_files(tmp_path: Path) -> None:
         Session.open(tmp_path / "c.h5")
 
 
-def test_a_newer_format_is_refused(path: Path) -> None:
+@pytest.mark.parametrize("version", [FORMAT_VERSION + 1, 99])
+def test_a_newer_format_is_refused(path: Path, version: int) -> None:
     writer(path).close()
     with h5py.File(path, "r+") as file:
-        file.attrs["format_version"] = 99
-    with pytest.raises(DataError, match=r"format version 99.*update"):
-        Session.open(path)
-
-
-def test_the_next_format_is_refused(path: Path) -> None:
-    writer(path).close()
-    with h5py.File(path, "r+") as file:
-        file.attrs["format_version"] = FORMAT_VERSION + 1
-    with pytest.raises(DataError, match=f"reads up to {FORMAT_VERSION}; update phasedic"):
+        file.attrs["format_version"] = version
+    with pytest.raises(
+        DataError, match=rf"format version {version}.*reads up to {FORMAT_VERSION}; update phasedic"
+    ):
         Session.open(path)
 
 
 def test_a_recording_is_no_live_camera_and_its_load_takes_no_tare(path: Path) -> None:
-    with writer(path) as session:
-        session.write_frame(frame(0))
-        session.write_load(sample(0))
+    recorded(path)
     told: list[Event] = []
     address = parse_address(f"session:{path}")
     with open_session_camera(address, told.append) as camera:
@@ -323,16 +280,6 @@ def test_a_recording_is_no_live_camera_and_its_load_takes_no_tare(path: Path) ->
         load.undo_tare()
         assert [one.force for one in load] == [0.0]
     assert [event.data["tared"] for event in told] == [False, False]
-
-
-def test_a_truncated_file_is_refused(path: Path) -> None:
-    with writer(path) as session:
-        for number in range(20):
-            session.write_frame(frame(number))
-    whole = path.read_bytes()
-    path.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(DataError, match="truncated"):
-        Session.open(path)
 
 
 def test_every_dataset_has_units_and_the_plots_are_named(path: Path) -> None:

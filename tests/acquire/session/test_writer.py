@@ -9,14 +9,13 @@ import h5py
 import numpy as np
 import pytest
 
-from acquire.burst.accumulate import BurstAccumulator
 from acquire.errors import DataError
 from acquire.record_mode import RecordMode
 from acquire.session import RotatingWriter, Session
 from acquire.session import writer as writer_module
 from acquire.session.reader import first_path, part_path
 from acquire.session.writer import _write_failure
-from tests.acquire.session.fixtures import CAMERA, frame, info, writer
+from tests.acquire.session.fixtures import CAMERA, bursts_of, frame, info, writer
 from tests.clock import Clock
 
 
@@ -31,16 +30,6 @@ def test_final_counts_have_8192_bytes(path: Path, length: int, fits: bool) -> No
         session.write_ledger(counts)
     with Session.open(path) as back:
         assert back.frame_counts == counts
-
-
-def test_what_is_written_waits_for_a_twentieth_of_a_second(path: Path) -> None:
-    clock = Clock()
-    with writer(path, now=clock) as session:
-        clock.now_s = 1.0
-        session.write_frame(frame(0))
-        clock.now_s = 1.02
-        session.write_frame(frame(1))
-        assert session.flush_when_due() == pytest.approx(0.03) and session.unflushed_frames == 1
 
 
 @pytest.mark.parametrize(
@@ -133,8 +122,7 @@ def test_frames_that_wait_when_a_flush_fails_are_lost_and_the_new_one_is_refused
 
 
 def test_bursts_have_numbers_through_all_files_of_a_set(path: Path) -> None:
-    accumulator = BurstAccumulator(2)
-    bursts = [burst for k in range(8) if (burst := accumulator.add(frame(k))) is not None]
+    bursts = bursts_of(2, 4)
     with RotatingWriter(path, info(mode=RecordMode("bursts"), burst_frames=2), 1) as session:
         assert [session.write_burst(burst) for burst in bursts] == [0, 1, 2, 3]
         assert session.unflushed_frames <= 2 and session.free_bytes() > 0

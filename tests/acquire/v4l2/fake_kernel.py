@@ -19,17 +19,9 @@ from numpy.typing import NDArray
 from acquire.v4l2 import api
 
 BYTES = {
-    "GREY": 1,
-    "Y10": 2,
-    "Y12": 2,
-    "Y16": 2,
-    "YUYV": 2,
-    "UYVY": 2,
-    "RGGB": 1,
-    "RG12": 2,
-    "MJPG": 0,
+    "GREY": 1, "Y10": 2, "Y12": 2, "Y16": 2, "YUYV": 2, "UYVY": 2, "RGGB": 1, "RG12": 2, "MJPG": 0,
     "RGB3": 3,
-}
+}  # fmt: skip
 
 
 def fault(number: int) -> OSError:

@@ -15,7 +15,6 @@ from acquire.v4l2 import api
 from acquire.v4l2.camera import set_up
 from acquire.v4l2.controls import V4L2Settings, changeable, exposure_s, list_controls
 from acquire.v4l2.device import Identity, SizeRange, V4L2Device
-from acquire.v4l2.formats import preferred
 from acquire.v4l2.listing import _modes, find_again
 from tests.acquire.v4l2 import fake_kernel
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
@@ -84,12 +83,6 @@ def test_an_input_is_one_of_those_there_are() -> None:
     in_force(device, "input=1")
     with pytest.raises(ConfigError, match=r"input=2 is not there; the camera has: 0 \(tuner\), 1 \(camera\)"):
         in_force(device, "input=2")
-
-
-def test_the_most_usual_depth_is_preferred() -> None:
-    assert preferred(["GREY", "Y10", "Y16", "Y14"]) == "Y14"
-    assert preferred(["Y10", "Y12"]) == "Y12"
-    assert preferred(["GREY", "Y16", "Y10"]) == "Y10"
 
 
 class _AnySize:

@@ -10,7 +10,8 @@ import pytest
 from acquire.camera.live import DEAD
 from acquire.genicam.device import GenicamDevice
 from acquire.genicam.library import Aravis, GenicamError
-from tests.genicam.inside.fakes import FakeCameraProcess, FrameWatch
+from tests.contracts.watching import FrameWatch
+from tests.genicam.inside.fakes import FakeCameraProcess
 
 SMALL = "genicam:127.0.0.1?format=Mono8&fps=20&width=200&height=100"
 

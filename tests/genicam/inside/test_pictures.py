@@ -12,9 +12,10 @@ import pytest
 from acquire.camera.contract import Camera, open_camera
 from acquire.genicam.device import GenicamDevice, Received, Take
 from tests.contracts import test_camera_contract as contract
-from tests.genicam.fake_camera import FIRST, PIXEL_FORMATS
-from tests.genicam.inside.fakes import FakeCameraProcess, FrameWatch
-from tests.genicam.packing import bits_of, picture
+from tests.contracts.watching import FrameWatch
+from tests.genicam.fake_camera import FIRST
+from tests.genicam.inside.fakes import FakeCameraProcess
+from tests.genicam.packing import PIXEL_FORMATS, bits_of, picture
 
 
 @pytest.mark.parametrize("name", PIXEL_FORMATS)

@@ -18,7 +18,8 @@ from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.setup.config_draft import ConfigDraft
 from live.ui.web.setup.draft_changes import CHANGES
 from live.ui.web.setup.setup_session import SetupSession
-from tests.genicam.inside.fakes import FakeCameraProcess, FrameWatch
+from tests.contracts.watching import FrameWatch
+from tests.genicam.inside.fakes import FakeCameraProcess
 from tests.live.ui.waiting import until
 
 

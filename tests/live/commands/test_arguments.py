@@ -24,6 +24,7 @@ from live.config.loading import Config, load_config
 from live.replay.study import NO_WINDOW, StudyResult, StudySetting
 from live.setup.check.lines import CheckLine
 from live.setup.check.quick_check import QuickCheck
+from live.setup.scale import Board
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.screens import Terminal
 
@@ -97,8 +98,10 @@ def test_two_points_are_x_and_y_of_the_one_and_then_of_the_other(
 ) -> None:
     rig = tmp_path / "rig.toml"
     rig.write_text("[measure]\nzoi = 48\n")
-    words = ["--points", "10,20,310,420", "--length", "25", "--stand-off", "500"]
-    assert main(["scale", "--config", str(rig), *words]) == 0
+    words = ["scale", "--config", str(rig), "--points", "10,20,310,420", "--length", "25"]
+    assert main(words) == 0
+    assert "give --stand-off MM" in capsys.readouterr().out
+    assert main([*words, "--stand-off", "500"]) == 0
     said = capsys.readouterr().out
     assert "scale: 0.05 " in said, "500 px are 25 mm"
     assert "0.1 mm toward the camera at a stand-off of 500 mm gives a false strain of 200 µm/m" in said
@@ -108,14 +111,9 @@ def test_two_points_are_x_and_y_of_the_one_and_then_of_the_other(
 
 def test_a_board_has_columns_first() -> None:
     board = board_of(given("scale", "--checkerboard", "9x6", "--square", "5"))
-    assert board is not None and (board.columns, board.rows, board.square_mm, board.marker_mm) == (
-        9,
-        6,
-        5.0,
-        0.0,
-    )
+    assert board == Board(9, 6, 5.0, 0.0)
     board = board_of(given("scale", "--charuco", "7X5", "--square", "5", "--marker", "3"))
-    assert board is not None and (board.columns, board.rows, board.marker_mm) == (7, 5, 3.0)
+    assert board == Board(7, 5, 5.0, 3.0)
     with pytest.raises(ConfigError, match="--marker MM is needed"):
         board_of(given("scale", "--charuco", "7x5", "--square", "5"))
 
@@ -147,8 +145,8 @@ def test_lines_are_renewed_over_as_many_as_there_were(monkeypatch: pytest.Monkey
     assert stream.getvalue() == "\x1b[2Kone\n\x1b[2Ktwo\n\x1b[2Kparts\n\x1b[0J", "three of a height of five"
     stream.truncate(0)
     stream.seek(0)
-    lines.lines(["a longer one"], "short")
-    assert stream.getvalue() == "\x1b[3A\x1b[2Ka lon\n\x1b[0J"
+    lines.lines(["a\x1b longer one"], "short")
+    assert stream.getvalue() == "\x1b[3A\x1b[2Ka\\x1b\n\x1b[0J", "cut to the width, and printable"
 
 
 def test_a_page_gets_a_number_where_it_or_what_is_saved_beside_it_is_there(tmp_path: Path) -> None:

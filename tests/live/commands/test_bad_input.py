@@ -35,38 +35,11 @@ def shots(tmp_path: Path) -> Path:
 
 
 def check_refusal(
-    capsys: pytest.CaptureFixture[str], code: int, message: str, *arguments: str, out: Path | None = None
+    capsys: pytest.CaptureFixture[str], code: int, message: str, *words: str, out: Path
 ) -> None:
-    extra = ["--out", str(out)] if out else []
-    assert main([*arguments, *extra, "--no-view", "--no-rrd"]) == code
+    assert main([*words, "--out", str(out), "--no-view", "--no-rrd"]) == code
     error = capsys.readouterr().err
-    assert message in error
-    assert "Traceback" not in error
-
-
-@pytest.mark.parametrize(
-    ("code", "message", "arguments"),
-    [
-        (2, "no camera is given", ["run"]),
-        (3, "/dev/video77", ["run", "--camera", "/dev/video77"]),
-        (2, "firewire", ["run", "--camera", "firewire:0"]),
-        (2, "unknown setting 'fsp'", ["run", "--camera", "sim:uniform?fsp=3"]),
-        (2, "burst", ["run", "--camera", "sim:", "--burst", "0"]),
-        (2, "leaves the picture", ["run", "--camera", "sim:?lockstep=yes", "--roi", "600,0,100,100"]),
-        (2, "x,y,width,height", ["run", "--camera", "sim:", "--config", "NO", "--section", "3"]),
-        (2, "no such configuration file", ["run", "--camera", "sim:", "--config", "nowhere.toml"]),
-        (3, "/dev/ttyUSB77", ["run", "--camera", "sim:?lockstep=yes", "--load", "/dev/ttyUSB77"]),
-        (4, "nowhere", ["replay", "files:nowhere/*.tif"]),
-        (4, "no such file", ["replay", "nowhere.h5"]),
-    ],
-)
-def test_arguments(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, code: int, message: str, arguments: list[str]
-) -> None:
-    if "--section" in arguments:
-        message = "give width,thickness"
-    check_refusal(capsys, code, message, *arguments, out=tmp_path / "out")
-    assert not (tmp_path / "out" / "session.h5").exists()
+    assert message in error and "Traceback" not in error
 
 
 def test_pictures_that_are_cut_off_or_of_another_size_are_left_out(
@@ -102,29 +75,30 @@ def test_a_film_that_is_cut_off(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     assert "of 12 frames; it may be cut off" in capsys.readouterr().out
 
 
-def test_a_reference_that_is_cut_off(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
-    (shots / "a_0.png").write_bytes(b"no picture")
-    check_refusal(capsys, 4, "a_0.png", "replay", f"files:{shots}/*.png", "--zoi", "32", out=tmp_path / "out")
-
-
-def test_a_zoi_larger_than_the_roi(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
-    source = f"files:{shots}/*.png"
+@pytest.mark.parametrize(
+    ("name", "content", "words", "code", "message"),
+    [
+        pytest.param("a_0.png", None, (), 4, "a_0.png", id="a reference that is cut off"),
+        pytest.param("a_0.png", (96, 128), (), 4, "pattern", id="a reference without a pattern"),
+        pytest.param(
+            "mask.png", (10, 10), ("--mask", "mask.png"), 4, "mask.png", id="a mask of another size"
+        ),
+        pytest.param(
+            "b.png", None, ("--roi", "0,0,40,40", "--zoi", "64"), 2, "ZOI", id="a ZOI larger than the ROI"
+        ),
+    ],
+)
+def test_pictures_that_cannot_be_measured(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, shots: Path, tmp_path: Path, name: str,
+    content: tuple[int, int] | None, words: tuple[str, ...], code: int, message: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(shots)
+    if content is None:
+        Path(name).write_bytes(b"no picture")
+    else:
+        cv2.imwrite(name, np.full(content, 128, np.uint8))
     check_refusal(
-        capsys, 2, "ZOI", "replay", source, "--roi", "0,0,40,40", "--zoi", "64", out=tmp_path / "out"
-    )
-
-
-def test_a_featureless_reference(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
-    cv2.imwrite(str(shots / "a_0.png"), np.full((96, 128), 128, np.uint8))
-    check_refusal(capsys, 4, "pattern", "replay", f"files:{shots}/*.png", "--zoi", "32", out=tmp_path / "out")
-
-
-def test_a_mask_of_another_size(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
-    mask = tmp_path / "mask.png"
-    cv2.imwrite(str(mask), np.full((10, 10), 255, np.uint8))
-    source = f"files:{shots}/*.png"
-    check_refusal(
-        capsys, 4, "mask.png", "replay", source, "--mask", str(mask), "--zoi", "32", out=tmp_path / "out"
+        capsys, code, message, "replay", "files:a_*.png", "--zoi", "32", *words, out=tmp_path / "out"
     )
 
 
@@ -132,13 +106,10 @@ def test_foreign_and_truncated_sessions(capsys: pytest.CaptureFixture[str], tmp_
     foreign = tmp_path / "foreign.h5"
     with h5py.File(foreign, "w") as file:
         file["x"] = np.arange(3)
-    check_refusal(capsys, 4, "foreign.h5", "replay", str(foreign), out=tmp_path / "out1")
-    cut = tmp_path / "cut.h5"
-    cut.write_bytes(foreign.read_bytes()[:700])
-    check_refusal(capsys, 4, "cut.h5", "replay", str(cut), out=tmp_path / "out2")
-    text = tmp_path / "text.h5"
-    text.write_text("this is no HDF5 file")
-    check_refusal(capsys, 4, "text.h5", "replay", str(text), out=tmp_path / "out3")
+    (tmp_path / "cut.h5").write_bytes(foreign.read_bytes()[:700])
+    (tmp_path / "text.h5").write_text("this is no HDF5 file")
+    for name in ("foreign.h5", "cut.h5", "text.h5"):
+        check_refusal(capsys, 4, name, "replay", str(tmp_path / name), out=tmp_path / f"out of {name}")
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -15,6 +15,7 @@ import pytest
 from acquire import compiled_loops
 from acquire.errors import ConfigError
 from acquire.system import can_write, private_folder, python_command, python_environment
+from live import VERSION
 from live.commands import process
 
 ROOT = Path(__file__).parents[3]
@@ -31,18 +32,17 @@ def test_a_child_takes_no_module_of_the_working_folder(
     assert done.returncode == 4 and "no such file" in done.stdout
 
 
-@pytest.mark.parametrize("name", ["analysis", "signal", "pathlib"])
-def test_nor_does_python_m_live(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [("live", "analysis"), ("live", "signal"), ("live", "pathlib"), ("phasedic", "analysis")],
+)
+def test_nor_does_python_m(module: str, name: str, tmp_path: Path) -> None:
     (tmp_path / f"{name}.py").write_text("raise SystemExit(77)\n")
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        [sys.executable, "-m", "live", "--version"],
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0 and "phasedic" in done.stdout
+        [sys.executable, "-m", module, "--version"],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, f"phasedic {VERSION}\n"), done.stderr
 
 
 def kept(folder: Path) -> Any:

@@ -16,9 +16,8 @@ import pytest
 from acquire.errors import Interrupted
 from acquire.system import signal_handler
 from analysis import PICTURE_KINDS, share_compiled
-from live import cli
 from live.pipeline.consumer import Screen
-from live.setup.compiling import compile_ahead, progress_text
+from live.setup.compiling import compile_ahead
 from tests.bench.soak import children
 from tests.live.ui.waiting import until
 
@@ -90,17 +89,6 @@ def test_while_workers_load(tmp_path: Path) -> None:
     assert seconds < 20, "it compiled first"
 
 
-def test_before_the_command_begins(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def pressed(words: list[str]) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(cli, "parse", pressed)
-    assert cli.main(["devices"]) == 130
-    assert capsys.readouterr().err == "phasedic: interrupted\n"
-
-
 def never_ending(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing is compiled, and compiling takes for ever."""
     monkeypatch.setattr("analysis.not_compiled", lambda kinds, phase: True)
@@ -170,16 +158,6 @@ def test_a_process_that_was_interrupted_ends_the_other(monkeypatch: pytest.Monke
     with pytest.raises(Interrupted):
         compile_ahead(("uint8",))
     assert [process.returncode for process in made] == [-signal.SIGINT, -signal.SIGTERM]
-
-
-@pytest.mark.parametrize(
-    ("share", "seconds", "bar", "left"),
-    [(0.0, 1.0, 0, "about a minute"), (0.5, 20.0, 15, "about 21 s left"), (1.0, 50.0, 30, "about 1 s left")],
-)
-def test_one_bar_with_an_estimate(share: float, seconds: float, bar: int, left: str) -> None:
-    text = progress_text(share, seconds)
-    assert text.count("#") == bar and text.count(".") == 30 - bar
-    assert text.endswith(f"{seconds:.0f} s, {left}")
 
 
 def test_the_share_that_is_compiled() -> None:

@@ -12,22 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag, LoadSample
 from analysis.evaluate import TwoSides
-from live.commands import devices, identify, scale
+from live.commands import devices, identify
 from live.commands.init import _stable
 from live.commands.load_calibrate import _raw, _unfit
 from live.commands.map import _warn_of_motion
-from live.commands.scale import _check as check_scale
-from live.commands.scale import _print_false_strain
 from live.commands.sides import _strains as side_lines
 from live.commands.study import _curve, _figures, _section
 from live.replay.study import StudySetting
 from live.results.run_folder import open_run
 from tests.live.made_run import make_run
 from tests.live.made_up import in_ascii
-from tests.live.screens import RecordingScreen
 
 
 def test_a_port_is_asked_question_after_question(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -84,33 +80,6 @@ def test_a_cell_is_calibrated_as_it_sends() -> None:
 ])  # fmt: skip
 def test_the_address_that_stays(address: str, stable: str, found: str) -> None:
     assert _stable(address, stable) == found
-
-
-def scale_arguments(**given: Any) -> argparse.Namespace:
-    names = ("points", "checkerboard", "charuco", "width", "length", "square", "marker", "stand_off", "sigma")
-    return argparse.Namespace(**{**dict.fromkeys(names), "sigma": 0.0, **given})
-
-
-def test_a_scale_is_taken_one_way_and_in_mm_above_zero() -> None:
-    check_scale(scale_arguments(width=5.0, sigma=0.0, stand_off=1.0))
-    for given in ({}, {"points": "1,2,3,4", "width": 5.0}):
-        with pytest.raises(ConfigError):
-            check_scale(scale_arguments(**given))
-    parser = argparse.ArgumentParser()
-    scale.add_arguments(parser)
-    for words in (
-        "--sigma -0.1", "--length 0", "--square inf", "--stand-off -1", "--marker 0", "--width 0", "--width nan"
-    ):  # fmt: skip
-        with pytest.raises(SystemExit):
-            parser.parse_args(words.split())
-    screen = RecordingScreen()
-    _print_false_strain(None, screen)
-    _print_false_strain(500.0, screen)
-    assert screen.lines[0].startswith("give --stand-off MM")
-    assert (
-        screen.lines[1]
-        == "0.1 mm toward the camera at a stand-off of 500 mm gives a false strain of 200 µm/m (exx and eyy)"
-    )
 
 
 def studied(vsg: float, order: int = 1, **more: Any) -> Any:

@@ -10,6 +10,7 @@ from acquire.errors import ConfigError
 from live.config.cameras import camera_configs, names_of, other_cameras
 from live.config.figures import JOINT_CHANNELS, channel_names, is_joint, joint_channels
 from live.config.loading import load_config
+from live.config.sections import CameraConfig
 
 ALARM = [{"channel": "axial", "above": 0.5}]
 
@@ -51,20 +52,30 @@ def test_alarms_commands_and_outputs_are_of_the_first_camera_alone() -> None:
 def test_a_rig_file_of_the_back_has_its_camera_and_the_front_all_else(tmp_path: Path) -> None:
     rig = tmp_path / "back.toml"
     rig.write_text(
-        "[camera]\naddress = '/dev/video1'\n[measure]\nzoi = 48\n[scale]\nmm_per_px = 0.05\n"
-        "[specimen]\naxis = 'x'\narea_mm2 = 3\n[load]\naddress = 'sim:'\n"
+        "[camera]\naddress = '/dev/video1'\ncrop = [1, 2, 300, 200]\n[measure]\nzoi = 48\nroi = [5, 6, 70, 80]\n"
+        "[scale]\nmm_per_px = 0.05\n[specimen]\naxis = 'x'\narea_mm2 = 3\n[load]\naddress = 'sim:'\n"
+        "[gauges.behind]\nkind = 'area'\nbox = [1, 2, 3, 4]\n"
     )
     given = {
-        "camera.address": "sim:", "camera.back": str(rig), "specimen.area_mm2": 7.0, "measure.zoi": 24,
-        "scale.mm_per_px": 0.02,
+        "camera.address": "sim:", "camera.crop": [0, 0, 100, 100], "load.address": "/dev/ttyUSB0",
+        "specimen.area_mm2": 7.0, "measure.zoi": 24, "measure.mask": "front.png", "scale.mm_per_px": 0.02,
+        "gauges.axial": {"kind": "line", "start": [1, 1], "end": [1, 50]},
     }  # fmt: skip
-    front, back = camera_configs(load_config(None, given), {"measure.zoi": 32}).values()
-    assert (back.camera.address, back.measure.zoi, back.scale.mm_per_px) == ("/dev/video1", 32, 0.05)
-    assert (back.specimen.axis, back.specimen.area_mm2, back.load.address) == ("x", 7.0, "none:")
-    assert (front.measure.zoi, front.scale.mm_per_px) == (24, 0.02)
-    both = load_config(None, {**given, "camera.beside": "sim:"})
+    with_rig = load_config(None, given | {"camera.back": str(rig)})
+    front, back = camera_configs(with_rig, {"measure.zoi": 32}).values()
+    assert back.camera == CameraConfig(address="/dev/video1", crop=(1, 2, 300, 200))
+    assert (back.measure.roi, back.measure.zoi, list(back.gauges)) == ((5, 6, 70, 80), 32, ["behind"])
+    assert (back.specimen.axis, back.specimen.area_mm2, back.load.address) == ("x", 7.0, "/dev/ttyUSB0")
+    assert (back.scale.mm_per_px, front.measure.zoi, front.scale.mm_per_px) == (0.05, 24, 0.02)
+    _, plain = camera_configs(load_config(None, given | {"camera.back": "/dev/video2"}), {}).values()
+    assert plain.camera == CameraConfig(address="/dev/video2")
+    assert (plain.measure.mask, plain.measure.zoi, list(plain.gauges)) == (None, 24, ["axial"])
+    both = load_config(None, given | {"camera.back": str(rig), "camera.beside": "sim:"})
     with pytest.raises(ConfigError, match="not both"):
         camera_configs(both, {})
+    rig.write_text("[camera]\naddress = 'sim:'\nback = 'sim:'\n")
+    with pytest.raises(ConfigError, match=r"no camera\.back or camera\.beside"):
+        camera_configs(with_rig, {})
 
 
 def test_the_channels_of_front_and_back_together() -> None:

@@ -17,7 +17,6 @@ from acquire.text.message import from_json
 from live.config.loading import load_config
 from live.config.sections import AlarmConfig, SpecimenConfig
 from live.pipeline.consumer import Screen
-from live.pipeline.history import History
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import ChannelValues
@@ -219,7 +218,6 @@ def test_a_force_that_comes_back_within_the_limit_ends_the_alarm() -> None:
 
 def test_an_alarm_on_a_value_that_is_not_there_has_its_age_and_stays_silenced() -> None:
     watched = Watched(run_state("old"))
-    watched.state.snapshot  # noqa: B018
     later: Any = watched.watch
     later._values._clock = lambda: NOW + 6.0
     later.idle()
@@ -403,10 +401,3 @@ def test_an_armed_recording_begins_where_the_force_may_be_above_the_trigger(
     buffer.frame(make_frame(0, NOW), is_reference=False)
     assert buffer.on is bool(begins and above_N < math.inf)
     assert any(begins in event.text for event in state.event_log.events()) or not buffer.on
-
-
-def test_history_knows_how_often_bursts_come() -> None:
-    history = History()
-    for k in range(5):
-        history.add(burst_at(3.0 * k).time_step)
-    assert history.arrivals.usual_s == 3.0

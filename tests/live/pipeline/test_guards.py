@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from acquire.events import Event
-from analysis import StrainField
+from analysis import Roi, StrainField, ZoiGrid
 from analysis.field.uncertainty import PictureError
+from hw_mocks.deformation import Affine
+from hw_mocks.machine import Programme
+from hw_mocks.optics import Optics, PlaneMotion
+from hw_mocks.specimen import VirtualSpecimen
+from live.cli import main
 from live.pipeline.guards import (
     BlurGuard,
     DilatationGuard,
@@ -20,8 +27,11 @@ from live.pipeline.guards import (
     _usual_sigma,
     picture_words,
 )
+from live.pipeline.measurement import region_strains
+from live.results import Strain
 from tests.live.made_up import in_ascii, make_measurement
 from tests.live.pipeline.test_reference import GRID, seen
+from tests.live.shots import write_shots
 
 
 def field(sigma_xx: float = 30e-6, sigma_yy: float = 40e-6, **values: float) -> StrainField:
@@ -75,9 +85,10 @@ def test_a_blur_names_its_cost_where_that_exceeds_the_limit_alone() -> None:
     step = replace(make_measurement(0).time_step, blur=0.8, sigma_blur=0.01)
     for factor, costs in ((1.5, False), (1.51, True)):
         events: list[Event] = []
-        BlurGuard(events.append).check(
-            replace(field(), picture=PictureError(factor, (1.0, 1.0), "blur")), step
-        )
+        blurred = replace(field(), picture=PictureError(factor, (1.0, 1.0), "blur"))
+        for guard in (PictureGuard(events.append), BlurGuard(events.append)):
+            guard.check(blurred, step)
+        assert [event.source for event in events] == ["sharpness"], "it is told once"
         assert ("is uncertain by" in events[0].text) == costs
 
 
@@ -94,8 +105,11 @@ def test_small_strains_are_valid_up_to_half_a_degree_and_two_percent(
     values: dict[str, float], told: bool
 ) -> None:
     events: list[Event] = []
-    StrainGuard("small", events.append).check(field(**values), make_measurement(0).time_step)
-    assert bool(events) == told
+    for measure in ("small", "hencky"):
+        guard = StrainGuard(measure, events.append)  # type: ignore[arg-type]
+        for _ in range(2):
+            guard.check(field(**values), make_measurement(0).time_step)
+    assert len(events) == told, "once, and of small strains alone"
 
 
 def test_the_error_of_small_strains_is_half_the_squares_of_turn_and_strain() -> None:
@@ -163,3 +177,143 @@ def test_strains_that_are_alike_are_told_beyond_their_noise(
     silent: list[Event] = []
     TiltGuard(None, silent.append, dilatation=False).check(field(), step_of(exx, eyy, sigma))
     assert silent == []
+
+
+SHAPE, TURN, STRAIN, NU = (160, 192), math.radians(3), 0.01, 0.3
+
+
+@pytest.fixture(scope="module")
+def turned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A strip pulled along y by 1 %, turned by 3 degrees on the way."""
+    places = []
+    for share in (0.0, 0.5, 1.0):
+        c, s = math.cos(share * TURN), math.sin(share * TURN)
+        F = np.array([[c, -s], [s, c]]) @ np.diag([1 - NU * share * STRAIN, 1 + share * STRAIN])
+        places.append(Affine(0.0, 0.0, F[0, 0] - 1, F[0, 1], F[1, 0], F[1, 1] - 1, 96.0, 80.0))
+    return write_shots(tmp_path_factory.mktemp("turned"), SHAPE, places)
+
+
+@pytest.mark.parametrize(
+    ("measure", "axial", "across"),
+    [
+        ("", STRAIN, -NU * STRAIN),
+        ("engineering", STRAIN, -NU * STRAIN),
+        ("small", math.cos(TURN) * (1 + STRAIN) - 1, math.cos(TURN) * (1 - NU * STRAIN) - 1),
+        ("green", STRAIN + STRAIN**2 / 2, -NU * STRAIN + (NU * STRAIN) ** 2 / 2),
+        ("hencky", math.log(1 + STRAIN), math.log(1 - NU * STRAIN)),
+    ],
+)
+def test_every_file_is_in_the_measure_asked_for(
+    turned: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture, measure: str, axial: float, across: float
+) -> None:
+    caplog.set_level("INFO", logger="live")
+    arguments = ["--zoi", "48", "--step", "16", "--no-view", "--no-rrd", "--out", str(tmp_path / "out")]
+    more = ["--strain", measure] if measure else []
+    assert main(["replay", str(turned), *arguments, *more]) == 0
+    with Strain.open(tmp_path / "out" / "strain.h5") as strain:
+        assert strain.strain_measure == (measure or "engineering")
+        assert strain.config["measure"]["strain"] == strain.strain_measure
+        assert strain.values["eyy"][-1] == pytest.approx(axial, abs=3e-5)
+        assert strain.values["exx"][-1] == pytest.approx(across, abs=3e-5)
+        assert np.nanmean(strain.maps("eyy", -1)) == pytest.approx(axial, abs=3e-5)
+        assert np.nanmean(strain.maps("dv_dy", -1)) == pytest.approx(
+            math.cos(TURN) * (1 + STRAIN) - 1, abs=3e-5
+        )
+    row = (tmp_path / "out" / "strain.csv").read_text().splitlines()[-1].split(",")
+    assert float(row[4]) == pytest.approx(axial, abs=3e-5)
+    assert ("measure with --strain engineering" in caplog.text) is (measure == "small")
+
+
+def steps(
+    events: list[Event], nu: float | None, strains: list[tuple[float, float]], stand_off: float | None = 500.0
+) -> None:
+    guard = DilatationGuard(nu, stand_off, events.append)
+    for t, (exx, eyy) in enumerate(strains):
+        sigmas = {"sigma_exx": 5e-6, "sigma_eyy": 5e-6}
+        one = make_measurement(number=t)
+        guard.check(one.field, replace(one.time_step, t=float(t), exx=exx, eyy=eyy, **sigmas))
+
+
+def test_strains_that_do_not_fit_nu_are_motion_off_the_plane() -> None:
+    events: list[Event] = []
+    grown = [(k * (-0.33e-3 + 200e-6), k * (1e-3 + 200e-6)) for k in (0.1, 0.3, 0.6, 0.8)]
+    steps(events, 0.33, grown)
+    assert [(event.t, event.level) for event in events] == [(1.0, "warning")]
+    assert events[0].data["strain"] == pytest.approx(0.3 * 200e-6, rel=1e-9)
+    assert "60 µm/m in both is as from motion by 0.03 mm towards the camera" in events[0].text
+
+
+def test_motion_away_along_x_without_a_distance() -> None:
+    events: list[Event] = []
+    steps(events, 0.3, [(math.nan, math.nan), (500e-6 - 150e-6, -150e-6 - 150e-6)], None)
+    steps(events, None, [(0.2e-3, 0.2e-3)])  # of an unknown ratio nothing is said
+    assert len(events) == 1
+    assert "−150 µm/m in both is as from motion away from the camera" in events[0].text
+
+
+def seen_by(optics: Optics, u: float = 0.0, sigma: float = 1e-3) -> StrainField:
+    """What a perfect kernel measures of a plane that moves as ``optics`` say, in pictures of 640 x 480 px."""
+    plane = VirtualSpecimen(width=640, height=480, programme=Programme(max_strain=1e-12))
+    grid = ZoiGrid.cover(Roi(60, 60, 520, 360), 40, 20)
+    seen, (x, y) = optics.seen(plane, plane.duration_s), np.meshgrid(grid.x, grid.y)
+    (right, down), gradient = seen.displacement(x, y), seen.gradient(x, y)
+    values = dict(zip(("du_dx", "du_dy", "dv_dx", "dv_dy"), gradient, strict=True))
+    return StrainField.from_values(grid, {"u": right + u, "v": down, **values}, sigma)
+
+
+def warned(one: StrainField, *, focal_px: float | None = 10_000.0, dilatation: bool = True) -> list[Event]:
+    events: list[Event] = []
+    guard = TiltGuard(focal_px, events.append, dilatation=dilatation)
+    step = replace(make_measurement(number=1).time_step, **region_strains(one))
+    for _ in range(2):  # warned of once
+        guard.check(one, step)
+    return events
+
+
+def test_a_plane_that_comes_nearer_or_tilts_is_named_with_its_figures() -> None:
+    nearer = warned(seen_by(Optics(500.0, settling=PlaneMotion(0.05))))
+    assert len(nearer) == 1
+    assert nearer[0].data["strain"] == pytest.approx(100e-6, rel=1e-2)
+    assert "exx and eyy are alike, 100 µm/m: as from motion by 1.0e-04 of the stand-off" in nearer[0].text
+    for axis, way, px in ((2, "from left to right", 480), (1, "from top to bottom", 320)):
+        tilt = PlaneMotion(0.0, *(math.radians(0.2) * np.eye(2)[axis - 1]))
+        (event,) = warned(seen_by(Optics(500.0, settling=tilt)))
+        assert event.data["strain"] == pytest.approx(1.5 * math.radians(0.2) * px / 10_000, rel=2e-2)
+        assert way in event.text
+        assert "as from a tilt by 0.2 degrees" in event.text
+    assert "by 0.2 degrees" not in warned(seen_by(Optics(500.0, settling=tilt)), focal_px=None)[0].text
+
+
+def bent(load: float, kappa: float, nu: float = 0.3) -> StrainField:
+    """Pulled along y by ``load`` and bent in its plane."""
+    grid = ZoiGrid.cover(Roi(60, 60, 520, 360), 40, 20)
+    x, y = np.meshgrid(grid.x - grid.x.mean(), grid.y - grid.y.mean())
+    eyy = load + kappa * x
+    v, u = eyy * y, -nu * (load * x + kappa * (x**2 - y**2) / 2) - kappa * y**2 / 2 * (1 - nu)
+    values = {"u": u, "v": v, "dv_dy": eyy, "du_dx": -nu * eyy, "dv_dx": kappa * y, "du_dy": -kappa * y}
+    return StrainField.from_values(grid, values, 1e-3)
+
+
+@pytest.mark.parametrize(
+    "one",
+    [
+        bent(5e-4, 0.0),
+        bent(0.0, 1e-6),
+        bent(5e-4, 1e-6),
+        seen_by(Optics(500.0), 3.0),
+        seen_by(Optics(5e4), sigma=0.5),
+    ],
+    ids=["pulled", "bent", "pulled and bent", "shifted", "noise"],
+)
+def test_load_bending_and_shift_are_no_motion_off_the_plane(one: StrainField) -> None:
+    assert not warned(one)
+
+
+def test_a_tilt_is_named_where_neither_load_nor_noise_may_have_made_it() -> None:
+    """It rises by 250 um/m; a load makes exx and eyy differ by less, or by more, and the noise may be as much."""
+    tilt = Optics(500.0, settling=PlaneMotion(0.0, math.radians(0.2)))
+    tilted = seen_by(tilt)
+    for load, named in ((1e-4, True), (4e-4, False)):
+        loaded = replace(tilted, parameters=tilted.parameters + bent(load, 0.0).parameters)
+        assert bool(warned(loaded)) == named, load
+    assert not warned(seen_by(tilt, sigma=0.3))

@@ -92,17 +92,6 @@ def test_memory_of_hours(hours: float, fps: int) -> None:
     assert kept.matched + len(kept.matching) == frames and len(kept.matching) <= 2
 
 
-def test_time_steps_that_wait_in_a_file_are_read_again() -> None:
-    history, steps = History(), [changed(i / 7) for i in range(5000)]
-    for step in steps:
-        history.add(step)
-    assert history.time_steps[1500].exx == steps[1500].exx
-    assert history.time_steps[4095].n_valid == steps[4095].n_valid
-    assert [one.t for one in history.time_steps] == [one.t for one in steps]
-    assert history.column("eyy").tolist() == [one.eyy for one in steps]
-    assert history.column("sigma_eyy") == pytest.approx([one.sigma_eyy for one in steps], rel=1e-6)
-
-
 def test_time_steps_stay_in_memory_where_no_file_can_be_written(monkeypatch: pytest.MonkeyPatch) -> None:
     def full(**options: object) -> NoReturn:
         raise OSError("No space left on device")

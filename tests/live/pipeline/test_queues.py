@@ -11,11 +11,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from acquire.system import lower_priority
 from live.pipeline import queues
 from live.pipeline.latency import KernelWork, LatencyMonitor, LatencySample, ProcessorUse, processor_use
-from live.pipeline.queues import BoundedQueue, LatestQueue
+from live.pipeline.queues import BoundedQueue, LatestQueue, Thinned
 from tests.live.ui.waiting import LONG_S
 
 
@@ -271,41 +273,22 @@ def test_a_waiting_buffer_loses_nothing() -> None:
 PERIOD_S = 1 / 30
 
 
-def told(latency_s: float, *, backlog: float = 0.0, kernel_s: float = 0.01, others: float = 0.0,
-         view: float = 0.0, seconds: float = 4.0) -> list[str]:  # fmt: skip
-    """The warnings of some seconds of measurements, ``others`` and ``view`` in cores."""
-    now = 0.0
-
-    def use() -> ProcessorUse:
-        return ProcessorUse(now, now * (1.0 + others + view), now * 1.0, now * view)
-
-    pace, warnings = LatencyMonitor(lambda: backlog, use), []
-    for k in range(round(seconds * 30)):
-        now = k * PERIOD_S
-        if words := pace.check(LatencySample(now, latency_s, kernel_s), PERIOD_S):
-            warnings.append(words)
+def told(latency_s: float, seconds: float = 4.0) -> list[str]:
+    """The warnings of some seconds of measurements."""
+    pace = LatencyMonitor(lambda: 0.0, lambda: None)
+    samples = (LatencySample(k * PERIOD_S, latency_s, 0.01) for k in range(round(seconds * 30)))
+    said = [words for one in samples if (words := pace.check(one, PERIOD_S))]
     assert pace.p95_s == pytest.approx(latency_s)
-    return warnings
+    return said
 
 
 def test_nothing_is_said_while_all_is_well() -> None:
     assert told(0.04) == []
 
 
-@pytest.mark.parametrize(
-    ("cause", "says"),
-    [
-        ({"backlog": 0.3}, "the disk is too slow"),
-        ({"others": 0.9}, "another program takes 0.9 processor cores"),
-        ({"kernel_s": 0.05}, "the kernel needs 50 ms"),
-        ({"view": 0.8}, "drawing takes 0.8 processor cores"),
-        ({}, "the processor is short"),
-    ],
-)
-def test_a_lost_pace_is_told_once_with_its_cause(cause: dict[str, float], says: str) -> None:
-    (warning,) = told(0.1, **cause)
-    assert "up to 100 ms late (p95), bursts every 33 ms" in warning
-    assert says in warning
+def test_a_lost_pace_is_told_once_with_its_cause() -> None:
+    (warning,) = told(0.1)
+    assert "up to 100 ms late (p95), bursts every 33 ms" in warning and "the processor is short" in warning
 
 
 def test_bursts_that_come_seldom_have_a_latency_and_no_warning() -> None:
@@ -388,3 +371,15 @@ def test_what_is_said_to_keep_up_does() -> None:
         work = KernelWork(64, 16, 3)
         step, zoi, burst = map(int, re.findall(r"\d+", work.keeping_up(share)))
         assert max((16 / step) ** 2, (zoi / 64) ** 2, 3 / burst) * share <= 0.8 + 1e-9
+
+
+@given(size=st.integers(2, 30), count=st.integers(0, 500))
+def test_evenly_thinned_from_the_first_to_the_newest(size: int, count: int) -> None:
+    history: Thinned[int] = Thinned(size)
+    for item in range(count):
+        history.append(item)
+    stride = 2**history.halvings
+    assert history.kept == list(range(0, count, stride))
+    assert len(history.kept) <= size and (stride == 1 or len(history.kept) > size // 2 - 1)
+    items = history.items()
+    assert items[-1:] == ([count - 1] if count else []) and len(set(items)) == len(items)

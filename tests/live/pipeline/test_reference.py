@@ -13,7 +13,7 @@ from acquire.events import Event, EventKind
 from analysis import KernelSettings, Roi, Status, StrainField, ZoiGrid
 from live.pipeline import reference
 from live.pipeline.measure import Tracker, _share
-from live.pipeline.reference import ReferenceMotion, averaged, motion_between, prepare, repetition_text
+from live.pipeline.reference import ReferenceMotion, motion_between, prepare, repetition_text
 from tests.live.made_up import START, make_field, make_grid, make_measurement
 
 GRID = ZoiGrid.cover(Roi(0, 0, 176, 32), 32, 16)  # ten side by side
@@ -94,10 +94,6 @@ def test_too_little_memory_is_one_sentence_with_the_way_out(
     words = r"ZOIs in a picture .* take about \d+ MiB.*: take a larger step or a smaller roi"
     with pytest.raises(TooLittleMemory, match=words):
         prepare(make_measurement(0).burst, make_grid(), KernelSettings(), 1.0)
-
-
-def test_the_noise_of_a_mean_has_at_least_that_of_the_rounding() -> None:
-    assert averaged(0.28, 4) == pytest.approx(12**-0.5 / 2) and averaged(0.29, 4) == pytest.approx(0.145)
 
 
 def test_the_share_is_that_of_the_active_zois() -> None:

@@ -190,20 +190,22 @@ def test_a_force_beyond_sense_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    "heading",
+    ("heading", "code_page"),
     [
-        "时间(s),试验力(kN)",
-        "Czas [s],Siła [kN]",
-        "시간(s),하중(kN)",
-        "Tempo (s),Força (kN)",
-        "Tijd [s],Kracht [kN]",
+        ("时间(s),试验力(kN)", "gb18030"),
+        ("時間(s),荷重(kN)", "cp932"),
+        ("시간(s),하중(kN)", "cp949"),
+        ("Czas [s],Siła [kN]", "cp1250"),
+        ("Время (с),Усилие (кН)", "cp1251"),
+        ("Tempo (s),Força (kN)", "cp1252"),
     ],
 )
-def test_headings_of_other_languages_are_understood(heading: str) -> None:
-    found = read(f"{heading}\n0,1\n1,3\n")
-    assert found.times is not None
-    assert found.times.tolist() == [0, 1]
-    assert found.forces.tolist() == [1000, 3000]
+def test_headings_of_other_languages_are_understood_in_their_code_pages(heading: str, code_page: str) -> None:
+    for encoding in ("utf-8", code_page):
+        found = read(f"{heading}\n0,1\n1,3\n".encode(encoding))
+        assert found.taken.startswith(f"column {heading.partition(',')[2].split()[0].partition('(')[0]}, ")
+        assert found.times is not None and found.times.tolist() == [0, 1]
+        assert found.forces.tolist() == [1000, 3000]
 
 
 def test_a_stress_in_another_language_is_no_force() -> None:

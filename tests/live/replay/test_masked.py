@@ -8,10 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from hw_mocks.deformation import Affine
-from hw_mocks.speckle import Speckle
 from live.cli import main
 from live.results import Strain
+from tests.live.shots import write_shots
 
 SHAPE = (128, 160)
 WORDS = ["--zoi", "32", "--step", "16", "--burst", "1", "--no-view", "--no-rrd"]
@@ -21,11 +20,7 @@ WORDS = ["--zoi", "32", "--step", "16", "--burst", "1", "--no-view", "--no-rrd"]
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with three pictures, a mask of their left half, and one of their upper half."""
     folder = tmp_path_factory.mktemp("masked")
-    (folder / "shots").mkdir()
-    speckle = Speckle(SHAPE, radius=2.0, seed=3)
-    for k in range(3):
-        picture = np.rint(255 * speckle.render(Affine(dv_dy=1e-3 * k, x0=80, y0=64), SHAPE)).astype(np.uint8)
-        cv2.imwrite(str(folder / "shots" / f"a{k}.png"), picture)
+    write_shots(folder / "shots", SHAPE, (0.0, 1e-3, 2e-3))
     left, upper = np.zeros(SHAPE, np.uint8), np.zeros(SHAPE, np.uint8)
     left[:, :80], upper[:64] = 255, 255
     cv2.imwrite(str(folder / "left.png"), left)

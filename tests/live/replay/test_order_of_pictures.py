@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cv2
-import numpy as np
 import pytest
 
 from acquire.frame import CameraInfo
-from hw_mocks.deformation import Affine
-from hw_mocks.speckle import Speckle
 from live.cli import main
 from live.config.loading import Config
 from live.results import Strain
 from live.results.figures import film_line, tensile_options
 from live.setup.pictures import with_film
+from tests.live.shots import write_shots
 
 SHAPE, STRAINS = (96, 112), (0.0, 0.001, 0.002)
 SMALL = ["--zoi", "48", "--step", "24", "--roi", "all", "--no-view", "--no-rrd"]
@@ -23,12 +20,7 @@ SMALL = ["--zoi", "48", "--step", "24", "--roi", "all", "--no-view", "--no-rrd"]
 
 def shots(folder: Path, *names: str) -> Path:
     """Pictures with strains of 0, 1000, 2000 um/m under these names."""
-    folder.mkdir()
-    speckle = Speckle(SHAPE, radius=2.0, seed=3)
-    for name, strain in zip(names, STRAINS, strict=False):
-        picture = 255 * speckle.render(Affine(dv_dy=strain, x0=56, y0=48), SHAPE)
-        assert cv2.imwrite(str(folder / name), np.rint(picture).astype(np.uint8))
-    return folder
+    return write_shots(folder, SHAPE, STRAINS[: len(names)], names)
 
 
 def replayed(capsys: pytest.CaptureFixture[str], source: Path, *words: str) -> tuple[int, str, list[float]]:

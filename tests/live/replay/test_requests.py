@@ -29,6 +29,7 @@ from live.results import Strain
 from live.results.finished.figures_file import stored_remarks
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.ended import code_of
+from tests.live.shots import write_shots
 
 SHAPE = (128, 160)
 STRAINS = (0.0, 0.001, 0.002, 0.003, 0.004, 0.005)
@@ -37,13 +38,7 @@ SMALL = ["--zoi", "48", "--step", "24", "--no-view", "--no-rrd"]
 
 @pytest.fixture(scope="module")
 def shots(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("asked") / "shots"
-    folder.mkdir()
-    speckle = Speckle(SHAPE, radius=2.0, seed=3)
-    for i, strain in enumerate(STRAINS):
-        picture = 255 * speckle.render(Affine(dv_dy=strain, x0=80, y0=64), SHAPE)
-        cv2.imwrite(str(folder / f"a{i}.png"), np.rint(picture).astype(np.uint8))
-    return folder
+    return write_shots(tmp_path_factory.mktemp("asked") / "shots", SHAPE, STRAINS)
 
 
 @pytest.fixture(scope="module")
@@ -81,10 +76,7 @@ def test_a_reference_of_ones_own(
         (["--reference", "DEEP"], 4, "the reference has 16-bit samples"),
         (["--reference", "SMALL"], 4, "the reference has 20 x 10 px"),
         (["--from", "nan"], 2, "--from: 'nan': give a number from 0"),
-        (["--to", "nan"], 2, "--to: 'nan': give a number from 0"),
-        (["--from", "inf"], 2, "--from: 'inf': give a number from 0"),
         (["--to", "-5"], 2, "--to: '-5': give a number from 0"),
-        (["--from", "-5"], 2, "--from: '-5': give a number from 0"),
         (["--from", "3", "--to", "2"], 2, "--from 3.0 must be before --to 2.0"),
         (["--from", "1000"], 4, "the last one is at 5.000 s"),
         (["--burst", "200"], 4, "no whole burst follows"),

@@ -52,17 +52,6 @@ def test_y_up_gives_back_the_analytic_rotation(tmp_path: Path) -> None:
     assert symmetric[0, 1] > 0.01  # or the sign of exy would not have been tried
 
 
-def test_what_is_shown_is_the_derivative_of_what_is_shown(tmp_path: Path) -> None:
-    display = Display(mm_per_px=0.02, y_up=True)
-    with open_run(make_run(tmp_path, [0.0], session=False, field_of=field_in_the_picture)) as run:
-        grid = run.strain.grid
-        u, v, exy = (display.shown(name, run.strain.maps(name, 0)) for name in ("u", "v", "exy"))
-        inside = np.s_[1:, 1:]  # without the row of the ZOI that is switched off
-        du = np.gradient(u[inside], display.y(grid)[1:], axis=0)
-        dv = np.gradient(v[inside], display.x(grid)[1:], axis=1)
-    np.testing.assert_allclose((du + dv) / 2, exy[inside], rtol=1e-3)
-
-
 def test_nothing_asked_for_changes_nothing(tmp_path: Path) -> None:
     with open_run(make_run(tmp_path, [0.0, 1e-3], session=False)) as run:
         for name in run.strain.names:

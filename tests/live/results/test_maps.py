@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,14 +17,11 @@ from hypothesis import strategies as st
 from acquire.cv2_loader import drawn_letters
 from acquire.errors import ConfigError
 from analysis import Roi, ZoiGrid
-from hw_mocks.deformation import Affine
-from hw_mocks.speckle import Speckle
+from analysis.field import Status
 from live.cli import main
 from live.commands.map import MapRequest, draw
 from live.results.maps import painting
 from live.results.maps.colours import (
-    MICROSTRAIN,
-    PERCENT,
     colour,
     diverging_table,
     nice_above,
@@ -29,39 +30,19 @@ from live.results.maps.colours import (
     ticks,
     unit_for,
 )
-from live.results.maps.scale import ColourScale
+from live.results.maps.painting import FIELD_MAPS, FieldMaps
+from live.results.maps.scale import (
+    AutoRange,
+    ColourRange,
+    ColourScale,
+    range_kind,
+    status_colours,
+    status_legend,
+)
 from live.results.reader import Strain
 from tests.live.ended import code_of
-
-
-def test_the_table_runs_from_blue_over_near_white_to_red_without_jumps() -> None:
-    table = diverging_table().astype(int)
-    assert table.shape == (256, 3)
-    assert table[0].argmax() == 2
-    assert table[-1].argmax() == 0
-    assert table[127:129].min() > 215
-    assert np.abs(np.diff(table, axis=0)).max() <= 8
-    luminance = table @ [0.2126, 0.7152, 0.0722]
-    assert (np.diff(luminance[:127]) > -0.5).all()
-    assert (np.diff(luminance[129:]) < 0.5).all()
-
-
-def test_rejected_is_transparent_and_the_ends_hold() -> None:
-    rgba = colour(np.array([[-2.0, -1.0, 0.0, 1.0, 2.0, np.nan]]), -1.0, 1.0, diverging_table(), alpha=200)[0]
-    assert rgba[:, 3].tolist() == [200] * 5 + [0]
-    assert (rgba[0] == rgba[1]).all()
-    assert (rgba[3] == rgba[4]).all()
-    assert rgba[2, :3].min() > 215
-
-
-@pytest.mark.parametrize("is_diverging", [False, True])
-def test_the_ramp_runs_from_the_lowest_value_to_the_highest(is_diverging: bool) -> None:
-    ramp, table = (
-        ColourScale(-1.0, 1.0, "%", 100.0, is_diverging).ramp(64),
-        diverging_table() if is_diverging else sequential_table(),
-    )
-    assert ramp.shape == (64, 3)
-    assert (ramp[0] == table[0]).all() and (ramp[-1] == table[-1]).all()
+from tests.live.made_up import make_field, make_grid
+from tests.live.shots import write_shots
 
 
 @given(st.floats(1e-7, 1e7))
@@ -86,18 +67,9 @@ def test_numbers_read_well(value: float, text: str) -> None:
     assert number(value) == text.replace(" ", "\u202f")
 
 
-def test_percent_from_one_percent_on() -> None:
-    assert unit_for(0.0099) == MICROSTRAIN
-    assert unit_for(0.02) == PERCENT
-
-
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("maps")
-    speckle = Speckle((160, 192), radius=2.0, seed=3)
-    for i, strain in enumerate((0.0, 1e-3)):
-        picture = 255 * speckle.render(Affine(dv_dy=strain, x0=96, y0=80), (160, 192))
-        cv2.imwrite(str(folder / f"a{i}.png"), np.rint(picture).astype(np.uint8))
+    folder = write_shots(tmp_path_factory.mktemp("maps"), (160, 192), (0.0, 1e-3))
     arguments = ["--zoi", "48", "--step", "8", "--no-view", "--no-rrd", "--out", str(folder / "out")]
     assert main(["replay", f"files:{folder}/*.png", *arguments]) == 0
     return folder
@@ -162,20 +134,9 @@ def test_only_a_known_blur_is_taken_off(results: Path, key: str, value: object) 
         (["--field", "ezz"], 4, "no map 'ezz'"),
         (["--row", "7"], 4, "no row 7"),
         (["--field", "status", "--median", "3"], 2, "neither filtered nor deconvolved"),
-        (["--deconvolve", "-1"], 2, "allowed: 0 to 100 steps"),
-        (["--deconvolve", "100000000"], 2, "allowed: 0 to 100 steps"),
-        (["--deconvolve", "2", "--sharpen", "5"], 2, "allowed: 0 to 4 times"),
-        (["--sharpen", "1"], 2, "only a deconvolved map can be sharpened; add --deconvolve STEPS"),
         (["--limit", "nan"], 2, "give a number"),
-        (["--limit", "inf"], 2, "give a number"),
-        (["--limit", "0"], 2, "a limit of 0.0"),
-        (["--limit", "-1"], 2, "a limit of -1.0"),
+        (["--low-pass", "inf"], 2, "give a number"),
         (["--median", "4"], 2, "an odd number from 1 to 51"),
-        (["--median", "-3"], 2, "an odd number"),
-        (["--median", "1000001"], 2, "an odd number"),
-        (["--low-pass", "1e9"], 2, "the extent of the grid"),
-        (["--low-pass", "nan"], 2, "give a number"),
-        (["--low-pass", "-1"], 2, "a low-pass of -1"),
         (["--field", "sigma_eyy", "--deconvolve", "3"], 2, "has no blur"),
     ],
 )
@@ -190,6 +151,33 @@ def test_refusals(
     assert code_of(["map", str(results / "out" / "strain.h5"), str(tmp_path / "x.png"), *more]) == code
     assert message in capsys.readouterr().err
     assert not (tmp_path / "x.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("more", "refused"),
+    [
+        ({"median": 51}, ""),
+        ({"median": 53}, "an odd number from 1 to 51"),
+        ({"median": 1}, ""),
+        ({"median": 2}, "an odd number"),
+        ({"median": -3}, "an odd number"),
+        ({"low_pass_px": 112.0}, ""),  # 7 ZOIs, 16 px apart
+        ({"low_pass_px": 112.1}, "the extent of the grid"),
+        ({"low_pass_px": -1.0}, "a low-pass of -1"),
+        ({"deconvolution": 100}, ""),
+        ({"deconvolution": 101}, "allowed: 0 to 100 steps"),
+        ({"deconvolution": -1}, "allowed: 0 to 100 steps"),
+        ({"deconvolution": 1, "sharpened": 4}, ""),
+        ({"deconvolution": 1, "sharpened": 5}, "allowed: 0 to 4 times"),
+        ({"sharpened": 1}, "only a deconvolved map can be sharpened; add --deconvolve STEPS"),
+        ({"limit": 1e-9}, ""),
+        ({"limit": 0.0}, "a limit of 0.0"),
+        ({"limit": -1.0}, "a limit of -1.0"),
+    ],
+)
+def test_the_limits_of_a_request(more: dict[str, Any], refused: str) -> None:
+    with pytest.raises(ConfigError, match=re.escape(refused)) if refused else contextlib.nullcontext():
+        MapRequest("eyy", **more).check(make_grid())
 
 
 @pytest.mark.parametrize(
@@ -237,3 +225,180 @@ def test_cells_of_a_coarse_overlay_lie_where_their_zois_have_moved() -> None:
     # Of the last ZOI: half a step about (69.5 + 4, 55.5 - 2), halved.
     assert (columns.min(), columns.max() + 1) == (34, 40) and (rows.min(), rows.max() + 1) == (24, 30)
     assert not picture[..., 1:].any()
+
+
+def full(value: float) -> np.ndarray:
+    return np.full((4, 4), value)
+
+
+def test_a_fixed_range_and_an_empty_map() -> None:
+    assert AutoRange(fixed=5e-3).update(full(1.0), full(0.0)) == (-5e-3, 5e-3, True)
+    assert AutoRange("from zero", 5e-3).update(full(1.0)) == (0, 5e-3, False)
+    for kind in ("about zero", "from zero", "free"):
+        low, high, _ = AutoRange(kind).update(full(np.nan), full(np.nan))
+        assert low < high
+        auto = AutoRange(kind)
+        known = auto.update(full(0.0))
+        assert known.low < known.high and auto.update(full(np.nan)) == known
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("eyy", "free"), ("du_dx", "free"), ("u", "free"), ("blur", "from zero"), ("sigma_v", "from zero"),
+     ("sigma", "from zero"), ("residual", "from zero")],
+)  # fmt: skip
+def test_where_the_colours_lie(name: str, kind: str) -> None:
+    assert range_kind(name) == kind
+
+
+def test_the_colours_run_from_one_end_of_the_scale_to_the_other() -> None:
+    for name, span in (
+        ("eyy", ColourRange(-1e-3, 1e-3, True)), ("sigma_eyy", ColourRange(0.0, 2e-5)), ("u", ColourRange(3.0, 5.0)),
+    ):  # fmt: skip
+        scale, table = (
+            ColourScale.of(name, span),
+            diverging_table() if span.is_diverging else sequential_table(),
+        )
+        ends = scale.colours(np.array([[span.low, span.high, np.nan]]))[0]
+        assert (ends[0, :3] == table[0]).all() and (ends[1, :3] == table[-1]).all(), name
+        assert (scale.ramp(64)[[0, -1]] == table[[0, -1]]).all() and len(scale.ramp(64)) == 64
+        assert ends[2, 3] == 0
+
+
+def test_units() -> None:
+    assert ColourScale.of("eyy", ColourRange(-0.03, 0.03, True)) == ColourScale(-3.0, 3.0, "%", 100.0, True)
+    assert ColourScale.of("sigma_eyy", ColourRange(0.0, 2e-5)) == ColourScale(0.0, 20.0, "µm/m", 1e6)
+    assert ColourScale.of("v", ColourRange(1.0, 2.0)) == ColourScale(1.0, 2.0, "px", 1.0)
+    assert ColourScale.of("v", ColourRange(1.0, 2.0), "mm", -0.5) == ColourScale(-1.0, -0.5, "mm", -0.5)
+    assert ColourScale.of("exy", ColourRange(-1e-3, 1e-3), factor=-1.0) == ColourScale(
+        -1000.0, 1000.0, "µm/m", -1e6
+    )
+    assert ColourScale.of("residual", ColourRange(0.0, 3.0)).unit == "chi²"
+
+
+def test_every_map_has_colours_and_a_scale_or_a_legend() -> None:
+    grid = make_grid()
+    field = make_field(grid, 1e-3)
+    painted = FieldMaps("y", is_symmetric=True).paint(field, FIELD_MAPS)
+    assert set(painted) == set(FIELD_MAPS)
+    valid = field.ok
+    for name, one in painted.items():
+        assert one.rgba.shape == (*grid.shape, 4)
+        assert (one.rgba[valid][:, 3] > 0).all(), name
+        assert (one.scale is None) == (name == "status")
+    scale = painted["eyy"].scale
+    assert scale is not None and scale.low == -scale.high and scale.high >= 1000 and scale.unit == "µm/m"
+    assert painted["e1"].scale == scale  # tension along y: the largest principal strain
+    assert painted["sigma"].scale is not None and painted["sigma"].scale.low == 0
+
+
+def test_the_principal_strains_are_of_the_measure_that_is_shown() -> None:
+    field = replace(make_field(make_grid(), 0.1), measure="green")
+    maps = FieldMaps("y").paint(field, ("eyy", "e1"))
+    np.testing.assert_array_equal(maps["e1"].rgba, maps["eyy"].rgba)
+
+
+def test_colours_over_the_values_there_are() -> None:
+    grid = make_grid()
+    maps = FieldMaps("y")
+    scale = maps.paint(make_field(grid, 1e-3), ("eyy",))["eyy"].scale
+    assert scale is not None and 0 < scale.low <= 1000 <= scale.high < 1100
+    fixed = FieldMaps("y", 0.01).paint(make_field(grid, 1e-3), ("eyy",))["eyy"].scale
+    assert fixed is not None and (fixed.low, fixed.high) == (-1.0, 1.0) and fixed.unit == "%"
+
+
+def test_statuses_have_one_colour_each_and_a_legend() -> None:
+    statuses = np.array([[*Status, 99, Status.OK]], np.uint8)
+    cells, legend = status_colours(statuses)[0], status_legend(statuses)
+    assert cells[Status.NOT_MEASURED, 3] == 0
+    shown = {one.name: one for one in legend}
+    assert "NOT_MEASURED" not in shown and shown["OK"].count == 2 and shown["status 99"].count == 1
+    for status in Status:
+        if status != Status.NOT_MEASURED:
+            assert tuple(cells[status, :3]) == shown[status.name].rgb
+            assert shown[status.name].text == status.text
+    assert len({one.rgb for one in legend}) == len(legend), "a colour stands for one status"
+
+
+RAMP = np.linspace(0.0, 1e-3, 101)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "span"),
+    [
+        ("about zero", RAMP, (-1.2e-3, 1.2e-3, True)),  # 1.05 times the 98th percentile, rounded up
+        ("about zero", -RAMP, (-1.2e-3, 1.2e-3, True)),
+        ("from zero", 0.9 * RAMP, (0.0, 1e-3, False)),
+        ("free", 3.0 + 100 * RAMP, (3.0, 3.1, False)),
+        ("free", 1.9 * RAMP - 9e-4, (-1.2e-3, 1.2e-3, True)),
+    ],
+)
+def test_the_range_of_one_map(kind: str, values: np.ndarray, span: tuple[float, float, bool]) -> None:
+    *ends, is_diverging = AutoRange(kind).update(values)  # type: ignore[arg-type]
+    assert ends == pytest.approx(list(span[:2])) and is_diverging == span[2]
+
+
+@pytest.mark.parametrize(
+    ("low", "sigma", "is_diverging"),
+    [
+        (-0.05, 0.0, False),
+        (-0.098, 0.0, False),
+        (-0.102, 0.0, True),
+        (-0.5, 0.124, True),
+        (-0.5, 0.126, False),
+    ],
+)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_colours_are_about_zero_where_values_lie_on_both_sides(
+    sign: int, low: float, sigma: float, is_diverging: bool
+) -> None:
+    """The smaller end above a tenth of the larger, and above four sigma."""
+    values = sign * np.concatenate([np.full(500, low), np.full(500, 1.0)])
+    found = AutoRange("free").update(values, np.full(1000, sigma))
+    assert found.is_diverging is is_diverging
+    assert (found.low == -found.high) is is_diverging or sigma
+    assert found.low <= values.min() and values.max() <= found.high
+
+
+def test_noise_beyond_zero_is_no_part_of_the_range() -> None:
+    values, sigmas = np.concatenate([np.full(500, -0.02), np.full(500, 1.0)]), np.full(1000, 0.01)
+    assert AutoRange("free").update(values, sigmas) == ColourRange(0.0, 1.0)
+    assert AutoRange("free").update(-values, sigmas) == ColourRange(-1.0, 0.0)
+    assert AutoRange("free").update(3 * values, sigmas).low < 0, "more than noise"
+
+
+def test_a_map_that_grows_to_one_side_becomes_sequential_after_a_while() -> None:
+    auto = AutoRange("free", shrink_after=3)
+    assert auto.update(2 * RAMP - 1e-3) == ColourRange(-1.2e-3, 1.2e-3, True)
+    assert [auto.update(RAMP).is_diverging for _ in range(3)] == [True, True, False]
+    assert auto.update(2 * RAMP - 1e-3).is_diverging, "and back at once"
+
+
+def test_two_percent_may_lie_beyond_the_colours() -> None:
+    values = np.full(1000, 1e-3)
+    values[:19] = 1.0
+    assert AutoRange().update(values)[:2] == pytest.approx((-1.2e-3, 1.2e-3))
+    values[:30] = 1.0
+    assert AutoRange().update(values)[1] > 1
+
+
+def test_noise_reaches_a_quarter_of_the_range() -> None:
+    span = AutoRange().update(np.full(100, 1e-5), np.full(100, 1e-4))
+    assert span[:2] == pytest.approx((-4e-4, 4e-4))
+
+
+def test_the_colour_of_a_value_is_its_place_in_the_range() -> None:
+    table = diverging_table()
+    found = colour(np.array([[-2.0, -1.0, -0.5, 0.5, 1.0, 7.0, np.nan]]), -1.0, 1.0, table, alpha=200)[0]
+    assert found[:-1, :3].tolist() == table[[0, 0, 64, 191, 255, 255]].tolist()
+    assert found[:, 3].tolist() == [200] * 6 + [0]
+    table = sequential_table()
+    scale = ColourScale.of("eyy", ColourRange(-1e-3, 3e-3))
+    middle = scale.colours(np.array([[1e-3, 3e-3, -1e-3]]), 255)[0]
+    assert middle[:, :3].tolist() == table[[128, 255, 0]].tolist()
+
+
+def test_round_numbers() -> None:
+    assert [nice_above(v) for v in (1.0, 1.01, 1.3, 8.1, 0.021)] == [1.0, 1.2, 1.5, 10.0, 0.025]
+    assert ticks(-1.0, 1.0) == [-1.0, -0.5, 0.0, 0.5, 1.0]
+    assert [unit_for(v).name for v in (0.0099, 0.01)] == ["µm/m", "%"]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from acquire.errors import ConfigError, DataError
+from acquire.errors import DataError
 from analysis import Roi, ZoiGrid
 from analysis.field import Status
 from analysis.field.strain_field import StrainField
@@ -57,6 +57,7 @@ def test_the_table_is_that_of_the_paper() -> None:
     places = [0, 32, 64, 96, 128, 160, 192, 224, 255]
     assert np.abs(table[places] - published).max() <= 3
     assert table[0].tolist() == [59, 76, 192] and table[255].tolist() == [180, 4, 38]
+    assert np.abs(np.diff(table, axis=0)).max() <= 8
 
 
 # R. A. Machado and others, doi:10.1109/TVCG.2009.113: linear sRGB as it is seen, at full severity.
@@ -232,28 +233,14 @@ def test_a_low_pass_is_that_of_its_width_and_leaves_gaps() -> None:
     )
     holed = np.full((15, 15), 3.0)
     holed[4:7, 4:7] = np.nan
+    before = holed.copy()
     treated = for_display(holed, 8, 16.0, 3)
+    np.testing.assert_array_equal(holed, before)
     assert np.array_equal(np.isnan(treated), np.isnan(holed))
     np.testing.assert_allclose(treated[~np.isnan(holed)], 3.0, rtol=1e-9)
     spike = np.ones((9, 9))
     spike[4, 4] = 50.0
     assert (for_display(spike, 8, 0.0, 3) == 1.0).all() and for_display(spike, 8, 0.0, 1)[4, 4] == 50.0
-
-
-@pytest.mark.parametrize(
-    ("more", "well"),
-    [({"median": 51}, True), ({"median": 53}, False), ({"median": 1}, True), ({"median": 2}, False),
-     ({"low_pass_px": 112.0}, True), ({"low_pass_px": 112.1}, False), ({"deconvolution": 100}, True),
-     ({"deconvolution": 101}, False), ({"deconvolution": 1, "sharpened": 4}, True),
-     ({"deconvolution": 1, "sharpened": 5}, False), ({"sharpened": 1}, False), ({"limit": 1e-9}, True)],
-)  # fmt: skip
-def test_the_limits_of_a_request(more: dict[str, Any], well: bool) -> None:
-    request = MapRequest("eyy", **more)
-    if well:
-        request.check(make_grid())  # 7 ZOIs, 16 px apart
-    else:
-        with pytest.raises(ConfigError):
-            request.check(make_grid())
 
 
 def test_a_map_lies_where_its_zois_were(tmp_path: Path) -> None:
@@ -300,6 +287,7 @@ def test_a_range_shrinks_to_data_below_a_half_of_it() -> None:
     auto.update(large)
     assert {auto.update(small)[1] for _ in range(19)} == {1.2e-3}
     assert auto.update(small)[1] == pytest.approx(8e-4)
+    assert auto.update(-2 * large)[:2] == pytest.approx((-1.5e-3, 1.5e-3)), "and grows at once"
 
 
 def test_a_free_range_is_never_empty() -> None:
@@ -317,6 +305,8 @@ def test_one_scale_holds_for_all_instants(strain: Strain) -> None:
     assert scale.unit == "px" and scale.low <= np.nanmin(v[v > -1]) and scale.high >= 0.95 * np.nanmax(v)
     sigma = ColourScale.of_run(strain, "sigma_eyy", [0, 1])
     assert (sigma.low, sigma.high, sigma.unit) == (0.0, 12.0, "µm/m")
+    shown = ColourScale.of_run(strain, "v", [0, 1], None, "mm", -0.5)
+    assert (shown.unit, shown.low, shown.high) == ("mm", -0.5 * scale.high, -0.5 * scale.low)
     assert ColourScale.of_run(strain, "eyy", [1], 0.005).high == 5000.0
     assert ColourScale.of_run(strain, "eyy", [0]).high >= 40.0, "noise reaches a quarter"
     assert range_kind("iterations") == range_kind("v") == "free" and range_kind("blur") == "from zero"

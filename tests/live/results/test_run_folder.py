@@ -234,6 +234,7 @@ def test_the_gauge_length_is_that_between_the_ends_in_mm(
         assert not run.strain.grid.active[0, 0]
         assert length_between(run.strain, "y", gauge) == pytest.approx(px)
         assert gauge is not None or run.gauge_length_mm == pytest.approx(0.05 * px)
+        assert math.isnan(length_between(run.strain, "x", {"kind": "spiral"}))
     with open_run(results_of(tmp_path / "b", (0.0,), gauges=gauges)) as run:
         assert run.gauge_length_mm is None, "the scale is not known"
 

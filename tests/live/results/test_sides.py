@@ -3,26 +3,43 @@
 from __future__ import annotations
 
 import csv
+import html
+import io
 import math
+import re
 from collections.abc import Mapping, Sequence
-from datetime import timedelta
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 
 from acquire.errors import DataError
-from analysis.evaluate import Course, Curve, TensileOptions, TwoSides, evaluate_test
+from analysis.evaluate import Curve, GaugeValue, TensileOptions, TwoSides, evaluate_test
 from live.cli import main
-from live.pipeline.measurement import AXIAL
+from live.config.sections import SpecimenConfig
 from live.pipeline.run_state import RunState
+from live.results import sides as clocks
 from live.results.figures import tensile_options
+from live.results.report.several import _strains, _stress_strain, report_of_cameras
 from live.results.run_folder import open_run
-from live.results.sides import JointChannels, SideOfTest, SidesOfTest, longest_gap, newest, shift_s
+from live.results.sides import (
+    JointChannels,
+    SideOfTest,
+    SidesOfTest,
+    _at_the_front,
+    _mean_of,
+    cameras_in,
+    longest_gap,
+    newest,
+    recorded_cameras_in,
+    shift_s,
+    write_sides,
+)
 from tests.live import made_run
-from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run, noisy
+from tests.live.made_run import CONFIG, GAUGES, PULLED, force_of, make_run, noisy
 from tests.live.made_up import START, make_measurement
 
 BENT, TOWARDS = 0.05, -0.08  # bending and out-of-plane motion of the front, as shares of the strain
@@ -38,16 +55,6 @@ def runs(
     monkeypatch.setattr(made_run, "START", made_run.START + LATER_S)
     back = make_run(folder / "back", config=config, field_of=lambda k, e: noisy(k + 1000, e * (1 - wrong)))
     return front, back
-
-
-def test_between_instants_by_lines_and_nothing_across_gaps() -> None:
-    course = Course(
-        np.array([0.0, 1.0, 2.0, 9.0]), np.array([0.0, 2.0, 4.0, 4.0]), np.array([3.0, 4.0, 0.0, 0.0])
-    )
-    found = course.at(np.array([-0.1, 0.0, 0.5, 2.0, 5.0, 9.1]), 2.0)
-    np.testing.assert_allclose(found.value, [np.nan, 0, 1, np.nan, np.nan, np.nan])
-    assert found.sigma[2] == pytest.approx(2.5)
-    assert np.isnan(Course(np.zeros(1), np.zeros(1), np.zeros(1)).at(np.zeros(3), 1.0).value).all()
 
 
 def test_a_gap_is_five_times_the_usual_distance_of_instants() -> None:
@@ -73,36 +80,6 @@ def test_the_curve_of_the_mean_has_means_and_the_stress_of_the_front() -> None:
     np.testing.assert_allclose(found.transverse, -5e-4 * t)
     np.testing.assert_allclose(found.narrowing, -2e-3 * t)
     np.testing.assert_allclose(found.lens, 2.5e-5)
-
-
-def test_the_newest_values_are_those_of_the_newest_instant_of_both(monkeypatch: pytest.MonkeyPatch) -> None:
-    def recent(state: Any) -> dict[str, Course]:
-        t = np.arange(state.last + 1.0)
-        return {AXIAL: Course(t, 1e-3 * t * state.last, np.zeros(state.last + 1))}
-
-    monkeypatch.setattr("live.results.sides._recent", recent)
-    healthy, live = SimpleNamespace(camera_failed=False), SimpleNamespace(known=True)
-    made = SimpleNamespace(figure=lambda _: live)
-    front, back = (
-        cast(RunState, SimpleNamespace(last=k, health=healthy, snapshot=lambda _: made)) for k in (6, 4)
-    )
-    mean, bending, _, at = newest({"front": front, "back": back})[AXIAL]
-    assert at == 4.0
-    assert mean == pytest.approx(4e-3 * (6 + 4) / 2) and bending == pytest.approx(4e-3 * (6 - 4) / 2)
-
-
-def test_mean_bending_and_their_sigma() -> None:
-    t = np.arange(3.0)
-    front, back = (
-        Course(t, np.full(3, value), np.full(3, sigma)) for value, sigma in ((110.0, 3), (90.0, 4))
-    )
-    both = TwoSides.of(front, back, 2.0)
-    assert both.mean.tolist() == [100, 100, 100]
-    assert both.bending.tolist() == [10, 10, 10]
-    assert both.sigma.tolist() == pytest.approx([2.5, 2.5, 2.5])
-    exact = Course(t, t, np.zeros(3))
-    # Both see cos(0.1 degree): short by 1.5 um/m at most.
-    assert TwoSides.of(exact, exact, 2.0).sigma == pytest.approx(1.523e-6 / math.sqrt(3), rel=1e-3)
 
 
 def test_the_mean_has_neither_bending_nor_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -141,22 +118,6 @@ def test_the_command_writes_a_table(
     assert abs(float(rows[-1]["mean_shear"])) < 1e-5
     assert main(["sides", str(front), str(back)]) == 2  # it exists
     assert "sides.csv" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_what_is_not_of_one_test_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    front = make_run(tmp_path / "front")
-    same = make_run(tmp_path / "same", session=False)  # by its time: of one run with two cameras
-    monkeypatch.setattr(made_run, "START", made_run.START + 501.0)
-    monkeypatch.setattr(made_run, "UTC_START", made_run.UTC_START + timedelta(seconds=1))
-    without = make_run(tmp_path / "without", session=False)
-    elsewhere = make_run(tmp_path / "elsewhere")
-    with open_run(front) as one, open_run(same) as other:
-        assert shift_s(one, other) == 0
-    with open_run(front) as one, open_run(without) as other, pytest.raises(DataError, match="no recording"):
-        SidesOfTest.of_folders(one, other)
-    with open_run(front) as one, open_run(elsewhere) as other, pytest.raises(DataError, match="500 s apart"):
-        SidesOfTest.of_folders(one, other)
 
 
 STRAIN, BENDING = 1e-3, 2e-4
@@ -249,3 +210,221 @@ def test_two_cameras_that_stall_together_leave_no_value() -> None:
     for state in states.values():
         state.health.paused = True
     assert (joint.read(START), joint.lost) == ({}, "")
+
+
+T = np.arange(5.0)
+
+
+def curve(value: float, **more: Any) -> Curve:
+    return Curve(T, value * T, 10 * value * T, -value * T / 4, elastic=2 * value * T, **more)
+
+
+def test_the_errors_of_both_cameras_are_independent() -> None:
+    """Of lenses and blurs; a blur that only one of them knows is none of the mean."""
+    ones = np.ones(5)
+    mean = _mean_of(curve(1.0, blur=3e-4 * ones, lens=3e-5 * ones), curve(3.0, blur=4e-4 * ones))
+    assert mean.elastic is not None and mean.lens is not None and mean.blur is not None
+    np.testing.assert_allclose(mean.elastic, 4.0 * T)
+    np.testing.assert_allclose(mean.lens, 1.5e-5)
+    np.testing.assert_allclose(mean.blur**2, math.hypot(9e-8, 16e-8) / 2)
+    assert _mean_of(curve(1.0, blur=ones), curve(3.0)).blur is None
+    assert mean.source.startswith("mean of both sides: ") and mean.narrowing is None
+
+
+def test_the_back_is_moved_to_the_instants_of_the_front() -> None:
+    moved = {name: 1.0 + np.arange(5.0) * k for k, name in enumerate(
+        ("uneven", "misfit", "narrowing", "lens", "blur"), 2)}  # fmt: skip
+    late = replace(curve(1.0, **moved), t=T + 0.5)
+    found = _at_the_front(curve(2.0), late, 2.0)
+    assert found.t is T and math.isnan(found.strain[0])
+    np.testing.assert_allclose(found.strain[1:], T[1:] - 0.5)
+    np.testing.assert_allclose(found.stress, 20 * T)
+    assert found.transverse is not None and found.elastic is not None
+    np.testing.assert_allclose(found.transverse[1:], -(T[1:] - 0.5) / 4)
+    np.testing.assert_allclose(found.elastic[1:], 2 * (T[1:] - 0.5))
+    for k, name in enumerate(moved, 2):
+        np.testing.assert_allclose(getattr(found, name)[1:], 1 + k * (T[1:] - 0.5), err_msg=name)
+    bare = _at_the_front(curve(2.0), Curve(T, T, T), 2.0)
+    assert bare.transverse is None and bare.lens is None
+
+
+def sides_of(axial: float, gauge: float = 3e-3) -> SidesOfTest:
+    def two(mean: float) -> TwoSides:
+        values = np.array([0.0, mean, math.nan])
+        return TwoSides(np.array([0.0, 1.0, 2.0]), values, 0.1 * values, np.array([1e-6, 2e-6, math.nan]))
+
+    return SimpleNamespace(  # type: ignore[return-value]
+        courses={"axial": two(axial), "wide": two(gauge), "lost": two(math.nan)}, force=np.array([0.0, 5.0, 7.5]),
+        curve=SimpleNamespace(stress=np.array([0.0, 2e8, 3e8])),
+    )  # fmt: skip
+
+
+def test_the_table_of_both_sides() -> None:
+    file = io.StringIO()
+    write_sides(sides_of(2e-3), file)
+    heads, first, second, third = (line.split(",") for line in file.getvalue().splitlines())
+    assert heads[:5] == ["time_s", "force_N", "mean_axial", "bending_axial", "sigma_axial"]
+    assert first[:5] == ["0", "0", "0", "0", "1e-06"]
+    assert second[:8] == ["1", "5", "0.002", "0.0002", "2e-06", "0.003", "0.0003", "2e-06"]
+    assert third[:5] == ["2", "7.5", "", "", ""]
+
+
+def test_the_last_strains_of_both_sides() -> None:
+    shown = re.sub(r"\|+", "|", re.sub("<[^>]*>", "|", str(_strains(sides_of(2e-3)))))
+    assert "|axial|2\u202f000.0|200.0|2.0|" in shown and "|wide|3\u202f000.0|300.0|2.0|" in shown
+    assert "|lost|0.0|0.0|1.0|" in shown, "the last that is known"
+
+
+def test_the_curves_of_mean_front_and_back() -> None:
+    plot = _stress_strain(sides_of(2e-3), True)
+    assert [line.label for line in plot.curves] == ["mean", "front", "back"]
+    assert [line.x[1] for line in plot.curves] == pytest.approx([2000, 2200, 1800])
+    assert [line.y[1] for line in plot.curves] == [200.0] * 3 and plot.y_label == "stress, MPa"
+    forces = _stress_strain(sides_of(0.05), False)
+    assert (forces.x_label, forces.y_label) == ("axial strain, %", "force, kN")
+    assert forces.curves[0].x[1] == pytest.approx(5.0) and forces.curves[0].y[1] == pytest.approx(2e5)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A test whose front has too much strain, and whose back too little."""
+    made, config = tmp_path_factory.mktemp("sides"), {**CONFIG, "gauges": GAUGES}
+    for k, (side, share) in enumerate((("front", 1 + BENT), ("back", 1 - BENT))):
+        make_run(made / side, config=config, session=False,
+                 field_of=lambda n, e, k=k, share=share: noisy(n + 1000 * k, share * e))  # type: ignore[misc]  # fmt: skip
+    return made
+
+
+def test_the_report_of_both_sides(folder: Path) -> None:
+    with open_run(folder / "front") as front, open_run(folder / "back") as back:
+        made = report_of_cameras({"front": front, "back": back}, {"front": "front/report.html"})
+        sides = SidesOfTest.of_folders(front, back)
+        lines = list(sides.figure_lines(stresses=True))
+    stress, mean, bending = made.figures
+    assert [one.name for one in made.figures] == ["stress-strain", "mean-time", "bending-time"]
+    assert mean.curves[0].y[-1] == pytest.approx(1e6 * PULLED[-1], rel=0.02)
+    assert bending.curves[0].y[-1] == pytest.approx(1e6 * BENT * PULLED[-1], rel=0.05)
+    assert mean.curves[0].sigma is not None and (mean.title, bending.title) == (
+        "Mean of front and back", "Front minus mean",
+    )  # fmt: skip
+    assert stress.curves[0].y[-1] == pytest.approx(1e-6 * force_of(PULLED[-1]) / 20e-6, rel=1e-6)
+    text = html.unescape(made.html)
+    assert (
+        "S1: front and back" in text
+        and 'href="front/report.html"' in text
+        and "report of the back" not in text
+    )
+    moduli = {
+        row[0]: float(row[1]) for row in re.findall(r"<tr><td>(both|front|back)</td><td>([\d.]+) ±", text)
+    }
+    assert moduli["both"] == pytest.approx(70.0, rel=0.02)
+    assert moduli["front"] == pytest.approx(70 / (1 + BENT), rel=0.02)
+    assert moduli["back"] == pytest.approx(70 / (1 - BENT), rel=0.02)
+    assert [line.split()[0] for line in lines] == ["both:", "front:", "back:"]
+    assert "not in the mean of both sides" in text
+
+
+def test_the_report_of_two_fields(folder: Path) -> None:
+    with open_run(folder / "front") as one, open_run(folder / "back") as other:
+        made = report_of_cameras({"first": one, "second": other}, {"second": "second/report.html"})
+    (plot,) = made.figures
+    assert [(line.label, line.colour) for line in plot.curves] == [("first", 0), ("second", 1)]
+    assert [line.y[-1] for line in plot.curves] == pytest.approx(
+        [1e6 * share * PULLED[-1] for share in (1 + BENT, 1 - BENT)], rel=0.02
+    )
+    np.testing.assert_allclose(plot.curves[1].x, 0.1 * np.arange(len(PULLED)), atol=1e-9)
+    assert "Budget of E, second" in made.html and "S1: 2 fields of view" in made.html
+
+
+def test_a_side_has_its_clock_and_its_gauges(folder: Path) -> None:
+    with open_run(folder / "front") as run:
+        side = SideOfTest.of_folder(run, 2.5)
+        values = run.strain.values
+    assert set(side.courses) == {"axial", "transverse", "shear"}
+    np.testing.assert_allclose(side.courses["axial"].value, values["gauge_axial"])
+    np.testing.assert_allclose(side.courses["transverse"].value, values["exx"])
+    np.testing.assert_allclose(side.courses["transverse"].sigma, values["sigma_exx"])
+    for course in side.courses.values():
+        assert course.t[0] == 2.5
+    assert side.curve.t[0] == 2.5
+    np.testing.assert_allclose(side.force, [force_of(e) for e in PULLED], rtol=1e-6)
+
+
+def state_of(values: list[tuple[float, float]], **more: Any) -> RunState:
+    """Two steps with a gauge."""
+    state = RunState.new(1.0)
+    for number, (strain, gauge) in enumerate(values):
+        step = make_measurement(number, strain).time_step
+        gauges = {"wide": GaugeValue(gauge, 1e-6), **more}
+        state.history.add(replace(step, gauges=gauges))
+    return state
+
+
+def test_gauges_of_a_running_test_are_put_together() -> None:
+    states = {"front": state_of([(1e-3, 1e-3), (2e-3, 5e-3)]), "back": state_of([(1e-3, 1e-3), (1e-3, 3e-3)])}
+    found = newest(states)
+    assert found["wide"].mean == pytest.approx(4e-3) and found["wide"].bending == pytest.approx(1e-3)
+    # Noise of both, and what one of them may be turned by 0.1 degree.
+    assert found["wide"].sigma == pytest.approx(
+        math.hypot(1e-6 / math.sqrt(2), 1.523e-6 / math.sqrt(3)), rel=1e-3
+    )
+    assert found["wide"].t == found["axial"].t == pytest.approx(START + 0.1)
+    joint = JointChannels()
+    joint.attach(states, live=False)
+    shown = joint.read(START - 1)
+    assert shown["mean_time_s"] == pytest.approx(1.1)
+    assert shown["mean_gauge_wide"] == pytest.approx(4e-3) and shown["bending_gauge_wide"] == pytest.approx(
+        1e-3
+    )
+    assert shown["mean_axial"] == pytest.approx(1.5e-3) and "mean_wide" not in shown
+
+
+def test_a_gauge_named_axial_has_both_names() -> None:
+    own = {"axial": GaugeValue(7e-3, 1e-6)}
+    states = {side: state_of([(1e-3, 1e-3), (2e-3, 5e-3)], **own) for side in ("front", "back")}
+    joint = JointChannels()
+    joint.attach(states, live=True)
+    shown = joint.read(START)
+    assert shown["mean_axial"] == shown["mean_gauge_axial"] == pytest.approx(7e-3)
+    side = SideOfTest.of_state(states["front"], SpecimenConfig())
+    assert side.courses["wide"].value.tolist() == pytest.approx([1e-3, 5e-3])
+    assert side.courses["wide"].sigma.tolist() == pytest.approx([1e-6, 1e-6])
+    assert side.courses["wide"].t.tolist() == pytest.approx([START, START + 0.1])
+
+
+def run_at(monotonic: float, utc: str, session: bool = True) -> Any:
+    strain = SimpleNamespace(start_utc=f"2030-01-02T03:04:{utc}+00:00")
+    return SimpleNamespace(session=session or None, start_monotonic=monotonic, strain=strain, path=Path(utc))
+
+
+def test_the_clocks_of_two_runs() -> None:
+    """That of the machine counts; the one of the day may have been set by two seconds."""
+    assert shift_s(run_at(100.0, "05"), run_at(107.5, "12")) == 7.5
+    assert shift_s(run_at(107.5, "12"), run_at(100.0, "05")) == -7.5
+    assert shift_s(run_at(100.0, "05"), run_at(107.0, "10")) == 7.0 and clocks.CLOCKS_AGREE_S == 2.0
+    with pytest.raises(DataError, match="their clocks are 3 s apart"):
+        shift_s(run_at(100.0, "05"), run_at(108.0, "10"))
+    assert shift_s(run_at(0.0, "05", False), run_at(0.0, "05", False)) == 0.0
+    with pytest.raises(DataError, match="07: no recording, whose clock is needed"):
+        shift_s(run_at(0.0, "05"), run_at(0.0, "07", False))
+
+
+def test_which_folder_holds_two_cameras(tmp_path: Path) -> None:
+    for name in ("front/strain.h5", "back/strain.h5", "back/session.h5"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    assert cameras_in(tmp_path) == ("front", "back") and recorded_cameras_in(tmp_path) == ()
+    (tmp_path / "front/session.h5").touch()
+    assert recorded_cameras_in(tmp_path) == ("front", "back")
+    (tmp_path / "strain.h5").touch()
+    assert cameras_in(tmp_path) == () and recorded_cameras_in(tmp_path) == ("front", "back")
+    with pytest.raises(DataError, match=r"a test with several cameras; give the folder of one, .*front"):
+        (tmp_path / "strain.h5").unlink()
+        open_run(tmp_path)
+
+
+def test_folders_without_an_instant_in_common_are_not_of_one_test(folder: Path) -> None:
+    with open_run(folder / "front") as front, open_run(folder / "back") as back:
+        back.strain.values["time_s"][:] += 100.0
+        with pytest.raises(DataError, match="have no instant in common"):
+            SidesOfTest.of_folders(front, back)

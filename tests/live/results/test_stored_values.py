@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import logging
 import math
 import sys
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,16 +19,13 @@ import pytest
 
 from acquire.errors import ConfigError, DataError
 from analysis.evaluate import GaugeValue
-from analysis.field.strain_field import StrainField
 from live.pipeline.measurement import Measurement
 from live.results import Results, ResultsInfo, Strain
 from live.results.__main__ import main as probed
 from live.results.layout import StrainRow, gauge_columns
 from live.results.quantities import Display
-from live.results.stored_fields import length_between, read_field
-from live.results.strain_h5 import StrainWriter, normal_matrices
+from live.results.strain_h5 import normal_matrices
 from live.results.writer import CsvWriter
-from tests.clock import Clock
 from tests.live.made_up import CAMERA, START, make_grid, make_measurement
 
 INFO = ResultsInfo(START, "2030-01-02T03:04:05+00:00", {"measure": {"zoi": 32}}, {"specimen": "S1"},
@@ -166,7 +163,6 @@ def test_files_that_contradict_themselves_are_refused(written: Path, tmp_path: P
         (lambda e: e["mean/exx"].resize((3,)), "not of one length"),
         (lambda e: e["strain"].attrs.__setitem__("grid", json.dumps(
             {**json.loads(e["strain"].attrs["grid"]), "step": 17})), "ZOIs, but"),
-        (lambda e: e.file.attrs.__setitem__("format_version", 2), "format version 2, this program reads up to 1"),
         (lambda e: e.file.attrs.__setitem__("format", "another"), "holds 'another'"),
     ]  # fmt: skip
     for k, (change, words) in enumerate(changes):
@@ -187,20 +183,6 @@ def test_the_child_reads_a_file_once(
     assert "is not an HDF5 file" in capsys.readouterr().out
     Results(tmp_path, make_grid(), INFO).close()
     assert probed(str(tmp_path / "strain.h5")) == 0, "no row"
-
-
-def test_a_row_waits_for_its_flush_no_longer_than_it_may(tmp_path: Path) -> None:
-    clock = Clock()
-    writer = StrainWriter(tmp_path / "strain.h5", make_grid(), INFO, 2.0, clock)
-    with closing(writer):
-        assert writer.flush_when_due() == math.inf
-        writer.write(StrainRow.of(gauged(0), INFO))
-        assert (writer._flushed, writer.flush_when_due()) == (1, math.inf), "nothing waits"
-        clock.now_s = 1.5
-        writer.write(StrainRow.of(gauged(1), INFO))
-        assert (writer._flushed, writer.flush_when_due()) == (1, 0.5)
-        clock.now_s = 2.0
-        assert (writer.flush_when_due(), writer._flushed) == (math.inf, 2)
 
 
 # -- rows -----------------------------------------------------------------------------------------
@@ -277,27 +259,6 @@ def test_a_table_that_cannot_be_made_says_so(tmp_path: Path) -> None:
 # -- fields ---------------------------------------------------------------------------------------
 
 
-def test_a_field_comes_back_with_the_covariance_of_its_shear(tmp_path: Path) -> None:
-    grid = make_grid()
-    field = StrainField.from_values(grid, {"du_dy": 1e-3, "dv_dx": 2e-3}, 1e-5)
-    covariance = np.array(field.covariance)
-    covariance[_pair(2, 4)] = 0.6e-10  # of du_dy and dv_dx, whose variances are 1e-10
-    field = replace(field, covariance=covariance)
-    with Results(tmp_path, grid, replace(INFO, gauges={})) as results:
-        results.add(replace(make_measurement(0), field=field))
-    with Strain.open(tmp_path / "strain.h5") as strain:
-        found = read_field(strain, 0)
-    ok = found.ok
-    np.testing.assert_allclose(found.sigma_exy[ok], 0.5 * math.sqrt(2e-10 + 1.2e-10), rtol=5e-3)
-    np.testing.assert_allclose(found.covariance[_pair(2, 4)][ok], 0.6e-10, rtol=0.02)
-    np.testing.assert_allclose(found.du_dy[ok], 1e-3, rtol=1e-4)
-
-
-def _pair(i: int, j: int) -> int:
-    """The place in the upper triangle of a matrix of 6 x 6."""
-    return next(k for k, pair in enumerate(zip(*np.triu_indices(6), strict=True)) if pair == (i, j))
-
-
 def test_normal_matrices_are_stored_as_upper_triangles() -> None:
     grid = make_grid()
 
@@ -312,9 +273,17 @@ def test_normal_matrices_are_stored_as_upper_triangles() -> None:
         assert stored[k, 2, 3] == 10 * i + j + 100 * (2 * 7 + 3)
 
 
-def test_the_length_between_the_ends_of_an_extension(strain: Strain) -> None:
-    line = {"kind": "line", "start": [30, 20], "end": [90, 20]}
-    assert length_between(strain, "x", line) == pytest.approx(60, abs=16)
-    assert math.isnan(length_between(strain, "x", {"kind": "spiral"}))
-    # Strips of the grid, whose centres are 96 px apart across and 64 down.
-    assert 32 < length_between(strain, "y", None) <= 64 < length_between(strain, "x", None) <= 96
+RECORDED = Path(__file__).with_name("recorded")
+
+
+def test_results_of_the_first_version_open() -> None:
+    with (RECORDED / "strain.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    with Strain.open(RECORDED / "strain.h5") as strain:
+        assert strain.versions["phasedic"] == "0.1.0"
+        assert strain.n == len(rows) == 8
+        for name in ("force_N", "exx", "eyy", "exy", "sigma_eyy", "noise_GL"):
+            assert strain.values[name] == pytest.approx([float(row[name]) for row in rows], rel=1e-8)
+        maps = strain.maps("eyy")
+        assert maps.shape == (8, 4, 6)
+        assert np.nanmean(maps, axis=(1, 2)) == pytest.approx(strain.values["eyy"], abs=1e-9)

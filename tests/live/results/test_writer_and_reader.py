@@ -11,7 +11,6 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ import pytest
 from acquire.errors import DataError
 from acquire.hdf5 import damage as child
 from analysis import Roi, ZoiGrid
-from analysis.evaluate import GaugeValue
 from analysis.field import PAIR_INDEX
 from live.pipeline.measurement import Measurement
 from live.results import Results, ResultsInfo, Strain
@@ -434,32 +432,6 @@ def test_an_unfinished_file_that_lost_its_end_does_not_hang(
         Strain.open(torn)
 
 
-def test_unknown_maps_and_rows_are_refused(tmp_path: Path) -> None:
-    with open_results(tmp_path) as results:
-        results.add(make_measurement(0))
-    with Strain.open(tmp_path / "strain.h5") as strain:
-        with pytest.raises(DataError, match="no map 'ezz'"):
-            strain.maps("ezz")
-        with pytest.raises(DataError, match="no row 1"):
-            strain.maps("exx", 1)
-
-
-@pytest.mark.parametrize(
-    ("measure", "strain"),
-    [("small", 0.02), ("engineering", 0.02), ("green", 0.0202), ("hencky", math.log(1.02))],
-)
-def test_true_strain_and_stress_are_those_of_the_stretch_in_any_measure(measure: Any, strain: float) -> None:
-    """Where no strips show the elongation, the stretch follows from the strain of the region."""
-    m = make_measurement(0, 0.02, force=3000.0)
-    step = dataclasses.replace(m.time_step, extension_y=math.nan, exx=0.0, eyy=strain)
-    field = dataclasses.replace(m.field, measure=measure)
-    info = dataclasses.replace(INFO, strain_measure=measure, area_m2=20e-6)
-    values = StrainRow.of(dataclasses.replace(m, field=field, time_step=step), info).values
-    assert values["stress_Pa"] == pytest.approx(150e6)
-    assert values["true_strain"] == pytest.approx(math.log(1.02), rel=1e-9)
-    assert values["true_stress_Pa"] == pytest.approx(153e6, rel=1e-9)
-
-
 def test_the_uncertainty_of_the_shear_comes_back_with_that_of_its_two_gradients(tmp_path: Path) -> None:
     """In the file are three standard deviations; what two gradients have in common follows from them."""
     m = make_measurement(0)
@@ -471,30 +443,3 @@ def test_the_uncertainty_of_the_shear_comes_back_with_that_of_its_two_gradients(
         field = read_field(strain, 0)
     assert field.covariance[PAIR_INDEX[2, 4]][field.ok] == pytest.approx(0.6e-10, rel=0.01)
     assert field.sigma_exy[field.ok] == pytest.approx(math.sqrt(2e-10 + 1.2e-10) / 2, rel=1e-3)
-
-
-def test_each_column_has_its_own_value() -> None:
-    measurement = make_measurement(3, 1e-3)
-    gauge = GaugeValue(1e-3, 2e-5, share=0.75)
-    step = dataclasses.replace(
-        measurement.time_step, u=1.5, v=-2.5, latency_s=0.03, measure_s=0.01, gauges={"middle": gauge}
-    )
-    values = StrainRow.of(dataclasses.replace(measurement, time_step=step), INFO).values
-    assert (values["u_px"], values["v_px"]) == (1.5, -2.5)
-    assert (values["latency_s"], values["kernel_s"]) == (0.03, 0.01)
-    columns = ("gauge_middle", "sigma_gauge_middle", "share_gauge_middle")
-    assert [values[name] for name in columns] == [1e-3, 2e-5, 0.75]
-    assert (values["frame"], values["last_frame"], values["n_frames"], values["lost"]) == (24, 31, 8, 1)
-
-
-def test_a_reference_holds_from_its_first_row_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("live.results.strain_h5.normal_matrices", lambda pattern, _: pattern)
-    grid = make_grid()
-    first, second = (np.full((21, *grid.shape), value, np.float32) for value in (1.0, 2.0))
-    with closing(StrainWriter(tmp_path / "strain.h5", grid, INFO)) as written:
-        for number, pattern in enumerate((first, first, first, second, second)):
-            row = StrainRow.of(make_measurement(number), INFO)
-            written.write(dataclasses.replace(row, pattern=pattern))  # type: ignore[arg-type]
-    with Strain.open(tmp_path / "strain.h5") as strain:
-        assert [strain.reference(row) for row in range(5)] == [0, 0, 0, 1, 1]
-        np.testing.assert_array_equal(strain.normal(1), second)

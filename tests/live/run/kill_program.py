@@ -24,26 +24,14 @@ GRACE_S = 0.06  # what is younger at the kill may be missing: 50 ms, and the flu
 
 @dataclass(frozen=True, slots=True)
 class Remains:
-    """What one killed run left.
-
-    Attributes
-    ----------
-    frames, samples : int
-        Readable in the file.
-    frame_age_s, sample_age_s : float, s
-        Of the newest frame and load sample at the kill.
-    gaps : int
-        Steps of the index that ``lost_before`` does not account for.
-    period_s : float, s
-        Median interval of frames.
-    """
+    """What of one killed run is readable in its file."""
 
     frames: int
     samples: int
-    frame_age_s: float
+    frame_age_s: float  # of the newest frame at the kill
     sample_age_s: float
-    gaps: int
-    period_s: float
+    gaps: int  # steps of the index that ``lost_before`` does not account for
+    period_s: float  # median interval of frames
 
     def missing(self, load_period_s: float) -> int:
         """Frames and samples older than the grace that should be there and are not, by their pace."""

@@ -7,6 +7,7 @@ import math
 import stat
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -21,6 +22,7 @@ from live.run.control import (
     ENDED,
     FORCED,
     ONCE,
+    QUEUED,
     SOCKET_NAME,
     START,
     STOP,
@@ -83,9 +85,7 @@ def test_a_second_p_goes_on() -> None:
     assert [call[0] for call in live.calls] == [EventKind.PAUSE, EventKind.RESUME, EventKind.PAUSE]
 
 
-@pytest.mark.parametrize(
-    "line", ["", "\n", "x", "n", "note", "stop it", "quit now", "alarm", "tare twice", "n" * 501]
-)
+@pytest.mark.parametrize("line", ["", "\n", "x", "n", "note", "stop it", "quit now", "alarm", "tare twice"])
 def test_what_is_no_order_is_refused_with_a_reason(line: str) -> None:
     live = FakeLive()
     assert answer(line, live).startswith("no: ")
@@ -227,22 +227,6 @@ class TareSetup:
         return str(refused.value)
 
 
-def test_under_load_in_mid_test_it_takes_two() -> None:
-    bench = TareSetup()
-    assert "800 N in mid-test" in bench.refused() and bench.cell.calls == [] and not bench.told
-    bench.now += 2.9
-    bench.controls.tare()
-    assert bench.cell.calls == ["tare"] and bench.told[-1][0] is EventKind.TARE
-
-
-def test_a_late_second_order_is_a_first_one() -> None:
-    bench = TareSetup()
-    for _ in range(4):
-        bench.refused()
-        bench.now += 3.1
-    assert bench.cell.calls == []
-
-
 def test_a_third_order_asks_again() -> None:
     bench = TareSetup()
     bench.refused()
@@ -275,13 +259,6 @@ def test_a_tare_once_is_never_the_confirmation_of_another() -> None:
     assert free.cell.calls == ["tare"]
 
 
-@pytest.mark.parametrize(("force", "capacity_N"), [(0.0, None), (0.9, 1000.0)])
-def test_without_load_one_order_is_enough(force: float, capacity_N: float | None) -> None:
-    bench = TareSetup(force, capacity_N=capacity_N)
-    bench.controls.tare()
-    assert bench.cell.calls == ["tare"]
-
-
 def test_before_the_test_one_order_is_enough() -> None:
     bench = TareSetup(measured=False)
     bench.controls.tare()
@@ -298,14 +275,6 @@ def test_without_a_load_cell_there_is_nothing_to_tare() -> None:
     bench.cell = FakeCell(None, "none")
     bench.controls = TareControl(bench.cell, bench, lambda: bench.now)
     assert "no load cell" in bench.refused()
-
-
-def test_forced_and_undone_at_once() -> None:
-    bench = TareSetup()
-    bench.controls.tare(FORCED)
-    bench.controls.tare(UNDO)
-    assert bench.cell.calls == ["forced", "undo"]
-    assert [kind for kind, *_ in bench.told] == [EventKind.TARE] * 2
 
 
 def test_the_answer_is_what_the_cell_did() -> None:
@@ -332,3 +301,66 @@ def test_an_undoing_is_no_confirmation() -> None:
     bench.controls.tare(UNDO)
     bench.refused()
     assert bench.cell.calls == ["undo"]
+
+
+@pytest.mark.parametrize(("letters", "good"), [(500, True), (501, False)])
+def test_a_command_has_up_to_500_letters(letters: int, good: bool) -> None:
+    live = FakeLive()
+    said = answer("note ".ljust(letters, "x"), live)
+    assert (said == "ok") is good and len(live.calls) == good
+    assert good or said == "no: a command has up to 500 letters"
+
+
+@pytest.mark.parametrize(("after_s", "done"), [(0.4, False), (0.5, True), (3.0, True), (3.1, False)])
+def test_a_tare_is_confirmed_from_half_a_second_to_three_seconds_later(after_s: float, done: bool) -> None:
+    bench = TareSetup()
+    assert bench.refused().endswith("repeat the command within 3 s to do it") and not bench.told
+    bench.now = 10.0 + after_s
+    if done:
+        assert bench.controls.tare() == QUEUED
+    else:
+        bench.refused()
+    assert bench.cell.calls == ["tare"] * done
+
+
+@pytest.mark.parametrize(("force", "at_once"), [(1.0, True), (-1.0, True), (1.01, False), (-1.01, False)])
+def test_a_thousandth_of_the_capacity_is_no_load(force: float, at_once: bool) -> None:
+    bench = TareSetup(force, capacity_N=1000.0)
+    if at_once:
+        bench.controls.tare()
+    else:
+        assert f"{force:g}".replace("-", "−") + " N in mid-test" in bench.refused()
+    assert bench.cell.calls == ["tare"] * at_once
+
+
+def test_an_answer_to_a_tare_waits_two_seconds() -> None:
+    nothing: Any = None
+    assert TareControl(FakeCell(None), nothing, nothing)._wait_s == 2.0
+
+
+def test_before_the_first_sample_a_tare_risks_nothing() -> None:
+    cell = FakeCell(None)
+    test: Any = SimpleNamespace(has_measured=True, latest_load=None, emit=lambda *_: None)
+    TareControl(cell, test, lambda: 0.0, wait_s=0).tare()
+    assert cell.calls == ["tare"]
+
+
+def test_an_answer_of_another_cell_is_none_of_this_one() -> None:
+    bench = TareSetup(measured=False)
+    bench.cell.says = [Event(10.0, EventKind.TARE, "/dev/y", "tared: 8 N", "info", {})]
+    assert bench.controls.tare() == QUEUED
+    bench.cell.says = [Event(10.0, EventKind.DEVICE, "/dev/x", "it did", "info", {"tared": True})]
+    assert bench.controls.tare() == QUEUED
+
+
+def test_a_forced_tare_is_told_as_one() -> None:
+    bench = TareSetup()
+    bench.controls.tare("force")
+    bench.controls.tare("undo")
+    assert bench.cell.calls == ["forced", "undo"]
+    assert [(kind, level, text) for kind, level, text in bench.told] == [
+        (EventKind.TARE, "info", "tare, forced"), (EventKind.TARE, "info", "undo the last tare"),
+    ]  # fmt: skip
+    free = TareSetup(0.0)
+    free.controls.tare()
+    assert free.told == [(EventKind.TARE, "info", "tare")]

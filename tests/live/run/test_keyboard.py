@@ -17,7 +17,7 @@ import pytest
 
 from acquire.events import EventKind
 from live.commands.attended import HELP, LINES_HELP, Keyboard, Keys, listen
-from live.run.control import ENDED, FORCED, UNDO
+from live.run.control import ENDED, UNDO
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.run.test_control import FakeLive
 from tests.live.screens import Terminal
@@ -38,11 +38,6 @@ def test_what_nobody_knows_is_answered_with_the_orders() -> None:
 def test_only_a_terminal_is_listened_to() -> None:
     assert listen(FakeLive(), io.StringIO("q\n"), TerminalScreen(io.StringIO())) is None
     assert listen(FakeLive(), None, TerminalScreen(io.StringIO())) is None
-    live = FakeLive()
-    thread = listen(live, Terminal("q\n"), TerminalScreen(io.StringIO()))
-    assert thread is not None
-    thread.join(LONG_S)
-    assert live.calls == [("stop", ENDED)]
 
 
 class Typed:
@@ -58,11 +53,6 @@ class Typed:
         return self.live.calls
 
 
-def test_single_keys_are_orders_at_once() -> None:
-    calls = Typed().type("rp", "T")
-    assert calls == [(EventKind.NEW_REFERENCE, ""), (EventKind.PAUSE, ""), (EventKind.TARE, FORCED)]
-
-
 def test_a_note_is_typed_to_its_end_and_no_key_in_it_is_an_order() -> None:
     typed = Typed()
     assert typed.type("n", "a qx", "\x7f", "\n") == [(EventKind.NOTE, "a q")]
@@ -76,15 +66,6 @@ def test_a_note_without_words_is_none() -> None:
     assert "no" not in typed.stream.getvalue().replace("note", "")
 
 
-def test_one_q_alone_ends_no_test() -> None:
-    typed = Typed()
-    assert typed.type("q") == [] and "q again" in typed.stream.getvalue()
-    typed.now = 3.5
-    assert typed.type("q") == []
-    typed.now = 5.0
-    assert typed.type("q") == [("stop", ENDED)]
-
-
 def test_other_keys_are_answered_with_the_keys_and_arrows_with_nothing() -> None:
     typed = Typed()
     typed.type("\x1b[A", "\n")
@@ -93,54 +74,40 @@ def test_other_keys_are_answered_with_the_keys_and_arrows_with_nothing() -> None
     assert typed.stream.getvalue().startswith("keys: ")
 
 
-def test_a_true_terminal_gives_single_keys_and_is_put_back_as_it_was() -> None:
-    """In its own process, since a terminal has one foreground process."""
-    program = (
-        "import sys, termios; from live.commands.attended import listen;"
-        " from live.ui.terminal.screen import TerminalScreen;"
-        "from tests.live.run.test_control import FakeLive; live = FakeLive();"
-        "before = termios.tcgetattr(0); k = listen(live, sys.stdin, TerminalScreen());"
-        "during = termios.tcgetattr(0)\n"
-        "import time\n"
-        "while not live.calls: time.sleep(0.01)\n"
-        "k.close()\n"
-        "print('CALLS', live.calls[0][0], bool(during[3] & termios.ICANON), termios.tcgetattr(0) == before)"
-    )
+PROGRAM = """
+import sys, termios, time
+from live.commands.attended import listen
+from live.ui.terminal.screen import TerminalScreen
+from tests.live.run.test_control import FakeLive
+live, before = FakeLive(), termios.tcgetattr(0)
+keys = listen(live, sys.stdin, TerminalScreen())
+during = termios.tcgetattr(0)
+while not live.calls: time.sleep(0.01)
+keys.close()
+print("CALLS", live.calls[0][0], bool(during[3] & termios.ICANON), termios.tcgetattr(0) == before)
+"""
+
+
+def in_a_terminal() -> tuple[int, int]:
+    """The program in its own process, since a terminal has one foreground process; and the terminal."""
     child, master = pty.fork()
     if child == 0:
-        os.execv(sys.executable, [sys.executable, "-c", program])
-    got, until = b"", time.monotonic() + LONG_S
-    sent = False
-    while b"CALLS" not in got or not got.endswith(b"\n"):
-        assert time.monotonic() < until, got
-        if not select.select([master], [], [], 0.2)[0]:
-            continue
-        try:
-            got += os.read(master, 4096)
-        except OSError:
-            break
-        if b"keys: " in got and not sent:
-            sent = True
-            os.write(master, b"r")
+        os.execv(sys.executable, [sys.executable, "-c", PROGRAM])
+    return child, master
+
+
+def test_a_true_terminal_gives_single_keys_and_is_put_back_as_it_was() -> None:
+    child, master = in_a_terminal()
+    wait_for(master, b"keys: ")
+    os.write(master, b"r")
+    wait_for(master, b"CALLS new-reference False True")
     os.waitpid(child, 0)
     os.close(master)
-    assert b"CALLS new-reference False True" in got
 
 
 def test_a_terminal_gives_single_keys_again_after_ctrl_z() -> None:
     """The test is the shell: stops the program, has lines itself, and lets it go on."""
-    program = (
-        "import sys, time; from live.commands.attended import listen;"
-        " from live.ui.terminal.screen import TerminalScreen;"
-        "from tests.live.run.test_control import FakeLive; live = FakeLive();"
-        "k = listen(live, sys.stdin, TerminalScreen())\n"
-        "while not live.calls: time.sleep(0.01)\n"
-        "k.close()\n"
-        "print('CALLS', live.calls[0][0])"
-    )
-    child, master = pty.fork()
-    if child == 0:
-        os.execv(sys.executable, [sys.executable, "-c", program])
+    child, master = in_a_terminal()
     lines = termios.tcgetattr(master)
     wait_for(master, b"keys: ")
     assert not has_lines(master)
@@ -227,9 +194,9 @@ def test_without_single_keys_lines_are_taken_and_answers_shown(monkeypatch: pyte
 @pytest.mark.parametrize(("after_s", "ends"), [(3.0, True), (3.01, False)])
 def test_the_second_q_comes_within_three_seconds(after_s: float, ends: bool) -> None:
     typed = Typed()
-    typed.type("q")
+    assert typed.type("q") == [] and "q again" in typed.stream.getvalue()
     typed.now = after_s
-    assert len(typed.type("q")) == ends
+    assert typed.type("q") == [("stop", ENDED)] * ends
 
 
 def test_each_key_is_its_command() -> None:
@@ -241,6 +208,7 @@ def test_each_key_is_its_command() -> None:
     for key, call in keys.items():
         typed = Typed()
         assert typed.type(key) == [call] and typed.stream.getvalue() == ""
+    assert Typed().type("rp", "T") == [keys["r"], keys["p"], keys["T"]]
     typed = Typed()
     typed.type("?")
     assert typed.stream.getvalue().startswith("ok: start, stop, reference")

@@ -34,17 +34,38 @@ class SilentCell(NoLoadCell):
         self._stopped.set()
 
 
+class SlowCell(SilentCell):
+    """Sends 2 a second."""
+
+    def __iter__(self) -> Iterator[LoadSample]:
+        for sample in super().__iter__():
+            self._now[0] += 0.4
+            yield sample
+
+
 @pytest.mark.parametrize(
-    ("count", "silent_s", "ends", "missing"),
-    [(21, 4.0, False, 40), (21, 0.9, False, 0), (0, 4.0, False, 1), (21, 4.0, True, 0)],
+    ("kind", "count", "silent_s", "ends", "missing"),
+    [
+        pytest.param(SilentCell, 21, 4.0, False, 40, id="away at the end"),
+        pytest.param(SilentCell, 21, 0.9, False, 0, id="silent for ten periods"),
+        pytest.param(SilentCell, 0, 4.0, False, 1, id="never a sample"),
+        pytest.param(SilentCell, 21, 4.0, True, 0, id="at its end"),
+        pytest.param(SlowCell, 21, 4.9, False, 0, id="slow, silent for ten periods"),
+        pytest.param(SlowCell, 21, 5.1, False, 10, id="slow, away"),
+    ],
 )
 def test_samples_that_are_missing_at_the_end(
-    monkeypatch: pytest.MonkeyPatch, count: int, silent_s: float, ends: bool, missing: int
+    monkeypatch: pytest.MonkeyPatch,
+    kind: type[SilentCell],
+    count: int,
+    silent_s: float,
+    ends: bool,
+    missing: int,
 ) -> None:
     now, kept = [100.0], KeptState()
     run_state = kept.state
     monkeypatch.setattr(kept.keeper, "_clock", lambda: now[0])
-    cell = SilentCell(now, count, ends=ends)
+    cell = kind(now, count, ends=ends)
     source = LoadSource(cell, kept.stream)
     kept.keeper.begin()
     source.start()
@@ -61,33 +82,6 @@ def test_samples_that_are_missing_at_the_end(
     assert any("the load is missing" in event.text for event in run_state.event_log.events("warning")) is (
         missing > 0
     )
-
-
-class SlowCell(SilentCell):
-    """Sends 2 a second."""
-
-    def __iter__(self) -> Iterator[LoadSample]:
-        for sample in super().__iter__():
-            self._now[0] += 0.4
-            yield sample
-
-
-@pytest.mark.parametrize(("silent_s", "missing"), [(4.9, 0), (5.1, 10)])
-def test_a_slow_cell_may_be_silent_for_ten_of_its_periods(
-    monkeypatch: pytest.MonkeyPatch, silent_s: float, missing: int
-) -> None:
-    now, kept = [100.0], KeptState()
-    monkeypatch.setattr(kept.keeper, "_clock", lambda: now[0])
-    cell = SlowCell(now, 21)
-    source = LoadSource(cell, kept.stream)
-    kept.keeper.begin()
-    source.start()
-    assert cell.silent.wait(LONG_S)
-    now[0] += silent_s
-    kept.keeper.end()
-    source.stop()
-    source.join()
-    assert kept.state.frame_counts.load_lost == missing
 
 
 class BrokenCell(NoLoadCell):

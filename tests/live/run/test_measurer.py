@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -232,9 +235,11 @@ def test_smear_begins_beyond_a_twentieth_of_a_pixel(motion: float, told: int) ->
 def test_smear_ends_below_four_fifths_of_the_limit() -> None:
     events: list[Event] = []
     guard = SmearWatch(events.append, 1.0)
-    for motion in (1.1, 0.8, 0.79):
+    for motion, told in ((math.nan, 0), (1.1, 1), (1.2, 1), (math.nan, 1), (0.8, 1), (0.79, 2), (1.1, 3)):
         guard.check(replace(make_measurement(0).burst, motion_px=motion))
-        assert len(events) == 1 + (motion < 0.8)
+        assert len(events) == told
+    assert [event.level for event in events] == ["warning", "info", "warning"]
+    assert events[0].data == {"motion_px": 1.1, "n": 8}
 
 
 def test_the_cores_of_others_and_of_the_view_are_over_the_time_between_two_readings() -> None:
@@ -260,8 +265,9 @@ def warned(
     kernel_s: float = 0.0,
     backlog: float = 0.0,
     period_s: float = 0.1,
+    late_s: float = 1.0,
 ) -> list[tuple[float, str]]:
-    """Times and causes of the warnings of 10 s that come a second late."""
+    """Times and causes of the warnings of 10 s of results that come so late."""
     now, found = 0.0, []
 
     def use() -> ProcessorUse:
@@ -270,7 +276,7 @@ def warned(
     monitor = LatencyMonitor(lambda: backlog, use)
     for k in range(round(10 / period_s)):
         now = k * period_s
-        if words := monitor.check(LatencySample(now, 1.0, kernel_s), period_s):
+        if words := monitor.check(LatencySample(now, late_s, kernel_s), period_s):
             found.append((now, words.rpartition(": ")[2]))
     return found
 
@@ -298,6 +304,7 @@ def test_it_takes_ten_results_from_two_seconds_after_the_first_and_two_looks_a_s
     ((t, _),) = warned(period_s=0.125)
     assert t == 5.125
     assert warned(period_s=0.6) == [], "in 5 s there are 9"
+    assert warned(late_s=0.19) == [] and len(warned(late_s=0.21)) == 1, "from two periods on"
 
 
 def test_the_latency_is_the_95th_percentile_of_five_seconds() -> None:
@@ -356,3 +363,34 @@ def test_a_reference_that_cannot_be_used_stops_the_whole_test(monkeypatch: pytes
     monkeypatch.setattr(bench.thread, "_thread", SimpleNamespace(join=lambda: None, ident=1))
     with pytest.raises(DataError, match="no pattern"):
         bench.thread.join()
+
+
+@pytest.fixture
+def thread(monkeypatch: pytest.MonkeyPatch) -> Measurer:
+    """One that is not started; half a second has passed since START."""
+    monkeypatch.setattr(measurer, "time", SimpleNamespace(monotonic=lambda: START + 0.5))
+    nothing: Any = None
+    return Measurer(nothing, nothing, nothing, nothing, nothing, nothing)
+
+
+def test_nominal_times_have_none(thread: Measurer) -> None:
+    made = make_measurement(0)
+    made = replace(made, burst=replace(made.burst, clock="nominal"))
+    assert math.isnan(thread._timed(made).time_step.latency_s)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
+def test_the_linear_algebra_of_the_program_has_no_threads_of_its_own() -> None:
+    code = """
+import contextlib, os, live.cli
+with contextlib.suppress(SystemExit):
+    live.cli.main(["--version"])
+import numpy as np
+np.ones((500, 500)) @ np.ones((500, 500))
+print(len(os.listdir("/proc/self/task")))
+"""
+    without = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=without, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split()[-1] == "1"

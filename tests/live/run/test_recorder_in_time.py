@@ -88,22 +88,36 @@ def test_a_recording_that_fails_ends_the_run_where_it_was_asked_to(
 
 
 @pytest.mark.parametrize(
-    ("fps", "room_s", "words"),
+    ("bits", "mode", "fps", "room_s", "MB", "words"),
     [
-        (None, 1800.0, "recording about 15 MB/s at most, room for 30 minutes"),
-        (10.0, 1799.0, "warning: recording about 5 MB/s at most, room for 30 minutes"),
+        pytest.param(8, "all", None, 1800.0, 15, "recording about 15 MB/s", id="of no rate"),
+        pytest.param(8, "all", 10.0, 1799.0, 5, "warning: recording about 5 MB/s", id="below half an hour"),
+        pytest.param(12, "all", 50.0, 1800.0, 50, "recording about 50 MB/s", id="two bytes a pixel"),
+        pytest.param(12, "every=2", 50.0, 1800.0, 25, "recording about 25 MB/s", id="every second frame"),
     ],
 )
-def test_room_for_less_than_half_an_hour_is_a_warning(
-    monkeypatch: pytest.MonkeyPatch, fps: float | None, room_s: float, words: str
+def test_the_room_on_the_disk_is_announced_for_the_bytes_that_are_recorded(
+    monkeypatch: pytest.MonkeyPatch,
+    bits: int,
+    mode: str,
+    fps: float | None,
+    room_s: float,
+    MB: int,
+    words: str,
 ) -> None:
     printed: list[str] = []
+    asked: list[float] = []
     monkeypatch.setattr(Screen, "print", lambda self, text="": printed.append(text))
-    monkeypatch.setattr(recorder, "forecast", lambda path, rate: room_s)
+    monkeypatch.setattr(recorder, "forecast", lambda path, rate: asked.append(rate) or room_s)
     monkeypatch.setattr(recorder, "network_share", lambda path: "nfs")
-    camera = CameraInfo("a:", "a", 1000, 500, 8, True, "device", fps=fps)
-    assert _announce_disk(Path("run/session.h5"), camera, recorder.RecordMode(), Screen()) == room_s
-    assert printed == [words, "warning: run is on a network share (nfs); a local disk is safer"]
+    camera = CameraInfo("a:", "a", 1000, 500, bits, True, "device", fps=fps)
+    kept = recorder.RecordMode.parse(mode)
+    assert _announce_disk(Path("run/session.h5"), camera, kept, Screen()) == room_s
+    assert asked == pytest.approx([MB * 1e6])
+    assert printed == [
+        f"{words} at most, room for 30 minutes",
+        "warning: run is on a network share (nfs); a local disk is safer",
+    ]
 
 
 class ClockWriter(FakeBurstWriter):

@@ -12,15 +12,13 @@ import pytest
 
 from acquire.errors import DataError
 from acquire.events import Event, EventKind
-from acquire.frame import CameraInfo
 from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
-from live.pipeline.consumer import Screen
 from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import FrameCounts
 from live.run.control import START, STOP, ControlRefused
 from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
-from live.run.recorder import Recorder, _announce_disk
+from live.run.recorder import Recorder
 from tests.live.fakes import frame
 from tests.live.made_up import make_measurement
 from tests.live.ui.waiting import LONG_S
@@ -360,18 +358,3 @@ def test_a_recorder_that_tells_something_does_not_hold_itself_up() -> None:
     recorder.pre_trigger.frame(frame(0), is_reference=False)
     recorder.pre_trigger.close({})
     assert recorder.given == [("recorder", None), 0, ("recorder", None), "closed"]
-
-
-@pytest.mark.parametrize(("bits", "mode", "rate"), [(8, "all", 25), (12, "all", 50), (12, "every=2", 25)])
-def test_the_room_on_the_disk_is_announced_for_the_bytes_that_are_recorded(
-    monkeypatch: pytest.MonkeyPatch, bits: int, mode: str, rate: int
-) -> None:
-    printed: list[str] = []
-    monkeypatch.setattr(Screen, "print", lambda self, text="": printed.append(text))
-    monkeypatch.setattr("live.run.recorder.forecast", lambda path, per_s: 45e9 / per_s)
-    monkeypatch.setattr("live.run.recorder.network_share", lambda path: "")
-    camera = CameraInfo("a:", "a", 1000, 500, bits, True, "device", fps=50.0)
-    found = _announce_disk(Path("session.h5"), camera, RecordMode.parse(mode), Screen())
-    assert found == pytest.approx(45e3 / rate)
-    warning = "" if rate == 25 else "warning: "
-    assert printed == [f"{warning}recording about {rate} MB/s at most, room for {750 / rate:.0f} minutes"]

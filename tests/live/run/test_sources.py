@@ -341,3 +341,35 @@ def test_frames_that_never_make_a_reference_come_with_a_hint(tmp_path: Path) -> 
     outcome = live_run(tmp_path / "run", camera, **{"measure.reference_burst": 32})
     hints = [e.text for e in outcome.run_state.event_log.events("warning") if e.source == "reference"]
     assert len(hints) == 1 and "no 32 frames in a row" in hints[0] and "--reference-burst" in hints[0]
+
+
+def damaged_in(n: int, damaged: range) -> list[Frame]:
+    return [replace(frame(k), damaged=k in damaged) for k in range(n)]
+
+
+@pytest.mark.parametrize(("damaged", "told"), [(range(4, 164), 2), (range(4, 5), 2), (range(0), 0)])
+def test_they_are_lost_and_said(damaged: range, told: int) -> None:
+    found = Grabbed(ListCamera(damaged_in(170, damaged), live=True), reference=2)
+    counts = found.counts
+    assert counts.lost == len(damaged) and counts.grabbed == 170
+    assert counts.loss is bool(damaged)
+    events = found.log.events("warning")
+    assert len(events) == told
+    if told:
+        assert events[0].data["before"] == damaged[0] and events[-1].data["before"] == damaged[-1] + 1
+        assert events[-1].data["count"] == len(damaged)
+
+
+def test_those_that_last_to_the_end_are_said_at_their_begin() -> None:
+    found = Grabbed(ListCamera(damaged_in(20, range(10, 20)), live=True), reference=2)
+    assert found.counts.lost == 10
+    assert [event.data["before"] for event in found.log.events("warning")] == [10]
+
+
+def test_a_picture_of_another_size_is_a_damaged_one() -> None:
+    given = damaged_in(10, range(0))
+    given[5] = replace(given[5], image=np.zeros((4, 7), given[5].image.dtype))
+    found = Grabbed(ListCamera(given, live=True), reference=2)
+    assert found.source.error is None and found.counts.lost == 1
+    assert [one.index for one in found.frames if one.damaged] == [5]
+    assert found.frames[5].image.shape == given[0].image.shape and not found.frames[5].image.any()

@@ -53,17 +53,10 @@ class Caller:
 def test_each_line_is_answered() -> None:
     with server(answer=str.upper) as one:
         caller = Caller(one.port)
-        assert [caller.ask("abc"), caller.ask("d e\r")] == ["ABC", "D E"]
+        assert [caller.ask("abc"), caller.ask("d e\r"), caller.ask("")] == ["ABC", "D E", ""]
         caller.socket.sendall(b"two\nlines")
         assert caller.lines.readline() == "TWO\n"
         assert caller.ask(" at once") == "LINES AT ONCE"
-        caller.close()
-
-
-def test_an_empty_line_is_answered_too() -> None:
-    with server(answer=lambda line: f"no: {line!r} is no command") as one:
-        caller = Caller(one.port)
-        assert caller.ask("") == "no: '' is no command"
         caller.close()
 
 
@@ -130,16 +123,6 @@ def read_what_is_there(caller: Caller) -> Iterator[str]:
             return
         assert line[0].isdigit()  # only whole lines
         yield line
-
-
-def test_a_line_without_an_end_is_drop() -> None:
-    with server(answer=str.upper) as one:
-        caller = Caller(one.port)
-        caller.socket.sendall(b"x" * 20_000)
-        with pytest.raises(ConnectionError):
-            if not caller.socket.recv(1):
-                raise ConnectionError
-        caller.close()
 
 
 @pytest.mark.parametrize(

@@ -104,6 +104,8 @@ def test_the_light_is_given_in_parts_of_full_scale() -> None:
     lines = found(_light(made(exposure=exposed(low=0.07, high=0.3, saturated=1e-4))))
     assert lines["light"].value == "1 % to 99 % of the pixels from 7% to 30% of full scale"
     assert lines["light"].good and lines["saturated pixels"].good
+    lines = found(_light(made(exposure=exposed(high=0.29, saturated=1.1e-4))))
+    assert not lines["light"].good and not lines["saturated pixels"].good
     assert lines["noise"].value == "1.00 GL of one frame, 0.39% of full scale"
     assert not found(_light(made(noise=0.0)))["noise"].good
 
@@ -148,8 +150,8 @@ def test_the_share_of_zois_without_pattern(share: float, good: bool) -> None:
 def test_contrast_is_the_median_over_full_scale() -> None:
     contrast = np.array([[25.5, 51.0, np.nan], [25.5, 255.0, 12.75]])
     assert found(_pattern(made(zois__contrast=contrast)))["contrast (std)"].value == "10.0% of full scale"
-    line = found(_pattern(made(zois__contrast=np.full((2, 2), 12.75))))["contrast (std)"]
-    assert not line.good, "the limit itself is too little"
+    for value, good in ((12.75, False), (13.0, True)):  # the limit itself is too little
+        assert found(_pattern(made(zois__contrast=np.full((2, 2), value))))["contrast (std)"].good == good
 
 
 def test_without_any_pattern_sharpness_and_gradients_are_none() -> None:
@@ -168,6 +170,8 @@ def test_the_weakest_gradients_give_the_noise_of_a_place() -> None:
         line.value == "median 10\u202f000, weakest 5 % 400 GL^2/px^2 (0.1414 px in one frame)"
         and not line.good
     )
+    for noise_px, good in ((0.049, True), (0.051, False)):
+        assert _sssig(made(zois__sssig=np.full((2, 2), 2 / noise_px**2))).good == good
 
 
 @pytest.mark.parametrize(
@@ -178,6 +182,7 @@ def test_the_weakest_gradients_give_the_noise_of_a_place() -> None:
         ("keystone", (0.0, -4.9e-5), "tilt", True, "strain drifts by −49 µm/m from top to bottom"),
         ("keystone", (0.0, 5.1e-5), "tilt", False, "strain drifts by 51 µm/m from top to bottom"),
         ("dilatation", -5.1e-5, "distance", False, "exx and eyy drift alike, −51 µm/m: it changes by 5.1e-05"),
+        ("dilatation", 4.9e-5, "distance", True, "exx and eyy drift alike, 49 µm/m: it changes by 4.9e-05"),
         ("drift_px", 0.0501, "drift", False, "0.0501 px and 0 µm/m in 4 s"),
         ("drift_px", 0.05, "drift", True, "0.0500 px and 0 µm/m in 4 s"),
         ("exx", Steadiness(-3e-5, 0, 0, None, 4.0, None), "drift", True, "0.0000 px and −30 µm/m in 4 s"),
@@ -264,6 +269,7 @@ def floor_of(predicted: float, measured: float) -> ZoiFloor:
         (floor_of(1.01e-3, 1.01e-3), None, False, "1\u202f010 µm/m measured"),
         (None, 1e-4, True, "100 µm/m predicted (one ZOI"),
         (None, 0.9e-4, False, "100 µm/m predicted (one ZOI"),
+        (floor_of(1e-4, 1.6e-4), 1e-3, False, "160 µm/m measured, 100 µm/m predicted"),
     ],
 )
 def test_the_strain_noise_is_that_of_the_test_against_its_limit(
@@ -303,6 +309,10 @@ def test_what_a_camera_and_its_corrections_show() -> None:
     assert lines["automatic controls"].advice == "put on manual: gain_auto, focus_auto"
     assert lines["fixed pattern"].value.startswith("dark and flat corrected 1.23 GL;")
     assert "compression" in lines and "picture" not in lines
+    told = found(
+        _camera(made(stack__camera=SimpleNamespace(warnings=("its gain is automatic",), saturation=255)))
+    )
+    assert told["camera"].text() == "?     camera                 its gain is automatic"
 
 
 def advised(target: float, noise: float, high: float, *, floors: bool = True) -> str:
@@ -318,6 +328,34 @@ def test_a_burst_beyond_the_table_counts_the_noise_of_the_reference() -> None:
     assert advised(1e-4, 3e-4, 0.95).startswith("burst 64 and a reference of 64 with ZOI 64, or ")
     assert advised(2e-5, 3e-4, 0.95).startswith("15.0 times the contrast"), "1600 frames in both are too many"
     assert advised(2e-4, 3e-4, 0.95, floors=False).startswith("burst 11")
+
+
+@pytest.mark.parametrize(
+    ("target", "high", "words"),
+    [
+        (50, 0.2, "burst 16, or ZOI 96, or 4.0 times the light or exposure"),
+        (71, 0.4, "burst 8, or ZOI 96, or twice the light or exposure"),
+        (
+            50,
+            0.9,
+            "burst 16, or ZOI 96, or 1.9 times the contrast (light helps 1.1 times, then it saturates)",
+        ),
+        (30, 0.5, "ZOI 96 and burst 16, or burst 80 and a reference of 80 with ZOI 64"),
+    ],
+)
+def test_what_reaches_a_target_is_the_least_of_each_kind(target: float, high: float, words: str) -> None:
+    floors = tuple(
+        ZoiFloor(
+            zoi, 1, 2.2 * zoi, 0.7 * zoi, 50, tuple(StrainNoise(n, v * 1e-6, v * 1e-6) for n, v in noises), 32
+        )
+        for zoi, *noises in (
+            (32, (1, 800), (2, 560), (4, 400), (8, 290), (16, 220)),
+            (64, (1, 200), (2, 140), (4, 100), (8, 70), (16, 49)),
+            (96, (1, 90), (2, 64), (4, 45), (8, 33), (16, 24)),
+        )
+    )
+    figures = made(floors=floors, floor=floors[1], exposure=exposed(high=high))
+    assert advice(figures, target * 1e-6).startswith(words)
 
 
 def test_light_helps_until_it_saturates() -> None:

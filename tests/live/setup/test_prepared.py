@@ -53,7 +53,6 @@ def test_a_rolling_shutter_is_corrected_where_its_time_is_known() -> None:
     assert plan().shutter is None and plan(camera__readout_ms=0).shutter is None
     given = plan(camera__readout_ms=12.5, camera__sigma_readout_ms=0.5)
     shutter = given.shutter
-    assert shutter is not None
     shutter.apply(StrainField.from_values(given.grid, {"v": 0.0}, 1e-6), 1.0)
     found = shutter.apply(StrainField.from_values(given.grid, {"v": 10.0}, 1e-6), 1.1)
     assert float(found.dv_dy[0, 0]) == pytest.approx(-100 * 0.0125 / 95)

@@ -21,7 +21,7 @@ from acquire.errors import DeviceError
 from analysis.field import Blur
 from live.cli import main
 from live.commands import check as check_watch
-from live.commands.check import RenewedLines, blur_line, card, peak_line
+from live.commands.check import blur_line, card, peak_line
 from live.config.loading import load_config
 from live.setup.check.check_list import examine
 from live.setup.check.lines import CheckLine
@@ -35,21 +35,17 @@ from live.setup.check.quick_check import (
 )
 from live.setup.check.sample import take
 from live.setup.region import Region
-from live.ui.terminal.screen import TerminalScreen
 from tests.live.fakes import ListCamera, frame
-from tests.live.screens import Terminal
 
 STILL = "sim:uniform?bits=8&fps=50&width=224&height=192"
 SMALL = ["--zoi", "48", "--reference-burst", "8"]
+QUICK = {
+    "camera.address": STILL + "&seconds=5&lockstep=yes", "measure.zoi": 48, "measure.reference_burst": 8,
+}  # fmt: skip
 
 
 def test_the_peak_is_held() -> None:
-    overrides = {
-        "camera.address": STILL + "&seconds=5&lockstep=yes",
-        "measure.zoi": 48,
-        "measure.reference_burst": 8,
-    }
-    config = load_config(None, overrides)
+    config = load_config(None, QUICK)
     sharp, checker, found = take(config), QuickChecker(config), []
     for blur in (2.0, 1.0, 0.0, 1.5):
         frames = np.stack([gaussian_filter(f.astype(np.float32), blur) for f in sharp.frames[:8]])
@@ -126,12 +122,7 @@ def test_a_camera_that_ends(capsys: pytest.CaptureFixture[str], monkeypatch: pyt
 
 def test_the_work_of_a_quick_check(monkeypatch: pytest.MonkeyPatch) -> None:
     """Slow figures take turns, the picture is averaged once; the figures are those of a check."""
-    overrides = {
-        "camera.address": STILL + "&seconds=5&lockstep=yes",
-        "measure.zoi": 48,
-        "measure.reference_burst": 8,
-    }
-    config = load_config(None, overrides)
+    config = load_config(None, QUICK)
     sixteen = take(config)
     stack = replace(sixteen, frames=sixteen.frames[:8], times=sixteen.times[:8])
     done: list[str] = []
@@ -189,17 +180,6 @@ def test_pictures_that_are_few_leave_their_table(tmp_path: Path, capsys: pytest.
     assert "GO, as far as 1 picture can show" in capsys.readouterr().out
 
 
-def test_lines_are_renewed_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("shutil.get_terminal_size", lambda: (20, 24))
-    stream = Terminal()
-    show = RenewedLines(TerminalScreen(), stream)
-    show.lines(["one", "z" * 50, "bad\x1b[31m"], "")
-    show.lines(["two"], "")
-    assert stream.getvalue().count("z") == 19
-    assert "\x1b[31m" not in stream.getvalue()
-    assert stream.getvalue().endswith("\x1b[3A\x1b[2Ktwo\n\x1b[0J")
-
-
 def test_the_card_is_a_table() -> None:
     quick: Any = type("G", (), {"of_peak": math.nan, "blur": Blur(math.nan, math.nan)})()
     text = card(quick, [CheckLine("a|b", "1"), CheckLine("c", "2", False)])
@@ -228,14 +208,6 @@ def test_the_newest_frames_of_a_camera_without_damaged_ones() -> None:
         short._thread.join()
         with pytest.raises(DeviceError, match="gone"):
             short.newest(8)
-
-
-def test_sharpness_is_a_share_of_its_peak() -> None:
-    def of(sharpness: float, peak: float) -> float:
-        figures: Any = SimpleNamespace(sharpness=sharpness)
-        return QuickCheck(figures, peak, None).of_peak  # type: ignore[arg-type]
-
-    assert of(0.2, 0.25) == 0.8 and math.isnan(of(0.2, 0.0))
 
 
 @pytest.mark.parametrize(("width", "same"), [(100, True), (98, True), (97, False)])

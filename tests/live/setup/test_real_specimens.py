@@ -41,7 +41,6 @@ def region_in(path: Path) -> Region:
 
 def test_the_polymer_bar(data_dir: Path) -> None:
     mask = region_in(data_dir / "mudic_tension" / "ut_151.tif").mask
-    assert mask is not None
     for row, (left, right) in BAR.items():
         inside = np.flatnonzero(mask[row])
         assert abs(inside[0] - left) < HALF, row

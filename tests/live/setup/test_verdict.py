@@ -52,12 +52,14 @@ def test_the_softest_and_the_sharpest_side_are_named(
     assert line.advice.startswith(f"softer at the {words.split()[2]}:")
 
 
-@pytest.mark.parametrize(("drift", "shown"), [(1.4, 0.0), (1.6, 1.6), (-1.6, -1.6)])
-def test_a_drift_of_the_distance_is_clear_beyond_one_and_a_half_times_the_noise(
-    drift: float, shown: float
+@pytest.mark.parametrize(
+    ("drift", "other", "shown"), [(1.4, 1.4, 0.0), (1.6, 1.6, 1.6), (-1.6, -1.6, -1.6), (1.6, -1.6, 0.0)]
+)
+def test_the_distance_changes_where_both_strains_drift_alike_beyond_one_and_a_half_times_the_noise(
+    drift: float, other: float, shown: float
 ) -> None:
     still, noisy = Steadiness(0.0, 0.0, 0.0, None, 2.0, 30.0), Steadiness(drift, 1.0, 1.0, None, 2.0, 30.0)
-    quieter = replace(noisy, noise=0.1)
+    quieter = replace(noisy, drift=other, noise=0.1)
     found = PictureStillness(still, still, noisy, quieter, ((still, still), (still, still)), still)
     assert found.dilatation == shown, "of the noisier of both"
 

@@ -70,10 +70,11 @@ class Run:
     def __init__(self, out: Path, camera: str, load: str, *more: str) -> None:
         self.out = out
         self._words = out.with_suffix(".txt")
+        # faulthandler: one that does not end says where it stands
         argv = [
             sys.executable,
             "-X",
-            "faulthandler",  # one that does not end says where it stands
+            "faulthandler",
             "-m",
             "live.cli",
             "run",
@@ -81,10 +82,8 @@ class Run:
             camera,
             "--load",
             load,
-            "--out",
-            str(out),
-            *more,
         ]
+        argv += ["--out", str(out), *more]
         argv += ["--roi", "all", "--no-view", "--no-rrd"]
         with self._words.open("w") as words:
             self._process = subprocess.Popen(argv, stdout=words, stderr=subprocess.STDOUT)

@@ -2,71 +2,32 @@
 
 from __future__ import annotations
 
+import math
 import threading
-from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
 
-from acquire.camera.contract import Camera, open_camera
-from acquire.events import Event
-from acquire.frame import Frame
+from acquire.camera.contract import open_camera
+from tests.contracts.watching import FrameWatch
 from tests.v4l2.inside import vivid
 
 ADDRESS = "/dev/video0?format=GREY&width=640&height=360&fps=25"
 
 
-class Watch:
-    """A camera, the frames that came, the events told, and what to do at which frame."""
+class Watch(FrameWatch):
+    """As long as an emulated machine takes."""
+
+    patience_s = math.inf
 
     def __init__(self, address: str = ADDRESS) -> None:
-        self.events: list[Event] = []
-        self.frames: list[Frame] = []
-        self.camera: Camera = open_camera(address, self.on_event)
-        self.on_text: dict[str, Callable[[], None]] = {}
-
-    def on_event(self, event: Event) -> None:
-        self.events.append(event)
-        for words, action in list(self.on_text.items()):
-            if words in event.text:
-                del self.on_text[words]
-                action()
-
-    def run(self, at: dict[int, Callable[[], None]], until: Callable[[], bool], limit: int = 400) -> None:
-        """Take frames, do ``at[k]()`` after the k-th, end when ``until()`` says so."""
-        with self.camera:
-            for frame in self.camera:
-                self.frames.append(frame)
-                at.get(len(self.frames), lambda: None)()
-                if until() or len(self.frames) >= limit:
-                    return
-
-    def texts(self) -> str:
-        return "\n".join(event.text for event in self.events)
-
-    def check_numbers(self) -> None:
-        for earlier, later in pairwise(self.frames):
-            assert later.index > earlier.index
-            assert later.t >= earlier.t
-            assert later.lost_before == later.index - earlier.index - 1
-
-
-def after(watch: Watch, words: str, more: int = 5) -> Callable[[], bool]:
-    """True once so many frames have come after an event with these words."""
-    seen: list[int] = []
-
-    def done() -> bool:
-        if not seen and words in watch.texts():
-            seen.append(len(watch.frames))
-        return bool(seen) and len(watch.frames) >= seen[0] + more
-
-    return done
+        super().__init__(address)
 
 
 @pytest.mark.v4l2
 def test_dropped_buffers_are_counted() -> None:
     watch = Watch()
-    watch.run({5: lambda: vivid.press("percentage_of_dropped_buffers", 40)}, lambda: len(watch.frames) >= 40)
+    watch.take(lambda: len(watch.frames) >= 40, {5: lambda: vivid.press("percentage_of_dropped_buffers", 40)})
     watch.check_numbers()
     assert sum(frame.lost_before for frame in watch.frames) > 5
 
@@ -74,7 +35,7 @@ def test_dropped_buffers_are_counted() -> None:
 @pytest.mark.v4l2
 def test_a_damaged_buffer_is_marked() -> None:
     watch = Watch()
-    watch.run({5: lambda: vivid.press("inject_v4l2_buf_flag_error")}, after(watch, "damaged"))
+    watch.take(watch.after("damaged"), {5: lambda: vivid.press("inject_v4l2_buf_flag_error")})
     watch.check_numbers()
     assert sum(frame.damaged for frame in watch.frames) == 1
 
@@ -82,7 +43,7 @@ def test_a_damaged_buffer_is_marked() -> None:
 @pytest.mark.v4l2
 def test_a_fatal_streaming_error_is_survived() -> None:
     watch = Watch()
-    watch.run({5: lambda: vivid.press("inject_fatal_streaming_error")}, after(watch, "opened again"))
+    watch.take(watch.after("opened again"), {5: lambda: vivid.press("inject_fatal_streaming_error")})
     watch.check_numbers()
     assert "fatal error of the stream" in watch.texts()
     assert [event.level for event in watch.events[:2]] == ["error", "info"]
@@ -92,7 +53,7 @@ def test_a_fatal_streaming_error_is_survived() -> None:
 def test_a_disconnected_camera_is_found_when_it_is_back() -> None:
     watch = Watch()
     watch.on_text["unplugged"] = vivid.replug
-    watch.run({5: lambda: vivid.press("disconnect")}, after(watch, "opened again"))
+    watch.take(watch.after("opened again"), {5: lambda: vivid.press("disconnect")})
     watch.check_numbers()
     gap = max(frame.lost_before for frame in watch.frames)
     assert gap > 0
@@ -102,7 +63,7 @@ def test_a_disconnected_camera_is_found_when_it_is_back() -> None:
 def test_unplugged_and_plugged_in_again_in_mid_stream() -> None:
     watch = Watch()
     watch.on_text["unplugged"] = vivid.plug
-    watch.run({5: vivid.unplug}, after(watch, "opened again"))
+    watch.take(watch.after("opened again"), {5: vivid.unplug})
     watch.check_numbers()
     assert "last good frame" in watch.texts()
     with open_camera(ADDRESS) as camera:  # nothing of the old one was left open
@@ -113,7 +74,7 @@ def test_unplugged_and_plugged_in_again_in_mid_stream() -> None:
 def test_replugged_faster_than_noticed_it_is_found_under_its_new_name() -> None:
     watch = Watch()
     # The handle is still open then, so the kernel gives the old name to the other node.
-    watch.run({5: vivid.replug}, after(watch, "opened again"))
+    watch.take(watch.after("opened again"), {5: vivid.replug})
     watch.check_numbers()
     assert "opened again as /dev/video" in watch.texts()
 
@@ -122,7 +83,7 @@ def test_replugged_faster_than_noticed_it_is_found_under_its_new_name() -> None:
 def test_a_stalled_camera_is_told_and_goes_on() -> None:
     watch = Watch(ADDRESS + "&stall_s=1")
     watch.on_text["no picture for"] = lambda: vivid.press("percentage_of_dropped_buffers", 0)
-    watch.run({5: lambda: vivid.press("percentage_of_dropped_buffers", 100)}, after(watch, "pictures again"))
+    watch.take(watch.after("pictures again"), {5: lambda: vivid.press("percentage_of_dropped_buffers", 100)})
     watch.check_numbers()
     assert watch.texts().count("no picture for") == 1
     assert sum(frame.lost_before for frame in watch.frames) > 5
@@ -131,17 +92,12 @@ def test_a_stalled_camera_is_told_and_goes_on() -> None:
 @pytest.mark.v4l2
 def test_a_long_stall_opens_it_anew_and_ends_well() -> None:
     watch = Watch(ADDRESS + "&stall_s=0.5")
-    watch.run(
-        {5: lambda: vivid.press("percentage_of_dropped_buffers", 100), 6: lambda: None}, lambda: True, 1
-    )
-    watch = Watch(ADDRESS + "&stall_s=0.5")
 
     def heal_later() -> None:
-
         threading.Timer(4.0, lambda: vivid.press("percentage_of_dropped_buffers", 0)).start()
 
     watch.on_text["no picture for"] = heal_later
-    watch.run({5: lambda: vivid.press("percentage_of_dropped_buffers", 100)}, after(watch, "pictures again"))
+    watch.take(watch.after("pictures again"), {5: lambda: vivid.press("percentage_of_dropped_buffers", 100)})
     watch.check_numbers()
     assert max(frame.lost_before for frame in watch.frames) > 25
 
@@ -150,7 +106,7 @@ def test_a_long_stall_opens_it_anew_and_ends_well() -> None:
 def test_stop_ends_it_while_it_is_unplugged() -> None:
     watch = Watch()
     watch.on_text["unplugged"] = watch.camera.stop
-    watch.run({5: vivid.unplug}, lambda: False)
+    watch.take(lambda: False, {5: vivid.unplug})
     assert len(watch.frames) < 60
     watch.camera.close()
 
@@ -160,6 +116,6 @@ def test_opencv_behind_its_guards_survives_the_same() -> None:
     watch = Watch("opencv:0?width=640&height=360")
     assert watch.camera.info.clock == "device"
     watch.on_text["looking for it again"] = vivid.plug
-    watch.run({5: vivid.unplug}, after(watch, "opened again"))
+    watch.take(watch.after("opened again"), {5: vivid.unplug})
     assert "gone or dead" in watch.texts() or "no picture within" in watch.texts()
     assert all(later.index > earlier.index for earlier, later in pairwise(watch.frames))

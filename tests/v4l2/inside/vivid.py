@@ -117,12 +117,8 @@ class Screen:
         wanted = api.Format(type=OUTPUT)
         self._kernel.ioctl(self._fd, api.G_FMT, wanted)
         pix = wanted.fmt.pix
-        pix.width, pix.height, pix.pixelformat, pix.bytesperline = (
-            self._width,
-            self._height,
-            api.fourcc(self._fourcc),
-            0,
-        )
+        pix.width, pix.height, pix.pixelformat = self._width, self._height, api.fourcc(self._fourcc)
+        pix.bytesperline = 0
         self._kernel.ioctl(self._fd, api.S_FMT, wanted)
         got = api.fourcc_text(pix.pixelformat), pix.width, pix.height
         assert got == (self._fourcc, self._width, self._height), got

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-import dataclasses
 import os
 import platform
 import shutil
 import signal
 import subprocess
 import sys
-import threading
-import time
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -22,11 +17,8 @@ from pyarrow import parquet
 from acquire import hdf5
 from acquire.hdf5 import FlushTimer
 from live.cli import main
-from live.replay.batch.campaign import CampaignRequest, run_campaign
 from live.replay.batch.task import Task, perform
-from live.replay.batch.test_list import find_tests
 from live.results import strain_h5
-from live.ui.terminal.screen import TerminalScreen
 from tests.live.replay.batch.conftest import SETTINGS
 from tests.live.replay.batch.running import datasets, differing, is_gone, parts, pid_of, rows, started
 from tests.live.ui.waiting import until
@@ -118,28 +110,6 @@ def test_rows_of_a_task_are_flushed_seldom(
     assert paces == [10.0, strain_h5.FLUSH_S]
 
 
-@pytest.mark.slow
-def test_again_only_what_is_missing(runs: Path, done: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    before = {path: path.stat().st_mtime_ns for path in done.glob("*/strain.h5")}
-    words = (runs / "*" / "session.h5", *SETTINGS, "--out", done)
-    assert batch(*words) == 0
-    assert "12 done before, 0 to replay" in capsys.readouterr().out
-    shutil.rmtree(done / "hole-3")
-    assert batch(*words) == 0
-    assert "11 done before, 1 to replay" in capsys.readouterr().out
-    after = {path: path.stat().st_mtime_ns for path in done.glob("*/strain.h5")}
-    assert {path for path in before if before[path] != after[path]} == {done / "hole-3" / "strain.h5"}
-
-
-@pytest.mark.parametrize("other", [["--zoi", "32"], ["--section", "10,2"], ["--from", "0.5"]])
-def test_other_settings_need_another_folder(
-    runs: Path, done: Path, capsys: pytest.CaptureFixture[str], other: list[str]
-) -> None:
-    settings = dict(zip(SETTINGS[::2], SETTINGS[1::2], strict=True)) | {other[0]: other[1]}
-    assert batch(runs / "hole-1" / "session.h5", *chain(*settings.items()), "--out", done) == 2
-    assert "holds results of other settings" in capsys.readouterr().err
-
-
 def test_one_that_fails_stops_no_other(
     runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -206,31 +176,6 @@ def test_interrupted(runs: Path, tmp_path: Path) -> None:
     assert all(is_gone(pid) for pid in workers)
     assert not parts(out)
     assert not (out / "summary.csv").exists()
-
-
-@pytest.mark.slow
-def test_one_that_always_kills_its_worker(runs: Path, tmp_path: Path) -> None:
-    out, over = tmp_path / "out", threading.Event()
-
-    def kill() -> None:
-        while not over.is_set():
-            for part in parts(out):
-                if part.name.startswith(".hole-1."):
-                    with contextlib.suppress(ProcessLookupError):
-                        os.kill(pid_of(part), signal.SIGKILL)
-            time.sleep(0.005)
-
-    threading.Thread(target=kill, daemon=True).start()
-    tests = find_tests([str(runs / "hole-[12]" / "session.h5")])
-    tests[0] = dataclasses.replace(tests[0], overrides={"measure.step": 1})  # takes seconds
-    try:
-        found = run_campaign(CampaignRequest(tests, out, 2), TerminalScreen(quiet=True), threading.Event())
-    finally:
-        over.set()
-    assert found.exit_code == 5
-    assert [row.values["outcome"] for row in found.rows] == ["failed", "done"]
-    assert "died 3 times" in str(found.rows[0].values["error"])
-    assert not parts(out)
 
 
 def test_parts_of_others(runs: Path, done: Path) -> None:

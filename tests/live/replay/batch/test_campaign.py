@@ -20,7 +20,7 @@ from live.replay.batch.campaign import CampaignRequest, _planned, _task, run_cam
 from live.replay.batch.row import COLUMNS, BatchRow, _cell, as_csv, write_summary
 from live.replay.batch.scheduler import ChunkPlan, perform_all
 from live.replay.batch.task import ROW_FILE, Task
-from live.replay.batch.test_list import BatchJob, _of_source, _pictures, find_tests, key_of
+from live.replay.batch.test_list import BatchJob, _of_source, _pictures, key_of
 from live.replay.batch.worker import Pool
 from tests.live.screens import RecordingScreen
 
@@ -164,21 +164,6 @@ def test_pictures_are_those_of_a_folder_a_file_or_a_glob_in_order(tmp_path: Path
     assert stamps[0] == ["a.png", 5, about.st_mtime_ns]
     os.utime(tmp_path / "a.png", (1, 1))
     assert _of_source(f"files:{tmp_path}/*.png?gray=luma")[1] != stamps
-
-
-def test_a_list_may_name_its_tests_and_has_paths_beside_it(tmp_path: Path) -> None:
-    sessions(tmp_path, "ab")
-    (tmp_path / "tests.csv").write_text(
-        "# mine\nsource,name,load,specimen.width_mm,measure.window\n"
-        "a/session.h5,first,f.csv,20,uniform\nb/session.h5,second,,,\n",
-        encoding="utf-8",
-    )
-    first, second = find_tests([str(tmp_path / "tests.csv")])
-    assert (first.name, first.source, first.forces) == (
-        "first", str(tmp_path / "a" / "session.h5"), str(tmp_path / "f.csv"),
-    )  # fmt: skip
-    assert first.overrides == {"specimen.width_mm": 20, "measure.window": "uniform"}
-    assert (second.name, second.forces, second.overrides) == ("second", None, {})
 
 
 class Dying:

@@ -17,7 +17,6 @@ import pytest
 from acquire.errors import ConfigError
 from live.cli import main
 from live.replay.batch import cluster
-from live.replay.batch.test_list import deciding_versions
 from live.replay.batch.worker import NEEDED
 from live.results import Strain
 from tests.live.replay.batch.conftest import SETTINGS
@@ -113,18 +112,6 @@ def test_a_long_one_in_chunks(
     assert "joined of 3 chunks" in (tmp_path / "there" / "long" / "replay.txt").read_text(encoding="utf-8")
 
 
-def test_one_that_fails_stops_no_other(runs: Path, progress: Running, tmp_path: Path) -> None:
-    (tmp_path / "broken").mkdir()
-    (tmp_path / "broken" / "session.h5").write_bytes(b"no session at all" * 100)
-    tests = [str(tmp_path / "broken" / "session.h5"), str(runs / "hole-1" / "session.h5")]
-    words = [*SETTINGS, "--scheduler", progress.address, "--out", str(tmp_path / "out")]
-    assert main(["batch", *tests, *words]) == 5
-    assert [(row["test"], row["outcome"]) for row in rows(tmp_path / "out")] == [
-        ("broken", "failed"),
-        ("hole-1", "done"),
-    ]
-
-
 def test_a_caller_that_is_killed(
     runs: Path, progress: Running, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -207,25 +194,6 @@ def test_nobody_is_there(
     assert "give tcp://HOST:PORT" in capsys.readouterr().err
 
 
-def answer(**other: object) -> dict[str, object]:
-    alike = {
-        "slots": 1,
-        "host": "a",
-        "versions": deciding_versions(),
-        "threads": ONE_THREAD,
-        "has_token": True,
-    }
-    return alike | other
-
-
-@pytest.mark.parametrize("package", ["phasedic", "numpy"])
-def test_other_versions_are_refused(package: str) -> None:
-    cluster.check("tcp://a:1", {"tcp://b:1": answer()})
-    other = {**deciding_versions(), package: "0.0.1\x1b[31m"}
-    with pytest.raises(ConfigError, match=rf"worker tcp://c:1 has {package} 0\.0\.1[^\x1b]*, here it is"):
-        cluster.check("tcp://a:1", {"tcp://b:1": answer(), "tcp://c:1": answer(versions=other)})
-
-
 ELSEWHERE = """
 import live
 live.VERSION = "0.0.1"
@@ -267,18 +235,3 @@ def test_on_a_busy_machine_dask_is_started_again(
         with pytest.raises(ConfigError, match="too busy, try again"):
             cluster._connected("tcp://127.0.0.1:9")
     assert len(tries) == 3
-
-
-def test_a_worker_without_the_folder_of_the_results_is_refused() -> None:
-    with pytest.raises(ConfigError, match="does not find --out"):
-        cluster.check("tcp://a:1", {"tcp://b:1": answer(has_token=False)})
-
-
-def test_threads_that_are_too_many_are_told() -> None:
-    many = answer(threads=ONE_THREAD | {"NUMBA_NUM_THREADS": ""})
-    told = list(cluster.advice({"tcp://b:1": answer(), "tcp://c:1": many}))
-    assert told == [
-        "note: 1 of 2 workers, such as tcp://c:1, were started without NUMBA_NUM_THREADS=1; workers of one machine"
-        " then hold one another up"
-    ]
-    assert not list(cluster.advice({"tcp://b:1": answer()}))

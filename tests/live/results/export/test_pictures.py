@@ -52,15 +52,6 @@ def test_films(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert redness(frames[-1])[middle].mean() > redness(frames[0])[middle].mean() + 40
 
 
-def test_gif(run_dir: Path, tmp_path: Path) -> None:
-    pillow = pytest.importorskip("PIL.Image")
-    assert (
-        main(["export", str(run_dir), "--to", "gif", "--out", str(tmp_path / "f.gif"), "--from", "0.6"]) == 0
-    )
-    with pillow.open(tmp_path / "f.gif") as film:
-        assert film.n_frames == 6
-
-
 @pytest.mark.parametrize("field", ["eyy", "status", "v", "sigma_eyy"])
 def test_pictures(run_dir: Path, tmp_path: Path, field: str) -> None:
     out = tmp_path / "p"
@@ -110,23 +101,6 @@ def test_a_map_moves_with_its_specimen(tmp_path: Path) -> None:
     assert np.mean(rows) == pytest.approx((place[1] + 0.5) * ZOOM, abs=1.5)
     # Left of the specimen there is the picture as it was.
     np.testing.assert_array_equal(painted[:, : round(25 * ZOOM)], base[:, : round(25 * ZOOM)])
-
-
-def test_scales_are_in_the_unit_that_is_shown(run_dir: Path) -> None:
-    with open_run(run_dir) as run:
-        rows = range(run.strain.n)
-
-        def scale_of(name: str, shown: Display) -> ColourScale:
-            return ColourScale.of_run(run.strain, name, rows, None, shown.unit(name), shown.factor(name))
-
-        plain, percent = scale_of("eyy", Display()), scale_of("eyy", Display(percent=True))
-        shift = scale_of("v", Display(mm_per_px=0.5, y_up=True))
-        v = run.strain.maps("v")
-    assert (plain.unit, percent.unit, shift.unit) == ("µm/m", "%", "mm")
-    assert plain.low == 0 and not plain.is_diverging
-    assert plain.high == pytest.approx(1200, rel=0.3)
-    assert percent.high == pytest.approx(0.12, rel=0.3)
-    assert shift.low == pytest.approx(-0.5 * np.nanmax(v), rel=0.2)
 
 
 @pytest.mark.parametrize("kind", FORMATS)
@@ -215,12 +189,6 @@ def test_progress_is_told_after_two_seconds(run_dir: Path, capsys: pytest.Captur
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("instant 4 of 12, about 5 s left")
     assert len(lines) == 8
-
-
-def test_a_map_of_statuses_has_no_missing_values(run_dir: Path, tmp_path: Path) -> None:
-    with open_run(run_dir) as run:
-        export(run, ExportRequest("tiff", tmp_path / "s.tif", "status"), TerminalScreen(quiet=True))
-    assert (tmp_path / "s.tif").stat().st_size > 12 * 4 * 5 * 7
 
 
 @pytest.mark.parametrize(("form", "library"), [("tiff", "tifffile"), ("gif", "PIL")])

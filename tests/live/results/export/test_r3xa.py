@@ -16,9 +16,8 @@ from live.results.export.job import ExportJob
 from live.results.export.tables import VERSION, describe
 from live.results.quantities import Display
 from live.results.run_folder import RunFolder
-from tests.live.made_run import force_of
-from tests.live.results.export.test_numbers import table
-from tests.live.results.export.test_tables import N, exported
+from tests.live.made_run import THICKNESS_MM, WIDTH_MM, force_of
+from tests.live.results.export.test_tables import exported, table
 
 
 def parts_of(described: dict[str, Any]) -> dict[str, dict[str, Any]]:
@@ -32,7 +31,15 @@ def test_the_metadata_of_an_experiment(run: RunFolder, tmp_path: Path) -> None:
     described = json.loads((out / "r3xa.json").read_text(encoding="utf-8"))
     assert (described["title"], described["version"]) == ("S1", VERSION)
     assert described["description"] == "Displacement and strain fields measured by phasedic"
+    assert (described["authors"], described["date"]) == ([{"name": "Zoé"}], "2030-01-02")
     parts = parts_of(described)
+    assert len(parts) == sum(len(described[name]) for name in ("settings", "data_sources", "data_sets"))
+    for item in described["data_sets"]:
+        assert (out / item["path"]).exists() and set(item["parent_data_sources"]) <= parts.keys()
+    assert [(one["title"], one["unit"], one["value"]) for one in parts["stg-specimen"]["sizes"]] == [
+        ("width", "mm", WIDTH_MM),
+        ("thickness", "mm", THICKNESS_MM),
+    ]
     camera = parts["src-camera"]
     assert (camera["title"], camera["output_dimension"], camera["output_components"]) == (
         "made up",
@@ -109,5 +116,5 @@ def test_the_tables_of_r3xa_hold_the_instants_asked_for(run: RunFolder, tmp_path
     _, means = table(out / "means.csv")
     np.testing.assert_allclose(means["time_s"], [0.3, 0.4, 0.5])
     _, loads = table(out / "load.csv")
-    np.testing.assert_allclose(loads["time_s"], 0.1 * np.arange(N), atol=1e-9)
-    np.testing.assert_allclose(loads["force_N"], [force_of(1e-4 * k) for k in range(N)])
+    np.testing.assert_allclose(loads["time_s"], 0.1 * np.arange(12), atol=1e-9)
+    np.testing.assert_allclose(loads["force_N"], [force_of(1e-4 * k) for k in range(12)])

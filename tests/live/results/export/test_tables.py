@@ -2,30 +2,34 @@
 
 from __future__ import annotations
 
+import contextlib
+import csv
+import io
+import itertools
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from xml.etree import ElementTree
 
 import cv2
 import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DataError
 from analysis.field import Status
+from live.cli import main
 from live.pipeline.consumer import Screen
 from live.results.export import maps
 from live.results.export.formats import ExportRequest, export
-from live.results.export.job import ExportJob, ExportOptions
+from live.results.export.job import ExportJob, ExportOptions, chosen_fields
+from live.results.export.tables import load_table
 from live.results.quantities import Display, mean_name, quantity_of
 from live.results.run_folder import RunFolder, open_run
 from tests.live.made_run import CONFIG, GAUGES, force_of, make_run
 from tests.live.results.export import vti
-from tests.live.results.export.test_numbers import table
-
-N = 12
-
 
 SHOWN = Display(mm_per_px=0.05, y_up=True, percent=True)
 
@@ -40,6 +44,7 @@ def test_a_table_says_what_its_columns_are(tmp_path: Path) -> None:
     with open_run(make_run(tmp_path / "run", [0.0, 1e-3], config={**CONFIG, "gauges": GAUGES})) as run:
         out = exported(run, tmp_path / "m.csv", "csv", layout="means")
         comments, columns = table(out)
+        np.testing.assert_allclose(columns["eyy_percent"], 100 * run.strain.values["eyy"], rtol=1e-9)
     words = {line.split(":")[0].removeprefix("# "): line for line in comments}
     assert list(columns)[:6] == [
         "time_s",
@@ -66,21 +71,9 @@ def test_a_table_says_what_its_columns_are(tmp_path: Path) -> None:
     )
 
 
-def test_a_long_table_numbers_its_instants(run: RunFolder, tmp_path: Path) -> None:
-    comments, columns = table(
-        exported(run, tmp_path / "l.csv", "csv", fields="eyy, status,eyy", start_s=0.3, end_s=0.4)
-    )
-    n = run.strain.grid.n_active
-    assert columns["instant"].tolist() == [3.0] * n + [4.0] * n
-    np.testing.assert_allclose(columns["time_s"], [0.3] * n + [0.4] * n)
-    assert list(columns) == [
-        "instant", "time_s", "force_N", "row", "column", "x_mm", "y_mm", "eyy_percent", "status",
-    ]  # fmt: skip
-    assert f"# status: 0 OK, 1 {Status(1).name}" in "\n".join(comments)
-
-
 def test_wide_tables_name_the_centres_of_zois(run: RunFolder, tmp_path: Path) -> None:
-    out = exported(run, tmp_path / "w", "csv", layout="wide", fields="v", start_s=0.5, end_s=0.6)
+    out = exported(run, tmp_path / "w", "csv", layout="wide", fields="v,exx", start_s=0.5, end_s=0.6)
+    assert sorted(path.name for path in out.iterdir()) == ["exx_percent.csv", "v_mm.csv"]
     comments, columns = table(out / "v_mm.csv")
     r, c = 3, 2
     x, y = 0.05 * run.strain.grid.x[c], -0.05 * run.strain.grid.y[r]
@@ -90,6 +83,7 @@ def test_wide_tables_name_the_centres_of_zois(run: RunFolder, tmp_path: Path) ->
     np.testing.assert_allclose(columns["time_s"], [0.5, 0.6])
     np.testing.assert_allclose(columns["force_N"], run.force[5:7])
     assert "# one column a ZOI, named by its centre in mm" in comments
+    assert len(columns) == 2 + run.strain.grid.n_active
 
 
 def test_arrays_name_means_and_maps_apart(run: RunFolder, tmp_path: Path) -> None:
@@ -114,8 +108,14 @@ def test_arrays_name_means_and_maps_apart(run: RunFolder, tmp_path: Path) -> Non
         np.testing.assert_allclose(archive["eyy"], 100 * run.strain.maps("eyy")[3:5], rtol=1e-6)
         np.testing.assert_allclose(archive["mean_exx"], 100 * run.strain.values["exx"][3:5])
         np.testing.assert_allclose(archive["x"], 0.05 * run.strain.grid.x)
+        np.testing.assert_array_equal(archive["time"], run.strain.time_s[3:5])
         about = json.loads(str(archive["about"]))
     assert about["units"]["mean_u"] == "mm" and any("y up" in note for note in about["notes"])
+    with np.load(exported(run, tmp_path / "all.npz", "npz", fields="all"), allow_pickle=False) as archive:
+        np.testing.assert_array_equal(archive["status"], run.strain.maps("status"))
+        assert {archive[name].shape for name in run.strain.names} == {(12, *run.strain.grid.shape)}
+        about = json.loads(str(archive["about"]))
+    assert set(about["definitions"]) >= {*run.strain.names, "x", "y", "force"}
 
 
 @pytest.mark.parametrize(
@@ -153,21 +153,24 @@ def test_the_frame_of_reference_in_words() -> None:
 
 def test_points_of_vtk_upwards_or_downwards(run: RunFolder, tmp_path: Path) -> None:
     grid = run.strain.grid
-    for up in (False, True):
-        display = Display(y_up=up, percent=True)
-        out = exported(run, tmp_path / str(up), "vtk", display, fields="exx", start_s=0.5, end_s=0.55)
-        image = vti.read(out / "strain_00000.vti")
-        assert list(image.points) == ["exx_percent", "displacement_px"]
-        u, v, w = image.points["displacement_px"].reshape(*grid.shape, 3).transpose(2, 0, 1)
-        flip = slice(None, None, -1 if up else 1)
-        np.testing.assert_array_equal(u[flip], run.strain.maps("u", 5))
-        np.testing.assert_array_equal(v[flip], (-1 if up else 1) * run.strain.maps("v", 5))
+    for display, unit, px in ((Display(percent=True), "px", 1.0), (SHOWN, "mm", 0.05)):
+        out = exported(run, tmp_path / unit, "vtk", display, fields="exx", start_s=0.5, end_s=0.65)
+        collection = ElementTree.parse(out / "strain.pvd").getroot().findall("Collection/DataSet")
+        assert [float(one.attrib["timestep"]) for one in collection] == pytest.approx([0.5, 0.6])
+        image = vti.read(out / collection[0].attrib["file"])
+        assert list(image.points) == ["exx_percent", f"displacement_{unit}"]
+        u, v, w = image.points[f"displacement_{unit}"].reshape(*grid.shape, 3).transpose(2, 0, 1)
+        up = -1 if display.y_up else 1  # with y up the last row of ZOIs is the first
+        np.testing.assert_allclose(u[::up], px * run.strain.maps("u", 5), rtol=1e-6)
+        np.testing.assert_allclose(v[::up], up * px * run.strain.maps("v", 5), rtol=1e-6)
         assert not w[np.isfinite(u)].any()
         np.testing.assert_allclose(
-            image.points["exx_percent"].reshape(grid.shape)[flip], 100 * run.strain.maps("exx", 5), rtol=1e-6
+            image.points["exx_percent"].reshape(grid.shape)[::up], 100 * run.strain.maps("exx", 5), rtol=1e-6
         )
-        assert image.origin == pytest.approx([grid.x[0], -grid.y[-1] if up else grid.y[0], 0])
-        assert image.spacing == pytest.approx([16, 16, 1])
+        assert image.facts["TimeValue"][0] == run.strain.time_s[5]
+        assert image.facts["force_N"][0] == run.force[5]
+        assert image.origin == pytest.approx([px * grid.x[0], px * (-grid.y[-1] if up < 0 else grid.y[0]), 0])
+        assert image.spacing[:2] == pytest.approx([16 * px] * 2)
 
 
 def test_slices_of_tiff_are_labelled(run: RunFolder, tmp_path: Path) -> None:
@@ -175,6 +178,8 @@ def test_slices_of_tiff_are_labelled(run: RunFolder, tmp_path: Path) -> None:
     out = exported(run, tmp_path / "e.tif", "tiff", fields="exx", start_s=0.2, end_s=0.4)
     run.strain.values["force_N"][3] = math.nan
     gap = exported(run, tmp_path / "g.tif", "tiff", Display(), start_s=0.2, end_s=0.4)
+    single = exported(run, tmp_path / "s.tif", "tiff", fields="status", start_s=0.45, end_s=0.55)
+    np.testing.assert_array_equal(tifffile.imread(single), run.strain.maps("status", 5))
     with tifffile.TiffFile(out) as file, tifffile.TiffFile(gap) as other:
         meta, plain = file.imagej_metadata, other.imagej_metadata
         tags = file.pages[0].tags
@@ -195,7 +200,7 @@ def test_a_tiff_of_more_than_four_gigabytes_is_refused(
 ) -> None:
     pytest.importorskip("tifffile")
     rows, columns = run.strain.grid.shape
-    size = N * (4 * rows * columns + 256)
+    size = 12 * (4 * rows * columns + 256)
     monkeypatch.setattr(maps, "_MAX_BYTES", size - 1)
     with pytest.raises(ConfigError, match=f"12 maps of {columns} x {rows} are more than 4 GB"):
         exported(run, tmp_path / "e.tif", "tiff")
@@ -209,12 +214,12 @@ def test_films_run_at_their_rate(run: RunFolder, tmp_path: Path, fps: float) -> 
     assert film.get(cv2.CAP_PROP_FPS) == pytest.approx(fps)
     pillow = pytest.importorskip("PIL.Image")
     with pillow.open(exported(run, tmp_path / "f.gif", "gif", fps=fps, start_s=1.0)) as gif:
-        assert gif.info["duration"] == round(1000 / fps) and gif.info["loop"] == 0
+        assert gif.info["duration"] == round(1000 / fps) and gif.info["loop"] == 0 and gif.n_frames == 2
         assert max(gif.size) <= 640 + 200
 
 
 def framed(run: RunFolder, **options: Any) -> list[np.ndarray]:
-    job = ExportJob(run, ("eyy",), (0, N - 1), Display(), Screen(), ExportOptions(**options))
+    job = ExportJob(run, ("eyy",), (0, 11), Display(), Screen(), ExportOptions(**options))
     return [image for _, image in maps._frames(job)]
 
 
@@ -231,3 +236,159 @@ def test_pictures_lie_under_the_map_or_plain_grey(run: RunFolder) -> None:
 
 def redness(image: np.ndarray) -> float:
     return float(np.mean(image[..., 2].astype(float) - image[..., 0]))
+
+
+def table(path: Path) -> tuple[list[str], dict[str, np.ndarray]]:
+    """The lines of comment, and the columns by their names."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    comments = [line for line in lines if line.startswith("#")]
+    rows = list(csv.DictReader(lines[len(comments) :]))
+    return comments, {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+def test_long_table(run_dir: Path, tmp_path: Path) -> None:
+    units, out = ("--mm", "--scale", "0.05", "--y-up", "--percent"), tmp_path / "t.csv"
+    assert main(["export", str(run_dir), "--to", "csv", "--out", str(out), *units, "--until", "0.45"]) == 0
+    comments, columns = table(out)
+    with open_run(run_dir) as run:
+        active = run.strain.grid.active
+        eyy, v = (run.strain.maps(name)[:5, active].ravel() for name in ("eyy", "v"))
+        rows, places = np.nonzero(active)
+        x, y = run.strain.grid.x[places], run.strain.grid.y[rows]
+        force, t = run.force[:5], run.strain.time_s[:5]
+    n = int(active.sum())
+    assert list(columns)[:7] == ["instant", "time_s", "force_N", "row", "column", "x_mm", "y_mm"]
+    np.testing.assert_array_equal(columns["instant"], np.repeat(range(5), n))
+    np.testing.assert_allclose(columns["time_s"], np.repeat(t, n))
+    np.testing.assert_allclose(columns["eyy_percent"], 100 * eyy, rtol=1e-6)
+    np.testing.assert_allclose(columns["v_mm"], -0.05 * v, rtol=1e-6, equal_nan=True)
+    np.testing.assert_allclose(columns["y_mm"][:n], -0.05 * y)
+    np.testing.assert_allclose(columns["x_mm"][:n], 0.05 * x)
+    np.testing.assert_array_equal([columns["row"][:n], columns["column"][:n]], [rows, places])
+    np.testing.assert_allclose(columns["force_N"], np.repeat(force, n))
+    assert set(columns["status"]) == {0, 7}
+    for name in columns:
+        assert any(line.startswith(f"# {name} [") for line in comments), f"{name} has no definition"
+    assert any("y up" in line and "1 px = 0.05 mm" in line for line in comments)
+    assert f"# status: 0 OK, 1 {Status(1).name}" in "\n".join(comments)
+
+
+def test_vtk_by_its_own_reader(run: RunFolder, tmp_path: Path) -> None:
+    """Where vtk is installed (140 MB; not asked for by the tests)."""
+    vtk = pytest.importorskip("vtk")
+    out = exported(run, tmp_path / "vtk", "vtk", Display())
+    reader = vtk.vtkXMLImageDataReader()
+    reader.SetFileName(str(out / "strain_00003.vti"))
+    reader.Update()
+    assert reader.GetErrorCode() == 0
+    points = reader.GetOutput().GetPointData()
+    expected = run.strain.maps("exx", 3).ravel()
+    array = points.GetArray("exx")
+    np.testing.assert_array_equal([array.GetValue(i) for i in range(array.GetNumberOfValues())], expected)
+
+
+def test_r3xa_by_its_own_schema(run: RunFolder, tmp_path: Path) -> None:
+    """Where the validator of R3XA is installed (it is under the GPL, and not asked for by the tests)."""
+    validate = pytest.importorskip("r3xa_api.validate")
+    out = exported(run, tmp_path / "r3xa", "r3xa")
+    validate.validate(json.loads((out / "r3xa.json").read_text(encoding="utf-8")))
+
+
+def test_xarray(run_dir: Path) -> None:
+    pytest.importorskip("xarray")
+    with open_run(run_dir) as run:
+        data = run.strain.to_xarray(display=Display(y_up=True, percent=True))
+        np.testing.assert_allclose(
+            data["eyy"].sel(time=0.5, method="nearest"), 100 * run.strain.maps("eyy", 5)
+        )
+        assert data["eyy"].attrs["units"] == "%"
+        assert data["eyy"].dims == ("time", "y", "x")
+        np.testing.assert_array_equal(data["y"], -run.strain.grid.y)
+        np.testing.assert_array_equal(data["force"], run.force)
+        np.testing.assert_allclose(data["mean_eyy"], 100 * run.strain.values["eyy"])
+
+
+def test_a_table_of_loads_counts_from_the_start_of_the_test() -> None:
+    recorded: Any = SimpleNamespace(
+        session=SimpleNamespace(
+            load_curves=lambda: iter([(np.array([100.5, 101.25]), np.array([12.5, math.nan]))]),
+            start_monotonic=100.0,
+        ),
+        _recorded=contextlib.nullcontext,
+    )
+    run: Any = SimpleNamespace(readings=RunFolder.readings.func(recorded))
+    file = io.StringIO()
+    load_table(run, file)
+    heads, *rows = csv.reader(io.StringIO(file.getvalue()))
+    assert heads == ["time_s", "force_N"]
+    (half, known), (later, unknown) = ([float(cell) for cell in row] for row in rows)
+    assert (half, known, later) == (0.5, 12.5, 1.25) and math.isnan(unknown)
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "rows"),
+    [(None, None, range(12)), (0.3, 0.5, (3, 4, 5)), (0.3000001, 0.4999999, (3, 4, 5)), (0.31, None, range(4, 12)),
+     (None, 0.19, (0, 1)), (0.3001, 0.4999, (4,))],
+)  # fmt: skip
+def test_instants_between_two_times(
+    run: RunFolder, start: float | None, end: float | None, rows: Any
+) -> None:
+    assert run.strain.rows_between(start, end, "--from, --until") == tuple(rows)
+
+
+def test_the_maps_that_are_chosen(run: RunFolder) -> None:
+    strain = run.strain
+    assert chosen_fields(strain, None) == (
+        "u",
+        "v",
+        "exx",
+        "eyy",
+        "exy",
+        "sigma_exx",
+        "sigma_eyy",
+        "sigma_exy",
+        "status",
+    )
+    assert chosen_fields(strain, "all") == strain.names
+    assert chosen_fields(strain, " eyy,u , eyy") == ("eyy", "u")
+    assert chosen_fields(strain, None, ("ezz", "u")) == ("u",)
+
+
+def test_where_an_export_goes(run: RunFolder, tmp_path: Path) -> None:
+    run.path = tmp_path
+    for kind, layout, name in (
+        ("csv", "long", "strain.csv"), ("csv", "means", "means.csv"), ("csv", "wide", "wide"),
+        ("npz", "long", "strain.npz"), ("tiff", "long", "eyy.tif"), ("vtk", "long", "vtk"),
+    ):  # fmt: skip
+        request = ExportRequest(kind, start_s=1.0, options=ExportOptions(layout=layout))
+        assert export(run, request, Screen()) == tmp_path / "export" / name
+        assert (tmp_path / "export" / name).exists()
+    run.strain.names = ("residual",)
+    with pytest.raises(ConfigError, match="holds none of the usual maps"):
+        export(run, ExportRequest("csv", tmp_path / "x.csv"), Screen())
+
+
+def test_shears_of_gauges_turn_with_the_axis(tmp_path: Path) -> None:
+    with open_run(make_run(tmp_path, [0.0, 1e-3], config={**CONFIG, "gauges": GAUGES})) as run:
+        values = run.strain.values
+        job = ExportJob(run, ("eyy",), (1,), SHOWN, Screen())
+        for name, sign in (
+            ("gauge_shear", -100), ("gauge_axial", 100), ("sigma_gauge_shear", 100), ("exy", -100), ("eyy", 100),
+            ("v_px", -0.05), ("sigma_exy", 100), ("time_s", 1), ("n_valid", 1),
+        ):  # fmt: skip
+            np.testing.assert_allclose(job.column(name), sign * values[name][1:], err_msg=name)
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing(
+    run: RunFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ticks = itertools.count()
+
+    def full(*_: Any) -> None:
+        if next(ticks) > 2:
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("live.results.export.maps.image", lambda *_: full() or b"")  # type: ignore[func-returns-value]
+    with pytest.raises(DataError, match="No space left on device"):
+        export(run, ExportRequest("vtk", tmp_path / "vtk"), Screen())
+    assert list(tmp_path.iterdir()) == []

@@ -180,13 +180,9 @@ def test_comparison(run_dir: Path, tmp_path: Path) -> None:
     assert "Comparison of 2 tests" in page.words
     with out.with_suffix(".csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    values = [float(row["E_GPa"]) for row in rows[:2]]
     assert [row["test"] for row in rows] == [
         "S1 <b>& so on</b>", "S1", "mean", "standard deviation", "n",
     ]  # fmt: skip
-    assert float(rows[2]["E_GPa"]) == pytest.approx(np.mean(values))
-    assert float(rows[3]["E_GPa"]) == pytest.approx(np.std(values, ddof=1), abs=1e-6)
-    assert rows[4]["nu"] == "2"
 
 
 @pytest.mark.parametrize(
@@ -236,19 +232,6 @@ def test_nothing_is_overwritten(run_dir: Path, tmp_path: Path, capsys: pytest.Ca
     assert "r.csv exists already" in capsys.readouterr().err
     assert out.with_suffix(".csv").read_text() == "precious"
     assert not out.exists()
-
-
-def test_at_the_end_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = make_run(tmp_path)
-    command.write_report(folder, TerminalScreen())
-    assert "Noise floor" in (folder / "report.html").read_text(encoding="utf-8")
-    command.write_report(folder, TerminalScreen())
-    command.write_report(tmp_path / "nowhere", TerminalScreen())
-    printed = capsys.readouterr().out.splitlines()
-    assert [line[:12] for line in printed if "hash" not in line] == [
-        "  " + str(folder)[:10],
-        *["warning: no "] * 2,
-    ]
 
 
 def test_thinning_keeps_the_spikes_and_the_gaps() -> None:

@@ -84,17 +84,6 @@ def test_the_card_is_written_once_a_second_from_a_bounded_history(monkeypatch: p
     assert seen[-1][-1].t == newest.time_step.t
 
 
-def test_the_card_shows_the_state_of_the_test() -> None:
-    view = RecordingView()
-    writer = CardWriter(
-        view, StatusCard(SpecimenConfig(), make_loads(10.0, lambda t: 1e3 * t)), RunState.new(1.0)
-    )  # type: ignore[arg-type]
-    for number in range(100):
-        writer.measurement(make_measurement(number, 1e-5 * number))
-    (_, (text,)) = view.calls[-1]
-    assert "33 of 34" in text.replace("*", "") or "ZOIs valid" in text
-
-
 @pytest.mark.parametrize("state", ["ARMED", ""])
 def test_the_large_figures_before_and_after_the_first_measurement(state: str) -> None:
     """Live the load is shown from the first frame on; a replay (no state) shows the force of each measurement."""

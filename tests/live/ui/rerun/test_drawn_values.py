@@ -211,13 +211,16 @@ def test_a_running_test_has_no_values_at_its_zois() -> None:
     assert "/specimen/values" not in sink.logged
 
 
+@pytest.mark.parametrize("bits", [8, 12, 16])
 @pytest.mark.parametrize(("light", "side", "scale"), [(False, 1000, 2.0), (True, 500, 4.0)])
-def test_a_picture_keeps_its_size_and_its_grey_levels(light: bool, side: int, scale: float) -> None:
+def test_a_picture_keeps_its_size_and_its_grey_levels(
+    light: bool, side: int, scale: float, bits: int
+) -> None:
     """Of 2000 px, every second sent; reduced to 1280 or 640 px at most."""
     scene, sink, _ = made(light=light)
-    image = np.full((800, 1000), 4095, np.uint16)
+    image = np.full((800, 1000), 2**bits - 1, np.uint8 if bits == 8 else np.uint16)
     image[:, :500] = 0
-    scene.picture(PictureMessage(image, 12, START + 1.5, 2))
+    scene.picture(PictureMessage(image, bits, START + 1.5, 2))
     drawn = sink.image("camera/picture")
     assert drawn.shape == (side * 8 // 10, side) and sink.times == [1.5]
     assert drawn[5, 5] < 3 and drawn[5, -5] > 252
@@ -296,6 +299,11 @@ def test_the_axes_of_a_curve_by_value() -> None:
     assert rounded(1.23456e-3, strain_axis(np.array([0.9e-3]))) == "1\u202f235 µm/m"
     assert [force_axis(np.array([f])).unit for f in (9999.0, -9999.0, 1e4, -1e4)] == ["N", "N", "kN", "kN"]
     assert force_axis(np.array([1e4])).factor == 1e-3
+    axis = stress_axis(np.array([0.0, -120e6]))
+    assert axis.low <= -120e6 and axis.high == 0, "compression"
+    assert strain_axis(np.array([0.05])).unit == "%"
+    for axis in (strain_axis(np.zeros(1)), stress_axis(np.zeros(1)), force_axis(np.zeros(1))):
+        assert axis.high > axis.low and len(axis.ticks) >= 2
 
 
 def parts_of(layout: Any) -> list[Any]:

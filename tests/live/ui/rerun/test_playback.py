@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquire.text.quantity import Amount
 from live.cli import main
 from live.commands.show import ShowRequest, playback_messages, selected_rows, show, view_setup
 from live.pipeline.consumer import Screen
@@ -66,8 +67,10 @@ def test_the_messages_contain_the_data_of_the_files(run: RunFolder) -> None:
     axial = np.stack([run.strain.time_s, run.gauges["axial"].value, run.gauges["axial"].sigma], axis=1)
     np.testing.assert_array_equal(gauges["axial"], axial)
     status = next(message for message in messages if message.kind is Kind.STATUS)
-    assert "**S1**, 96 instants" in status.meta["markdown"]
-    assert "gauge **shear**" in status.meta["markdown"]
+    assert status.meta["markdown"].startswith("**S1**, 96 instants, 33 of 34 ZOIs at the end\n\n")
+    for name, gauge in run.gauges.items():
+        value = Amount("strain", gauge.value[-1], gauge.sigma[-1])
+        assert f"gauge **{name}** {value} at the end" in status.meta["markdown"]
 
 
 def test_the_gauges_are_drawn_where_they_lie(run: RunFolder, tmp_path: Path) -> None:
@@ -131,15 +134,6 @@ def test_it_serves_until_it_is_stopped(run: RunFolder) -> None:
 def test_which_rows_are_shown(run: RunFolder, shown: ShowRequest, rows: tuple[int, ...]) -> None:
     run.strain.values["time_s"][:] = 0.1 * np.arange(N)
     assert selected_rows(run, shown) == rows
-
-
-def test_a_long_run_is_thinned_to_what_the_viewer_keeps(
-    run: RunFolder, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("live.commands.show.MAX_BYTES", 1e5)
-    rows = selected_rows(run, ShowRequest())
-    assert 1 < len(rows) < 20
-    assert rows[-1] == N - 1
 
 
 @pytest.mark.parametrize(

@@ -129,55 +129,39 @@ def test_it_ends_where_it_has_grown_too_large(
     assert scene.told[-1][0] == "end", "the file is closed"
 
 
-def opened(
-    monkeypatch: pytest.MonkeyPatch, target: ViewTarget, **fails: Exception
-) -> tuple[list[Any], list[Any]]:
-    def served(*_: Any) -> tuple[str, int]:
-        if "serve" in fails:
-            raise fails["serve"]
-        return "server", 9877
+@pytest.mark.parametrize(
+    ("port", "rrd", "fails", "sinks", "trouble", "lasting"),
+    [
+        (9876, "v.rrd", {}, ["server", "file"], "", False),
+        (None, "v.rrd", {}, ["file"], "", False),
+        (9876, "v.rrd", {"serve": OSError("no port")}, ["file"],
+         "the view's server did not start: no port; all else goes on", False),
+        (9876, "v.rrd", {"write": FileExistsError()}, ["server"],
+         "the view's file did not start: v.rrd exists already", False),
+        (None, "v.rrd", {"write": OSError("full")}, [], "the view's file did not start: full; all else goes on", True),
+        (None, None, {}, [], "the view has nowhere to draw to", True),
+    ],
+)  # fmt: skip
+def test_what_is_served_and_written_is_told_and_so_is_what_does_not_start(
+    monkeypatch: pytest.MonkeyPatch, port: int | None, rrd: str | None, fails: dict[str, Exception],
+    sinks: list[str], trouble: str, lasting: bool,
+) -> None:  # fmt: skip
+    """Where nothing starts a restart is useless: the trouble is a lasting one."""
 
-    def written(*_: Any) -> str:
-        if "write" in fails:
-            raise fails["write"]
-        return "file"
+    def made(name: str, result: Any) -> Any:
+        if name in fails:
+            raise fails[name]
+        return result
 
-    monkeypatch.setattr(process, "serve", served)
-    monkeypatch.setattr(process, "write", written)
+    monkeypatch.setattr(process, "serve", lambda *_: made("serve", ("server", 9877)))
+    monkeypatch.setattr(process, "write", lambda *_: made("write", "file"))
     channel = Channel()
-    return process._open(SETUP, target, channel), channel.sent  # type: ignore[arg-type]
-
-
-def test_what_is_served_and_written_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert opened(monkeypatch, ViewTarget(9876, "v.rrd", "id")) == (
-        ["server", "file"], [(Kind.SERVING, {"port": 9877, "rrd": "v.rrd"})],
-    )  # fmt: skip
-    assert opened(monkeypatch, ViewTarget(None, "v.rrd", "id")) == (
-        ["file"], [(Kind.SERVING, {"port": None, "rrd": "v.rrd"})],
-    )  # fmt: skip
-
-
-def test_one_that_does_not_start_leaves_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    target = ViewTarget(9876, "v.rrd", "id")
-    sinks, sent = opened(monkeypatch, target, serve=OSError("no port"))
-    text = "the view's server did not start: no port; all else goes on"
-    assert sinks == ["file"]
-    assert sent == [
-        (Kind.TROUBLE, {"text": text, "lasting": False}), (Kind.SERVING, {"port": None, "rrd": "v.rrd"}),
-    ]  # fmt: skip
-    sinks, sent = opened(monkeypatch, target, write=FileExistsError())
-    assert sinks == ["server"]
-    assert sent[0][1]["text"].startswith("the view's file did not start: v.rrd exists already")
-    assert sent[1] == (Kind.SERVING, {"port": 9877, "rrd": None})
-
-
-def test_where_nothing_starts_a_restart_is_useless(monkeypatch: pytest.MonkeyPatch) -> None:
-    sinks, sent = opened(monkeypatch, ViewTarget(None, "v.rrd", "id"), write=OSError("full"))
-    assert (sinks, sent) == (
-        [], [(Kind.TROUBLE, {"text": "the view's file did not start: full; all else goes on", "lasting": True})],
-    )  # fmt: skip
-    sinks, ((_, meta),) = opened(monkeypatch, ViewTarget(None, None, "id"))
-    assert sinks == [] and meta["text"].startswith("the view has nowhere to draw to") and meta["lasting"]
+    assert process._open(SETUP, ViewTarget(port, rrd, "id"), channel) == sinks  # type: ignore[arg-type]
+    told = [(meta["text"], meta["lasting"]) for kind, meta in channel.sent if kind is Kind.TROUBLE]
+    assert [(text.startswith(trouble), last) for text, last in told] == ([(True, lasting)] if trouble else [])
+    served = [meta for kind, meta in channel.sent if kind is Kind.SERVING]
+    there = {"port": 9877 if "server" in sinks else None, "rrd": rrd if "file" in sinks else None}
+    assert served == ([there] if sinks else [])
 
 
 @pytest.mark.parametrize(

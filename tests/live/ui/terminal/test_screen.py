@@ -12,7 +12,7 @@ import pytest
 from acquire.events import Event, EventKind
 from acquire.text import Message
 from acquire.text.quantity import Amount
-from live.pipeline.event_log import EventLog, sentence
+from live.pipeline.event_log import sentence
 from live.pipeline.measurement import TimeStep
 from live.pipeline.run_state import FrameCounts
 from live.pipeline.snapshot import Snapshot
@@ -66,16 +66,8 @@ def test_the_progress_of_a_replay_is_one_line() -> None:
 
 def time_step() -> TimeStep:
     numbers = {f.name: 0.0 for f in dataclasses.fields(TimeStep) if f.default is dataclasses.MISSING}
-    values: Any = {
-        **numbers,
-        "force": 7.0,
-        "exx": 1e-4,
-        "eyy": -2e-3,
-        "exy": -1e-7,
-        "n_valid": 8,
-        "n_zoi": 10,
-    }
-    values |= {"sigma_eyy": 6.4e-7, "sigma_exx": 1.24e-5}
+    strains = {"exx": 1e-4, "eyy": -2e-3, "exy": -1e-7, "sigma_exx": 1.24e-5, "sigma_eyy": 6.4e-7}
+    values: Any = numbers | strains | {"force": 7.0, "n_valid": 8, "n_zoi": 10}
     return TimeStep(**values)
 
 
@@ -136,21 +128,10 @@ def test_what_is_typed_is_not_overwritten() -> None:
     screen.print("stays")
     screen.prompt(None)
     screen.status("again")
+    blank = " " * 10
     assert stream.getvalue().split("\r") == [
-        "status",
-        ": note sl_",
-        "          ",
-        "stays\n: note sl_",
-        "          ",
-        "again",
-        "",
-    ]
-
-
-def test_a_device_is_named_by_its_role() -> None:
-    address = "sim:woven?bits=12&fps=60"
-    event = Event(1.0, EventKind.DEVICE, address, f"{address}: the stream stalls")
-    assert sentence(event, {address: "camera"}) == "camera: the stream stalls"
+        "status", ": note sl_", blank, "stays\n: note sl_", blank, "again", "",
+    ]  # fmt: skip
 
 
 def test_an_address_is_named_once_and_without_its_settings() -> None:
@@ -165,28 +146,6 @@ def test_a_lost_terminal_does_not_matter() -> None:
     screen = TerminalScreen(ClosedTerminal())
     screen.print("nobody reads this")
     screen.print("nor this")
-
-
-def test_the_frame_counts_show_when_they_do_not_add_up() -> None:
-    frame_counts = FrameCounts()
-    frame_counts.add(grabbed=10, measured=6, skipped=2, reference=1, left_out=1, recorded=10)
-    assert frame_counts.adds_up
-    assert not frame_counts.loss
-    frame_counts.add(grabbed=1)
-    assert not frame_counts.adds_up
-    assert "NOT EVERY FRAME IS ACCOUNTED FOR" in frame_counts.line()
-    frame_counts.add(left_out=1, unrecorded=1)
-    assert frame_counts.adds_up
-    assert frame_counts.loss
-
-
-def test_late_listeners_get_every_event_once() -> None:
-    event_log, received = EventLog(), []
-    event_log(Event(1.0, EventKind.DEVICE, "a", "first"))
-    event_log.add_listener(received.append)
-    event_log(Event(2.0, EventKind.LOST, "a", "second", "warning"))
-    assert [event.text for event in received] == ["first", "second"]
-    assert [event.text for event in event_log.events("warning")] == ["second"]
 
 
 @pytest.mark.parametrize(

@@ -88,7 +88,7 @@ def test_verbose_has_all(tmp_path: Path) -> None:
         (
             (0.0, 1e-5, 2e-5, *[math.nan] * 7),
             True,
-            "only 3 measurements have strain and a tensile force, 8 are needed",
+            "only 3 measurements with strain and a tensile force, 8 are needed",
         ),
     ],
 )

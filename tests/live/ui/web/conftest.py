@@ -13,7 +13,7 @@ from tests.live.ui.web.browser import FLAGS, Page, Program, chromium
 
 CAMERA = "sim:uniform?width=256&height=192&fps=15&hold=4&end=1&buffers=64&seconds={seconds}"
 OPTIONS = ["--zoi", "32", "--section", "20,2", "--scale", "0.1", "--no-view", "--no-rrd", "--page-port", "0"]
-Start = Callable[..., Page]
+Begin, Start = Callable[..., Program], Callable[..., Page]
 
 
 @pytest.fixture(scope="session")
@@ -46,29 +46,45 @@ def no_page_stays_open(request: pytest.FixtureRequest) -> Iterator[None]:
 
 
 @pytest.fixture
-def start(browser: Any, tmp_path: Path) -> Iterator[Start]:
-    """Starts ``phasedic page`` and opens it; whatever happens, it does not run on."""
+def begin(tmp_path: Path) -> Iterator[Begin]:
+    """Starts ``phasedic`` in a folder of its own; whatever happens, it does not run on."""
     programs: list[Program] = []
 
-    def begin(
-        seconds: int = 300, load: str = "sim:", locale: str = "en-US", camera: str = CAMERA, **wanted: Any
-    ) -> Page:
-        words = ["--camera", camera.format(seconds=seconds), "--load", load, *OPTIONS]
-        programs.append(Program(tmp_path, "page", *words))
-        return another(browser, programs[-1].address, locale, **wanted)
+    def started(*words: str) -> Program:
+        programs.append(Program(tmp_path, *words))
+        return programs[-1]
 
-    yield begin
+    yield started
     for program in programs:
         program.kill()
-    assert "Traceback" not in (tmp_path / "err.txt").read_text()
+    assert not programs or "Traceback" not in (tmp_path / "err.txt").read_text()
 
 
-def another(browser: Any, address: str, locale: str = "en-US", **wanted: Any) -> Page:
+@pytest.fixture
+def start(browser: Any, begin: Begin) -> Start:
+    """Starts ``phasedic page`` and opens it."""
+
+    def started(
+        seconds: int = 300, load: str = "sim:", locale: str = "en-US", camera: str = CAMERA, **wanted: Any
+    ) -> Page:
+        program = begin("page", "--camera", camera.format(seconds=seconds), "--load", load, *OPTIONS)
+        return another(browser, program.address, locale, **wanted)
+
+    return started
+
+
+def opened(browser: Any, address: str, locale: str = "en-US", **wanted: Any) -> Page:
     """A page at the address, in a context of its own."""
     viewport = {"width": 1280, "height": 800}
     page = Page(browser.new_context(viewport=viewport, locale=locale, **wanted).new_page())
     page.address = address
     page.goto(address)
+    return page
+
+
+def another(browser: Any, address: str, locale: str = "en-US", **wanted: Any) -> Page:
+    """The same, as soon as it shows the specimen."""
+    page = opened(browser, address, locale, **wanted)
     page.until(lambda: bool(page.text("region")), "the specimen is found")
     return page
 

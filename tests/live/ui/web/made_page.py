@@ -11,6 +11,7 @@ from live.ui.web.map_view import as_jpeg
 from live.ui.web.setup.config_draft import kinds_of_devices
 from live.words.language import entries
 from tests.live.ui.web.browser import Page
+from tests.live.ui.web.made_up import KINDS, setup_state
 from tests.live.ui.web.page_texts import STATIC
 
 ADDRESS = "http://made.test/"
@@ -27,39 +28,20 @@ SOURCE = """window.EventSource = class { constructor() { this.heard = {}; window
     window.emit = (kind, value) => window.made.heard[kind]({ data: JSON.stringify(value) });
     setInterval(() => window.made?.heard.beat?.({ data: "{}" }), 500);"""
 TYPES = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
-KINDS = [
-    {"kind": "line", "label": "Line", "hint": "Drag a line.", "gesture": "line"},
-    {"kind": "area", "label": "Area", "hint": "Drag a box.", "gesture": "box"},
-    {"kind": "zoi", "label": "Point", "hint": "Click a place.", "gesture": "click"},
-]
 STAGE = {"n": 1, "words": "", "alone": False, "components": ["exx", "eyy"], "kinds": KINDS}
 WIDTH, HEIGHT = 640, 480
 
 
 def set_up(**changed: Any) -> dict[str, Any]:
     """A state of the set-up: a camera of 640 x 480 px, a region, a line from 200, 100 to 200, 300."""
-    line = {
-        "kind": "line",
-        "colour": 2,
-        "handles": [[200, 100], [200, 300]],
-        "outline": [[[200, 100], [200, 300]]],
-    }
-    return {
-        "side": "", "trouble": "", "doubt": "", "busy": "", "sharpness": 0.3, "peak": 0.3, "saturated": 0.0,
-        "sigma": 1e-4,
-        "camera": {"name": "a camera", "width": WIDTH, "height": HEIGHT, "bits": 8, "fps": 20.0, "sliders": [],
-                   "formats": [], "format": "", "rates": [], "warnings": []},
-        "region": {"words": "as drawn", "box": [0, 0, 9, 9], "edition": 1}, "zois": 100, "file": "rig.toml",
-        "unsaved": [], "picture": 1, "gauges": {"axial": line}, "plates": {}, "can": ["undo"], "remarks": [],
-        "measure": {"zoi": 64, "step": 16, "burst": 8}, "overlays": {"saturated": True, "quality": False},
-        "specimen": {"width_mm": 20.0, "thickness_mm": 1.5, "diameter_mm": None, "gauge_length_mm": None,
-                     "axis": "auto", "area_mm2": 30.0},
-        "metadata": {"specimen": "bar-6"}, "scale": {"px_per_mm": None, "sigma": None}, "address": "sim:?fps=20",
-        "devices": {"cameras": [], "loads": [], "finding": ""}, "checking": False, "go": None, "lines": [],
-        "table": None,
-        "load": {"address": "sim:", "name": "a cell", "trouble": "", "force_N": 1.0, "noise_N": 0.5, "rate": 80.0,
-                 "zero_N": 0.0},
-        **changed,
+    ends = [[200, 100], [200, 300]]
+    camera = {"name": "a camera", "width": WIDTH, "height": HEIGHT, "bits": 8, "fps": 20.0, "sliders": [],
+              "formats": [], "format": "", "rates": [], "warnings": []}  # fmt: skip
+    return setup_state() | {
+        "camera": camera, "address": "sim:?fps=20", "picture": 1, "can": ["undo"], "zois": 100, "saturated": 0.0,
+        "region": {"words": "as drawn", "box": [0, 0, 9, 9], "edition": 1}, "scale": {"px_per_mm": None, "sigma": None},
+        "gauges": {"axial": {"kind": "line", "colour": 2, "handles": ends, "outline": [ends]}},
+        "measure": {"zoi": 64, "step": 16, "burst": 8}, "go": None, "lines": [], "table": None, **changed,
     }  # fmt: skip
 
 

@@ -40,16 +40,8 @@ UNITS = {"N": 1.0, "kN": 1e3, "MPa": 1e6, "µm/m": 1e-6, "%": 1e-2, "mm": 1e-3, 
 
 def figure(value: float | None, sigma: float | None = None, **more: Any) -> dict[str, Any]:
     """A figure that is live unless ``more`` says otherwise."""
-    found = {
-        "state": "live",
-        "value": value,
-        "sigma": sigma,
-        "last": value,
-        "age_s": 0.1,
-        "why": "",
-        "limit": None,
-    }
-    return found | more
+    found = {"state": "live", "value": value, "sigma": sigma, "last": value, "age_s": 0.1, "why": ""}
+    return found | {"limit": None} | more
 
 
 def facts(delay_s: float = 0.044, cycle: float = math.nan, **counts: int) -> list[dict[str, Any]]:

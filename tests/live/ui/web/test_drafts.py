@@ -13,11 +13,9 @@ import cv2
 import numpy as np
 import pytest
 
-from acquire.addresses import with_setting
 from acquire.errors import ConfigError, DataError
-from acquire.frame import CameraInfo, Frame, frozen
-from live.config.loading import Config, load_config
-from live.setup.devices import at_rest
+from acquire.frame import Frame, frozen
+from live.config.loading import load_config
 from live.setup.pictures import read_mask
 from live.setup.scale import from_board
 from live.ui.web.broadcaster import Broadcaster
@@ -29,6 +27,7 @@ from live.ui.web.setup.setup_session import SetupSession
 from live.ui.web.setup.specimen_region import DrawnRegion, SpecimenRegion
 from tests.live.setup.test_scale import CHARUCO, CHECKER, seen
 from tests.live.ui.waiting import until
+from tests.live.ui.web.test_setup_values import INFO, draft_of
 
 PX_PER_MM = 9.0
 AS_CHECKER = {"columns": 9, "rows": 6, "square": 5, "marker": 0, "dictionary": "4X4_50"}
@@ -52,9 +51,8 @@ Opened = tuple[SetupSession, FixedPreview]
 
 @pytest.fixture
 def opened(tmp_path: Path) -> Iterator[Opened]:
-    rig = tmp_path / "rig.toml"
-    rig.write_text("[scale]\nstand_off_mm = 400\n")
-    session, preview = SetupSession(ConfigDraft(load_config(rig, {}), rig, {}), Broadcaster()), FixedPreview()
+    draft = draft_of(tmp_path, "[scale]\nstand_off_mm = 400\n")
+    session, preview = SetupSession(draft, Broadcaster()), FixedPreview()
     session.preview = preview  # type: ignore[assignment]
     yield session, preview
     session._folder.cleanup()
@@ -70,13 +68,11 @@ def slow_camera(tmp_path: Path) -> Iterator[CameraPreview]:
     (tmp_path / "shots").mkdir()
     for k in range(9):
         cv2.imwrite(str(tmp_path / "shots" / f"{k}.png"), seen(CHARUCO, PX_PER_MM))
-    rig = tmp_path / "slow.toml"
-    rig.write_text(f'[camera]\naddress = "files:{tmp_path}/shots?fps=0.03"\n')
-    draft = ConfigDraft(load_config(rig, {}), rig, {})
-    preview = CameraPreview(
-        draft,
-        SimpleNamespace(opened=lambda info: None, show=lambda frame: 0.0, frames_needed=lambda info: RECENT),
+    draft = draft_of(tmp_path, f'[camera]\naddress = "files:{tmp_path}/shots?fps=0.03"\n')
+    watched = SimpleNamespace(
+        opened=lambda info: None, show=lambda frame: 0.0, frames_needed=lambda info: RECENT
     )
+    preview = CameraPreview(draft, watched)
     preview.start()
     yield preview
     preview.close()
@@ -107,9 +103,7 @@ def test_a_board_gives_the_scale(opened: Opened, board: Any, said: dict[str, Any
     assert session.state()["remarks"] == []
 
 
-def test_a_tilt_is_shown_until_the_scale_is_taken_again(
-    opened: Opened,
-) -> None:
+def test_a_tilt_is_shown_until_the_scale_is_taken_again(opened: Opened) -> None:
     session, preview = opened
     show(preview, seen(CHECKER, PX_PER_MM, degrees=12.0))
     CHANGES["board"](session, {"columns": 9, "rows": 6, "square": 5})
@@ -215,21 +209,6 @@ def test_keys_are_removed(draft: ConfigDraft) -> None:
     assert config.gauges == {} and config.specimen.width_mm is None
 
 
-def test_settings_of_an_address() -> None:
-    assert with_setting("/dev/video0", "gain", 3) == "/dev/video0?gain=3"
-    assert with_setting("/dev/video0?gain=3&fps=30", "gain", 7.5) == "/dev/video0?gain=7.5&fps=30"
-    assert with_setting("files:a?b/*.tif", "fps", 3) == "files:a?b/*.tif?fps=3"
-    assert with_setting("/dev/video0?fps=30&format=Y12", "fps", "") == "/dev/video0?format=Y12"
-    assert with_setting("/dev/video0?fps=30", "fps", "") == "/dev/video0"
-
-
-def test_only_a_simulated_specimen_has_to_be_held() -> None:
-    assert at_rest("/dev/video0?fps=30") == "/dev/video0?fps=30"
-    assert "max_strain=0" in at_rest("sim:hole?max_strain=0.01") and "max_strain=0.01" not in at_rest(
-        "sim:?max_strain=0.01"
-    )
-
-
 @pytest.mark.parametrize(
     ("name", "following"),
     [("bar-6", "bar-7"), ("bar-009", "bar-010"), ("B7", "B8"), ("bar", "bar-2"), ("3", "4")],
@@ -268,14 +247,6 @@ def test_a_polygon() -> None:
     inside = (X > 10) & (Y > 10) & (X + Y < 60)
     edge = (np.abs(X - 10) < 1) | (np.abs(Y - 10) < 1) | (np.abs(X + Y - 60) < 1)
     assert np.array_equal(found.mask[~edge], inside[~edge])
-
-
-def test_brush_and_eraser() -> None:
-    way = {"points": [[20, 30], [60, 30]], "radius": 5}
-    painted = drawn({"tool": "brush", **way})
-    near = np.hypot(X - np.clip(X, 20, 60), Y - 30) <= 5
-    assert np.array_equal(painted.mask, near)
-    assert np.array_equal(drawn({"tool": "eraser", **way}, start=True).mask, ~near)
 
 
 def test_outside_the_picture_nothing_is_drawn() -> None:
@@ -323,9 +294,7 @@ def test_an_address_is_a_text_in_one_line(change: str, key: str, address: object
 
 def test_the_region_is_seen_when_its_automatic_gauges_are_placed(tmp_path: Path) -> None:
     """Else an edit of the page between the two is lost."""
-    rig = tmp_path / "rig.toml"
-    rig.write_text('[measure]\nzoi = 32\nstep = 16\nroi = [20, 20, 180, 150]\ngauges = "auto"\n')
-    draft = ConfigDraft(load_config(rig, {}), rig, {})
+    draft = draft_of(tmp_path, '[measure]\nzoi = 32\nstep = 16\nroi = [20, 20, 180, 150]\ngauges = "auto"\n')
     seen_at_changes: list[DrawnRegion | None] = []
 
     def spied(*changes: Mapping[str, Any]) -> None:
@@ -334,7 +303,7 @@ def test_the_region_is_seen_when_its_automatic_gauges_are_placed(tmp_path: Path)
 
     draft.replace_gauges = spied  # type: ignore[assignment]
     region = SpecimenRegion(draft, None, lambda: None)
-    region.begin(CameraInfo("sim:", "sim", 256, 192, 8, True, "host"), np.zeros((1, 192, 256), np.float32))
+    region.begin(INFO, np.zeros((1, 192, 256), np.float32))
     assert seen_at_changes == [None] and list(draft.config.gauges) == ["extension", "width", "area"]
     assert draft.config.gauges["area"]["box"] == (27.0, 27.0, 161.0, 129.0)
     assert region.drawn is not None and region.drawn.box == (20, 20, 180, 150)
@@ -343,13 +312,10 @@ def test_the_region_is_seen_when_its_automatic_gauges_are_placed(tmp_path: Path)
 
 
 def test_a_region_too_small_for_gauges_is_shown(tmp_path: Path) -> None:
-    rig = tmp_path / "rig.toml"
-    rig.write_text('[measure]\nzoi = 32\nstep = 16\nroi = [20, 20, 180, 40]\ngauges = "auto"\n')
-    region = SpecimenRegion(ConfigDraft(load_config(rig, {}), rig, {}), None, lambda: None)
+    draft = draft_of(tmp_path, '[measure]\nzoi = 32\nstep = 16\nroi = [20, 20, 180, 40]\ngauges = "auto"\n')
+    region = SpecimenRegion(draft, None, lambda: None)
     with pytest.raises(ConfigError, match="1 rows of ZOIs"):
-        region.begin(
-            CameraInfo("sim:", "sim", 256, 192, 8, True, "host"), np.zeros((1, 192, 256), np.float32)
-        )
+        region.begin(INFO, np.zeros((1, 192, 256), np.float32))
     assert region.drawn is not None and region.drawn.box == (20, 20, 180, 40)
 
 
@@ -365,9 +331,7 @@ def test_a_load_cell_that_is_missing_stays_so_while_it_is_tried_again(
 
     monkeypatch.setattr(load_preview, "open_load", missing)
     monkeypatch.setattr(load_preview, "RETRY_S", 0.01)
-    rig = tmp_path / "rig.toml"
-    draft = ConfigDraft(Config(), rig, {})
-    draft.change_all({"load.address": "/dev/one?protocol=ascii"})
+    draft = draft_of(tmp_path, load__address="/dev/one?protocol=ascii")
     preview = load_preview.LoadPreview(draft)
     preview.start()
     try:
@@ -385,9 +349,7 @@ def test_a_load_cell_that_is_not_open_yet_is_no_recorded_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A check between the choice of a cell and its opening is NO-GO; a cell that was open before is no excuse."""
-    rig = tmp_path / "rig.toml"
-    draft = ConfigDraft(Config(), rig, {})
-    draft.change_all({"load.address": "sim:"})
+    draft = draft_of(tmp_path, load__address="sim:")
     opening, go_on, real = threading.Event(), threading.Event(), load_preview.open_load
 
     def slow(address: str, *others: Any) -> Any:

@@ -159,7 +159,8 @@ def test_a_decimal_comma_in_german(browser: Any) -> None:
 
 def test_the_forms_of_scale_and_board_read_numbers_and_can_be_left(page: MadePage) -> None:
     page.step("gauges")
-    page.page.click("#board")
+    page.page.keyboard.press("b")
+    assert "inner corners" in page.text("hint")
     for name, text in (("columns", "8"), ("rows", "6,5"), ("square", "0.6 cm")):
         page.page.fill(f"#scale [name={name}]", text)
     page.page.click("#scale button:has-text('Apply')")

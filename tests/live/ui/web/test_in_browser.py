@@ -5,12 +5,10 @@ from __future__ import annotations
 import itertools
 import re
 import webbrowser
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
-import cv2
 import numpy as np
 import pytest
 
@@ -21,9 +19,9 @@ from live.setup.pictures import read_mask
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.web.authorization import RequestCheck
 from live.ui.web.page_controller import PageController
-from tests.live.setup.test_scale import CHARUCO, seen
 from tests.live.ui.waiting import until
 from tests.live.ui.web.browser import Page, Program
+from tests.live.ui.web.conftest import Begin, opened
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 WIDTH, HEIGHT = 480, 384
@@ -40,27 +38,6 @@ WATCH_LAYOUT = """() => { window.moved = [];
     .observe({ type: "layout-shift" }); }"""
 
 
-@pytest.fixture
-def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
-    """Starts ``phasedic`` in a folder of its own; whatever happens, it does not run on."""
-    programs: list[Program] = []
-
-    def begin(*words: str) -> Program:
-        programs.append(Program(tmp_path, *words))
-        return programs[-1]
-
-    yield begin
-    for program in programs:
-        program.kill()
-
-
-def opened(browser: Any, program: Program, **wanted: Any) -> Page:
-    context = browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US", **wanted)
-    page = Page(context.new_page())
-    page.goto(program.address)
-    return page
-
-
 def distance_to_path(points: list[list[float]]) -> np.ndarray:
     """Distance of each pixel to a path of the mouse, by brute force: many points on each segment."""
     y, x = np.mgrid[:HEIGHT, :WIDTH].astype(float)
@@ -71,10 +48,10 @@ def distance_to_path(points: list[list[float]]) -> np.ndarray:
     return nearest
 
 
-def test_from_nothing_to_a_report(browser: Any, tmp_path: Path, start: Callable[..., Program]) -> None:
+def test_from_nothing_to_a_report(browser: Any, tmp_path: Path, begin: Begin) -> None:
     words = ["page", "--camera", CAMERA, "--load", "sim:", "--no-view", "--no-rrd", "--page-port", "0"]
-    program = start(*words)
-    page = opened(browser, program)
+    program = begin(*words)
+    page = opened(browser, program.address)
     set_up(page, tmp_path)
     columns, rows = run(page, program)
     with open_run(tmp_path / "runs" / "specimen-1") as of:
@@ -89,17 +66,16 @@ def test_from_nothing_to_a_report(browser: Any, tmp_path: Path, start: Callable[
 
 
 def test_a_browser_comes_to_the_page_by_the_file_that_it_is_given(
-    browser: Any, start: Callable[..., Program], monkeypatch: pytest.MonkeyPatch
+    browser: Any, begin: Begin, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    program = start("page", "--camera", CAMERA, "--load", "sim:", "--no-view", "--no-rrd", "--page-port", "0")
+    program = begin("page", "--camera", CAMERA, "--load", "sim:", "--no-view", "--no-rrd", "--page-port", "0")
     given: list[str] = []
     monkeypatch.setattr(webbrowser, "open", lambda address: given.append(address) or True)
     monkeypatch.setenv("DISPLAY", ":99")
     screen, controller = TerminalScreen(quiet=True), SimpleNamespace(address=program.address)
     with page_opened(cast(PageController, controller), screen):
         until(lambda: given)
-        page = Page(browser.new_context().new_page())
-        page.goto(given[0])
+        page = opened(browser, given[0])
         page.until(lambda: bool(page.text("region")), "the specimen is found")
     assert page.page.url == program.address.partition("?")[0]
 
@@ -236,33 +212,14 @@ def after(page: Page, folder: Path) -> None:
     page.until(lambda: page.stage() == "gone", "it has ended")
 
 
-def test_the_scale_from_a_board(browser: Any, tmp_path: Path, start: Callable[..., Program]) -> None:
-    picture = seen(CHARUCO, 9.0)
-    (tmp_path / "shots").mkdir()
-    for k in range(300):
-        cv2.imwrite(str(tmp_path / "shots" / f"{k:03}.png"), picture)
-    program = start("page", "--camera", "files:shots?fps=10", "--roi", "all", "--page-port", "0")
-    page = opened(browser, program)
-    page.until(
-        lambda: page.page.evaluate("() => document.getElementById('live').naturalWidth > 0"), "a picture"
-    )
-    page.page.keyboard.press("b")
-    assert "inner corners" in page.text("hint")
-    for name, value in (("columns", 8), ("rows", 6), ("square", 6), ("marker", 4.5)):
-        page.page.fill(f"#scale [name={name}]", str(value))
-    page.page.click("#scale button")
-    page.until(lambda: page.text("scale").startswith("9.00 px/mm"), "the scale is shown")
-    assert page.text("answer") == "done ✓" and not page.errors
-
-
-def test_a_page_that_is_killed_changes_nothing(browser: Any, start: Callable[..., Program]) -> None:
+def test_a_page_that_is_killed_changes_nothing(browser: Any, begin: Begin) -> None:
     words = ["run", "--page", "--camera", CAMERA, "--load", "sim:", "--no-view", "--no-rrd", "--out", "out"]
-    program = start(*words)
-    page = opened(browser, program, color_scheme="dark")
+    program = begin(*words)
+    page = opened(browser, program.address, color_scheme="dark")
     page.until(lambda: page.page.get_attribute("#state", "data-word") == "measuring", "it measures")
     assert page.page.get_attribute("html", "data-theme") == "dark"
     page.page.context.close()
-    page = opened(browser, program, color_scheme="light")
+    page = opened(browser, program.address, color_scheme="light")
     page.until(
         lambda: page.stage() == "run" and any(map(str.isdigit, page.text("force"))), "another sees it too"
     )
@@ -278,10 +235,10 @@ def test_a_page_that_is_killed_changes_nothing(browser: Any, start: Callable[...
     assert "every frame is accounted for" in program.output and "STOPPED" not in program.output
 
 
-def test_another_site_gets_nothing(browser: Any, start: Callable[..., Program]) -> None:
+def test_another_site_gets_nothing(browser: Any, begin: Begin) -> None:
     """A page of another origin: its request carries no cookie, and is refused whatever it says."""
-    program = start("page", "--camera", CAMERA, "--page-port", "0")
-    page = opened(browser, program)
+    program = begin("page", "--camera", CAMERA, "--page-port", "0")
+    page = opened(browser, program.address)
     page.until(lambda: page.stage() == "setup", "it is there")
     port = int(program.address.partition("/?")[0].rpartition(":")[2])
     guard = RequestCheck(port, "x")

@@ -176,15 +176,8 @@ def test_a_recording_shows_force_strain_and_curve_of_one_instant(
     start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    recorded = [
-        "--camera",
-        CAMERA.format(seconds=12) + "&lockstep=yes",
-        "--load",
-        "sim:",
-        "--out",
-        "runs/bar",
-    ]
-    assert main(["run", *recorded, *OPTIONS[:-2]]) == 0
+    camera = CAMERA.format(seconds=12) + "&lockstep=yes"
+    assert main(["run", "--camera", camera, "--load", "sim:", "--out", "runs/bar", *OPTIONS[:-2]]) == 0
     page = start(load="none:")
     page.page.click("#step-camera > summary")
     for select in ("cameras", "loads"):

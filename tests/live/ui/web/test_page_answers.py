@@ -87,7 +87,6 @@ def test_each_stage_has_its_commands(at: PageController) -> None:
 
 
 def test_the_next_specimen_and_the_same_again(at: PageController, tmp_path: Path) -> None:
-    assert at.draft is not None
     at.draft.change_all({"metadata.specimen": "bar-009"})
     (tmp_path / "runs" / "bar-010").mkdir(parents=True)
     at.end({"figures": []})

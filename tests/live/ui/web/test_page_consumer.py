@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import time
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -21,52 +18,21 @@ from analysis.evaluate import GaugeValue
 from live.config.loading import Config, load_config
 from live.pipeline.consumer import Consumer
 from live.pipeline.measurement import Measurement
-from live.pipeline.run_state import RunState
 from live.stream.adapted import Adapted
-from live.stream.stream import Matched
-from live.ui.web.broadcaster import Broadcaster
+from live.ui.web.broadcaster import Broadcaster, plain
 from live.ui.web.map_view import RED, MapView, mark_saturated, plate_shapes, shrunk, traffic_light
 from live.ui.web.page_consumer import PageConsumer, elongation_length
 from live.ui.web.run_panels import MAX_POINTS, CurveHistory
-from tests.live.made_up import make_frame, make_measurement
-from tests.live.screens import StatedRun
 from tests.live.streaming import record_of
-from tests.live.ui.waiting import until
 from tests.live.ui.web.page_texts import STATIC
+from tests.live.ui.web.test_page_values import Run, pictured
 
 COLOURS = [("left", 3), ("right", 1)]
-
-
-def measurement() -> Measurement:
-    m = make_measurement(0)
-    return replace(m, burst=replace(m.burst, mean=make_frame(0, 0.0).image))
-
-
-class Received:
-    """The newest message of each kind that a page received."""
-
-    def __init__(self, broadcaster: Broadcaster) -> None:
-        stream = broadcaster.open()
-        assert stream is not None
-        self._stream = stream
-
-    def __getitem__(self, kind: str) -> object:
-        taken = self._stream.take(0)
-        assert taken is not None
-        return json.loads(taken[kind])
 
 
 @pytest.fixture
 def config() -> Config:
     return load_config(None, {"specimen.area_mm2": 40.0})
-
-
-class Run(StatedRun):
-    """Begun, and recording."""
-
-    def __init__(self, config: Config) -> None:
-        super().__init__(RunState.new(1.0, specimen=config.specimen))
-        self.run_state.health.state, self.run_state.health.began_t = "REC", 0.0
 
 
 def ready(consumer: PageConsumer) -> PageConsumer:
@@ -75,10 +41,12 @@ def ready(consumer: PageConsumer) -> PageConsumer:
 
 
 def test_the_state_of_a_run(config: Config) -> None:
-    broadcaster, run = Broadcaster(), Run(config)
-    received, consumer = Received(broadcaster), ready(PageConsumer(broadcaster, config, lambda: 1.5))
+    run, consumer = (
+        Run(config, state="REC", began_t=0.0),
+        ready(PageConsumer(Broadcaster(), config, lambda: 1.5)),
+    )
     consumer.attach(run)
-    m = measurement()
+    m = pictured()
     i = replace(
         m.time_step,
         gauges={"axial": GaugeValue(0.001, 2e-6, share=0.83), "b": GaugeValue(math.nan, math.nan, "lost")},
@@ -89,9 +57,7 @@ def test_the_state_of_a_run(config: Config) -> None:
         run.run_state.loads.append(LoadSample(t, force))
         run.run_state.health.loaded(t, force)
     consumer.event(Event(0.0, EventKind.DEVICE, "camera", "a \x1b[31mfault", "error"))
-    consumer.idle()
-    state = received["run"]
-    assert isinstance(state, dict)
+    state = plain(consumer.state())
     assert state["peak_N"] == 500 and state["axial"] == {"name": "axial", "assumed": ""}
     found = {name: (one["value"], one["sigma"]) for name, one in state["figures"].items()}
     assert found == {"force": (-400, None), "stress": (pytest.approx(-1e7), None), "axial": (0.001, 2e-6)}
@@ -108,12 +74,12 @@ def test_the_state_of_a_run(config: Config) -> None:
 def test_the_map_is_drawn_only_while_a_page_is_open(config: Config) -> None:
     broadcaster = Broadcaster()
     consumer = ready(PageConsumer(broadcaster, config))
-    consumer.measurement(measurement())
+    consumer.measurement(pictured())
     consumer.idle()
     assert consumer.picture == b""
     broadcaster.open()
     consumer.idle()
-    m = measurement()
+    m = pictured()
     picture = cv2.imdecode(np.frombuffer(consumer.picture, np.uint8), cv2.IMREAD_COLOR)
     assert picture.shape[:2] == m.burst.mean.shape
 
@@ -123,7 +89,7 @@ def test_another_map(config: Config) -> None:
     broadcaster.open()
     consumer = ready(PageConsumer(broadcaster, config))
     for name in ("exx", "e1", "u", "sigma", "status"):
-        consumer.measurement(measurement())
+        consumer.measurement(pictured())
         assert consumer.select_map({"of": name}) == ""
         before = consumer.state()["picture"]["n"]
         while consumer.state()["picture"]["n"] == before:
@@ -138,13 +104,11 @@ def test_points_are_bounded_and_a_page_gets_what_it_lacks() -> None:
     curve = CurveHistory(["t", "x"])
     for n in range(10):
         curve.add([n, n])
-    assert curve.since(0, 7) == {
-        "names": ["t", "x"],
-        "colours": [],
-        "edition": 0,
-        "first": 7,
-        "rows": [[7, 7], [8, 8], [9, 9]],
-    }
+    since = {"names": ["t", "x"], "colours": [], "edition": 0}
+    assert curve.since(0, 7) == since | {"first": 7, "rows": [[7, 7], [8, 8], [9, 9]]}
+    assert curve.since(1, 7) == since | {"first": 0, "rows": [[n, n] for n in range(10)]}, (
+        "of another edition"
+    )
     for n in range(10, 5 * MAX_POINTS):
         curve.add([n, n])
     edition, count = curve.position
@@ -155,35 +119,6 @@ def test_points_are_bounded_and_a_page_gets_what_it_lacks() -> None:
     assert times[0] == 0 and len(set(np.diff(times))) == 1 and times[-1] > 5 * MAX_POINTS - 20
 
 
-@pytest.fixture
-def worker(config: Config) -> Iterator[Adapted]:
-    broadcaster = Broadcaster()
-    for _ in range(8):
-        assert broadcaster.open() is not None
-    worker = Adapted(PageConsumer(broadcaster, config), lambda *told: pytest.fail(str(told)))
-    worker.start()
-    yield worker
-    worker.end()
-
-
-def costs_of(worker: Adapted, m: Measurement) -> list[float]:
-    """Time that each of many measurements takes of the thread that passes it on, s."""
-    costs = []
-    for _ in range(200):
-        began = time.thread_time()
-        worker.take(record_of(m))
-        worker.take(record_of(Matched(m)))
-        costs.append(time.thread_time() - began)
-        time.sleep(0.002)
-    return costs
-
-
-@pytest.mark.timed
-def test_eight_frozen_pages_cost_the_measuring_thread_under_a_millisecond(worker: Adapted) -> None:
-    """In thread time: other busy programs do not count."""
-    assert np.percentile(costs_of(worker, measurement()), 95) < 1e-3
-
-
 def test_a_failing_page_is_one_consumer_that_failed(config: Config) -> None:
     class Broken(PageConsumer):
         def measurement(self, measurement: Measurement) -> None:
@@ -192,69 +127,30 @@ def test_a_failing_page_is_one_consumer_that_failed(config: Config) -> None:
     told: list[tuple[str, str, bool]] = []
     worker = Adapted(Broken(Broadcaster(), config), lambda *said: told.append(said))
     worker.start()
-    worker.take(record_of(measurement()))
+    worker.take(record_of(pictured()))
     report = worker.end()
     assert report.failed and told[0][2] is False
     assert isinstance(Broken(Broadcaster(), config), Consumer)
 
 
-def drawn(consumer: PageConsumer, request: dict[str, object]) -> dict[str, Any]:
-    """The scale of the map after a request."""
-    assert consumer.select_map(request) == ""
-    consumer.measurement(measurement())
-    before = consumer.state()["picture"]["n"]
-    until(lambda: consumer.idle() and consumer.state()["picture"]["n"] > before)
-    return dict(consumer.state()["picture"])
-
-
-def test_the_range_of_a_map_and_its_histogram(config: Config) -> None:
-    broadcaster = Broadcaster()
-    broadcaster.open()
-    consumer = ready(PageConsumer(broadcaster, config))
-    field = measurement().field
-    values = field.value("eyy")[field.ok]
-    found = drawn(consumer, {"of": "eyy", "range": "automatic"})
-    assert found["low"] <= np.percentile(values, 1) and found["high"] >= np.percentile(values, 99)
-    assert found["strain"] and sum(found["histogram"]) == np.sum(
-        (values >= found["low"]) & (values <= found["high"])
-    )
-    found = drawn(consumer, {"of": "eyy", "range": "symmetric"})
-    assert found["low"] == -found["high"]
-    found = drawn(consumer, {"of": "eyy", "range": "fixed", "limit": 0.005})
-    assert (found["low"], found["high"]) == pytest.approx((-0.005, 0.005))
-
-
-def test_the_value_at_a_place_of_the_map(config: Config) -> None:
-    broadcaster = Broadcaster()
-    broadcaster.open()
-    consumer = ready(PageConsumer(broadcaster, config))
-    assert consumer.map.value_at(1, 1) == {"value": None, "status": "no ZOI is here"}
-    drawn(consumer, {"of": "eyy"})
-    m = measurement()
-    row, column = np.argwhere(m.field.ok)[3]
-    x, y = m.field.grid.x[column] + m.time_step.u, m.field.grid.y[row] + m.time_step.v
-    found = consumer.map.value_at(x + 0.3, y - 0.3)
-    assert found["value"] == pytest.approx(m.field.value("eyy")[row, column])
-    assert found["sigma"] == pytest.approx(m.field.sigma("eyy")[row, column])
-    assert consumer.map.value_at(-500, -500)["value"] is None
-
-
 def test_the_value_is_that_of_the_zoi_that_has_moved_to_the_place(config: Config) -> None:
-    m = measurement()
+    m = pictured()
     grid = m.field.grid
     x, y = np.meshgrid(grid.x, grid.y)
     field = StrainField.from_values(grid, {"dv_dy": 1e-5 * x + 3e-7 * y}, 1e-5)
     view = MapView(config)
+    assert view.value_at(1, 1) == {"value": None, "status": "no ZOI is here"}, "nothing is drawn yet"
     view.draw(replace(m, field=field, time_step=replace(m.time_step, u=20.0, v=-13.0)))
     for row, column in ((1, 2), (3, 4)):
         found = view.value_at(grid.x[column] + 20.0 + 5, grid.y[row] - 13.0 - 5)
         assert found["value"] == pytest.approx(1e-5 * grid.x[column] + 3e-7 * grid.y[row])
+        assert found["sigma"] == pytest.approx(field.sigma("eyy")[row, column])
     for off, there in ((7.9, True), (8.1, False)):  # half a step beyond the last centre
         assert (view.value_at(grid.x[-1] + 20.0 + off, grid.y[2] - 13.0)["value"] is not None) == there
 
 
 def test_a_map_that_is_chosen_while_another_is_drawn_is_the_next_one(config: Config) -> None:
-    view, m = MapView(config), measurement()
+    view, m = MapView(config), pictured()
     paint = view._maps.paint
 
     def painted(*given: Any) -> Any:
@@ -272,7 +168,7 @@ def test_a_map_that_is_chosen_while_another_is_drawn_is_the_next_one(config: Con
 
 def test_a_map_of_the_whole_test_has_its_value_with_sigma_and_unit() -> None:
     """And nothing before there is one."""
-    config, m = load_config(None, {"specimen.area_mm2": 40.0, "output.response": "stress"}), measurement()
+    config, m = load_config(None, {"specimen.area_mm2": 40.0, "output.response": "stress"}), pictured()
     view, grid = MapView(config), m.field.grid
     assert "compliance" in MapView(load_config(None, {})).choose("compliance", "automatic", None)
     assert view.choose("compliance", "automatic", None) == ""
@@ -291,12 +187,12 @@ def test_a_map_of_the_whole_test_has_its_value_with_sigma_and_unit() -> None:
 
 def test_a_recording_shows_figures_of_one_instant(config: Config) -> None:
     """Its load samples come far ahead of its pictures: the newest force is of another instant."""
-    broadcaster, run = Broadcaster(), Run(config)
+    broadcaster, run = Broadcaster(), Run(config, state="REC", began_t=0.0)
     run.live = False  # type: ignore[misc]
     consumer = ready(PageConsumer(broadcaster, config))
     consumer.attach(run)  # type: ignore[arg-type]
     run.run_state.health.recorded = True
-    m = measurement()
+    m = pictured()
     m = replace(m, time_step=replace(m.time_step, force=1234.0, latency_s=3.0))
     run.run_state.loads.append(LoadSample(1e3, -9999.0))
     run.run_state.health.loaded(1e3, -9999.0)
@@ -317,9 +213,12 @@ def test_a_gauge_has_its_stored_colour_and_the_force_the_range_of_its_cell() -> 
         for name, k in COLOURS
     }
     config = load_config(None, {"specimen.area_mm2": 40.0, **gauges})
-    run, consumer = Run(config), ready(PageConsumer(Broadcaster(), config, lambda: 0.5))
+    run, consumer = (
+        Run(config, state="REC", began_t=0.0),
+        ready(PageConsumer(Broadcaster(), config, lambda: 0.5)),
+    )
     consumer.attach(run)  # type: ignore[arg-type]
-    m = measurement()
+    m = pictured()
     m = replace(
         m, time_step=replace(m.time_step, gauges={name: GaugeValue(0.001, 2e-6) for name, _ in COLOURS})
     )
@@ -334,18 +233,6 @@ def test_a_gauge_has_its_stored_colour_and_the_force_the_range_of_its_cell() -> 
     run.run_state.health.load_range_N = 10e3
     limit = consumer.state()["figures"]["force"]["limit"]
     assert (limit["share"], limit["value"], limit["range"], limit["near"]) == (0.8, 10e3, True, False)
-
-
-def test_the_map_at_the_highest_force(config: Config) -> None:
-    consumer = ready(PageConsumer(Broadcaster(), config))
-    assert consumer.at_peak()["peak"] is None
-    for force, strain in ((100.0, 0.001), (-900.0, 0.002), (500.0, 0.003)):
-        m = measurement()
-        gauges = {"axial": GaugeValue(strain, 1e-6)}
-        consumer.matched(replace(m, time_step=replace(m.time_step, force=force, gauges=gauges)))
-    found = consumer.at_peak()
-    assert found["atpeak"] == "at the highest force" and found["gauges"][0]["value"] == 0.002
-    assert found["peak"]["width"] == measurement().burst.mean.shape[1] and consumer.picture
 
 
 def test_the_length_of_an_elongation() -> None:
@@ -378,7 +265,7 @@ def test_plates_are_drawn_beside_the_gauges_and_cannot_be_dragged() -> None:
     broadcaster = Broadcaster()
     broadcaster.open()
     consumer = ready(PageConsumer(broadcaster, config))
-    consumer.measurement(measurement())
+    consumer.measurement(pictured())
     consumer.idle()
     assert set(consumer.state()["picture"]["gauges"]) == {"axial", "plate left"}
 

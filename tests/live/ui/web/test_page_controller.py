@@ -78,7 +78,6 @@ def at(tmp_path: Path) -> Iterator[PageSession]:
 
 def test_set_up_changed_saved_and_started(at: PageSession, tmp_path: Path) -> None:
     session = at.controller.session
-    assert session is not None
     until(lambda: session.region.drawn is not None and bool(session.draft.config.gauges))
     assert set(session.draft.config.gauges) == {"extension", "width", "area"}, "placed, as the rig asks for"
     assert at.command("tare").startswith("no:") and at.command("next").startswith("no:")
@@ -107,26 +106,9 @@ def test_set_up_changed_saved_and_started(at: PageSession, tmp_path: Path) -> No
     }  # fmt: skip
     drawn = session.state()["gauges"]["long"]
     assert drawn["handles"] == ((60, 40), (60, 130)) and drawn["outline"][0] == [(60, 40), (60, 130)]
-    for wrong in (
-        {"kind": "spiral"},
-        {"kind": ["line"]},
-        {"points": [[1, "a"]]},
-        {"points": []},
-        {"points": None},
-    ):
-        assert at.change(do="gauge", **{"kind": "line", "points": [[1, 2], [3, 4]], **wrong}).startswith(
-            "no:"
-        )
-    assert at.change(do="gauge", name="long", was=["extension"], gauge=3).startswith("no:")
     assert at.change(do="gauge", name="long", gauge=None) == "ok"
-    assert at.change(do="set", key="measure.zoi", value=4).startswith("no:")
-    assert at.change(do="set", key="output.dir", value="/").startswith("no:")
     assert at.change(do="scale", points=[[10, 10], [110, 10]], mm=5) == "ok"
-    assert at.change(do="scale", points=[[10, 10], [10, 10]], mm=5).startswith("no:")
-    assert at.change(do="scale", points=[[10, 10], [110, 10**400]], mm=5).startswith("no:")
     assert at.change(do="scale", points=[[10, 10], [110, 10]], mm=True) == "no: a distance is a number"
-    board = {"do": "board", "columns": 5, "rows": 4}
-    assert at.change(**board, square=-1) == "no: a square in mm is a number from 0 to 100000"
     assert at.change(do="overlay", name="quality", on=True) == "ok"
     assert at.change(do="save") == "ok"
     saved = load_config(at.rig, {})
@@ -155,12 +137,8 @@ def test_two_cameras_are_set_up_checked_saved_and_started_together(tmp_path: Pat
             at.change(do="gauge", side="back", name="behind", kind="line", points=[[60, 40], [60, 130]])
             == "ok"
         )
-        assert at.change(do="set", side="back", key="specimen.width_mm", value=12.5) == "ok"
         assert at.change(do="set", side="back", key="measure.step", value=12) == "ok"
-        assert (front.draft.config.specimen.width_mm, back.state()["specimen"]["width_mm"]) == (12.5, 12.5)
-        assert (front.draft.config.measure.step, back.draft.config.measure.step) == (16, 12)
         assert at.change(do="load", side="back", value="sim:") == "ok"
-        assert front.draft.config.load.address == "sim:" and back.state()["load"]["address"] == "sim:"
         pictures = {side: fetch(at.controller.server, f"/mask?side={side}").body for side in sessions.by_name}
         assert pictures["front"] != pictures["back"]
         assert at.change(do="check") == "ok"
@@ -170,30 +148,20 @@ def test_two_cameras_are_set_up_checked_saved_and_started_together(tmp_path: Pat
         assert at.change(do="save") == "ok"
         own = load_config(tmp_path / "rig-back.toml", {})
         assert load_config(at.rig, {}).camera.back == str(tmp_path / "rig-back.toml")
-        assert (own.camera.address, own.measure.zoi, own.measure.step) == (
-            f"{CAMERA}&side=back&seed=3",
-            32,
-            12,
-        )
+        assert (own.camera.address, own.measure.step) == (f"{CAMERA}&side=back&seed=3", 12)
         assert own.measure.roi == (20, 20, 181, 151) and "behind" in own.gauges
         assert at.command("start") == "ok"
         config, others = at.has_ended(), at.controller.others
         assert config is not None and len(others) == 1
         configs = camera_configs(config, {}, others)
         assert configs["back"].measure.roi == (20, 20, 181, 151) and configs["back"].load.address == "sim:"
-        assert configs["back"].specimen.width_mm == 12.5 and configs["front"].measure.roi != (
-            20,
-            20,
-            180,
-            150,
-        )
+        assert configs["front"].measure.roi != (20, 20, 180, 150)
     finally:
         at.end()
 
 
 def test_a_camera_setting_that_is_refused_leaves_the_camera_as_it_was(at: PageSession) -> None:
     session = at.controller.session
-    assert session is not None
     until(lambda: session.preview.info is not None)
     assert at.change(do="camera", key="exposure_us", value=3000) == "ok"
     assert session.preview.info is not None and session.preview.info.exposure_s == pytest.approx(3e-3)
@@ -301,7 +269,6 @@ def test_a_check_begun_before_the_first_frame_of_a_recording_gets_its_frames(tmp
 
 def test_a_zero_taken_in_the_set_up_holds_in_the_test(at: PageSession) -> None:
     session = at.controller.session
-    assert session is not None
     assert at.change(do="tare").startswith("no: not tared"), "there is no load cell"
     assert at.change(do="untare") == "no: there is no tare to undo"
     assert at.change(do="load", value="sim:?noise_N=0.5") == "ok"
@@ -319,11 +286,10 @@ def test_a_zero_taken_in_the_set_up_holds_in_the_test(at: PageSession) -> None:
 
 
 @pytest.mark.parametrize(
-    "address", ["sim:?width=wide", "a\x00b", "", 3, "x" * 600, "files:/no/such", "/dev/video99"]
+    "address", ["sim:?width=wide", "a\x00b", "", 3, "x" * 600, "files:/no/such", "/dev/video99", "nonsense:1"]
 )
 def test_a_bad_address_is_refused_in_words(at: PageSession, address: Any) -> None:
     session = at.controller.session
-    assert session is not None
     before = session.draft.config.camera.address
     answer = at.change(do="address", value=address)
     assert (

@@ -16,7 +16,6 @@ from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster, plain
 from live.ui.web.map_view import MapView
 from live.ui.web.page_consumers import PageConsumers
-from live.ui.web.run_panels import CurveHistory
 from tests.live.made_up import make_grid
 from tests.live.ui.web.test_page_values import Run, pictured
 
@@ -139,17 +138,3 @@ def test_pages_are_limited_and_a_closed_broadcaster_takes_none() -> None:
     assert pages[1].take(0) == {"a": b"2", "b": b"3"} and pages[1].take(0) is None
     broadcaster.remove(pages[1])
     assert broadcaster.open() is None
-
-
-def test_a_page_of_another_edition_gets_all_rows() -> None:
-    curve = CurveHistory(["t"])
-    for n in range(3):
-        curve.add([n])
-    assert curve.position == (0, 3)
-    assert curve.since(1, 2) == {
-        "names": ["t"],
-        "colours": [],
-        "edition": 0,
-        "first": 0,
-        "rows": [[0], [1], [2]],
-    }

@@ -192,10 +192,12 @@ def test_a_point_of_the_curves_is_si_and_counts_from_the_first() -> None:
 @pytest.mark.parametrize(
     ("forces", "strain", "words"),
     [((math.nan, math.nan), 2e-3, "at the end"), ((5.0, 5.0), 2e-3, "at the highest force"),
-     ((5.0, 4.0), 1e-3, "at the highest force"), ((5.0, math.nan), 1e-3, "at the highest force")],
+     ((5.0, 4.0), 1e-3, "at the highest force"), ((5.0, math.nan), 1e-3, "at the highest force"),
+     ((100.0, -900.0, 500.0), 2e-3, "at the highest force")],
 )  # fmt: skip
-def test_the_map_after_the_test(forces: tuple[float, float], strain: float, words: str) -> None:
+def test_the_map_after_the_test(forces: tuple[float, ...], strain: float, words: str) -> None:
     consumer = PageConsumer(Broadcaster(), load_config(None, {}), side="front")
+    assert consumer.at_peak()["peak"] is None
     for k, force in enumerate(forces):
         gauges = {"axial": GaugeValue(1e-3 * (k + 1), 1e-6)}
         consumer.matched(pictured(k, force=force, gauges=gauges))

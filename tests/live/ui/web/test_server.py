@@ -194,15 +194,6 @@ def test_a_page_gets_the_newest_message_first(page: PageServer) -> None:
         assert events.fp.readline() == b'data: {"n":2,"nan":null}\n'
 
 
-def test_a_frozen_page_delays_nothing() -> None:
-    broadcaster = Broadcaster()
-    frozen = [broadcaster.open() for _ in range(MAX_PAGES)]
-    for number in range(1000):
-        broadcaster.publish("state", number)
-    assert broadcaster.open() is None
-    assert [one.take(0) for one in frozen if one] == [{"state": b"999"}] * MAX_PAGES
-
-
 def connected(page: PageServer, text: bytes) -> socket.socket:
     """A connection that has sent this."""
     opened = socket.create_connection(("127.0.0.1", page.access.port), timeout=LONG_S)
@@ -259,18 +250,9 @@ def test_connections_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_nothing_is_printed_whatever_comes(page: PageServer, capfd: pytest.CaptureFixture[str]) -> None:
     sent = [
-        b"",
-        b"\x00" * 500,
-        b"GET\r\n\r\n",
-        b"GET / HTTP/9.9\r\n\r\n",
-        b"A" * 70_000,
-        post_head(page, 900) + b"{",
-    ]
-    sent += [
-        b"GET /picture HTTP/1.1\r\nHost: evil\r\n\r\n",
-        b"POST /order HTTP/1.1\r\n\r\n",
-        post_head(page, 2),
-    ]
+        b"", b"\x00" * 500, b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"A" * 70_000, post_head(page, 900) + b"{",
+        b"GET /picture HTTP/1.1\r\nHost: evil\r\n\r\n", b"POST /order HTTP/1.1\r\n\r\n", post_head(page, 2),
+    ]  # fmt: skip
     for text in sent:
         opened = connected(page, b"")
         opened.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # reset, not closed

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from acquire.errors import ConfigError, DataError
-from acquire.frame import CameraInfo, Frame, frozen
+from acquire.frame import Frame, frozen
 from live.config.gauges import with_colours
 from live.config.loading import load_config
 from live.setup.pictures import read_mask
@@ -25,10 +25,7 @@ from live.ui.web.setup.draft_changes import CHANGES
 from live.ui.web.setup.setup_session import SetupSession, SetupSessions
 from live.ui.web.setup.specimen_region import DrawnRegion, SpecimenRegion
 from tests.live.made_up import make_grid
-from tests.live.ui.web.test_setup_values import draft_of, figures
-
-INFO = CameraInfo("sim:", "sim", 256, 192, 12, True, "host")
-
+from tests.live.ui.web.test_setup_values import INFO, draft_of, figures
 
 # -- drafts ---------------------------------------------------------------------------------------
 
@@ -154,6 +151,13 @@ def test_settings_of_the_camera_are_in_its_address(session: SetupSession) -> Non
         ("set", {"key": "specimen.width_mm", "value": -1}, "specimen.width_mm"),
         ("scale", {"points": [[1, 2], [50, 2]], "mm": "10"}, "a distance is a number"),
         ("overlay", {"name": "x", "on": True}, "the overlays are saturated, quality"),
+        ("scale", {"points": [[9, 9], [9, 9]], "mm": 3}, "more than 1 px apart"),
+        ("scale", {"points": [[9, 9], [10**400, 9]], "mm": 3}, "two points"),
+        ("board", {"columns": 5, "rows": 4, "square": -1}, "a square in mm is a number from 0 to 100000"),
+        ("gauge", {"kind": ["line"], "points": [[1, 2], [3, 4]]}, "kind"),
+        ("gauge", {"kind": "line", "points": [[1, "a"]]}, "1 to 100 points"),
+        ("gauge", {"kind": "line", "points": None}, "1 to 100 points"),
+        ("gauge", {"name": "long", "was": ["a"], "gauge": 3}, "gauge"),
         ("draw", {"strokes": []}, "strokes are a list"), ("draw", {"strokes": [{}] * 501}, "strokes are a list"),
         ("draw", {"strokes": ["a"]}, "a stroke has"), ("scale", {"points": [[1, 2]], "mm": 3}, "two points"),
     ):  # fmt: skip

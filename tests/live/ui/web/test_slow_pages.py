@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,31 +14,18 @@ import pytest
 
 from live.config.loading import load_config
 from live.stream.adapted import Adapted
+from live.stream.stream import Matched
 from live.ui.web.broadcaster import MAX_PAGES
 from live.ui.web.page_controller import PageController
+from tests.live.streaming import record_of
 from tests.live.ui.waiting import until
 from tests.live.ui.web.browser import Program
 from tests.live.ui.web.http_page import HttpPage
-from tests.live.ui.web.test_page_consumer import costs_of, measurement
+from tests.live.ui.web.test_page_values import pictured
 
 ROOT = Path(__file__).parents[4]
 CAMERA = "sim:uniform?width=256&height=192&fps=20&seconds=5"
-RUN = [
-    "run",
-    "--page",
-    "--camera",
-    CAMERA,
-    "--load",
-    "sim:",
-    "--no-view",
-    "--no-rrd",
-    "--out",
-    "out",
-    "--zoi",
-    "32",
-    "--burst",
-    "2",
-]
+RUN = f"run --page --camera {CAMERA} --load sim: --no-view --no-rrd --out out --zoi 32 --burst 2".split()
 TIMINGS = ("latency_s", "kernel_s")  # of the machine, not of the specimen
 
 
@@ -96,7 +84,7 @@ def test_pages_that_are_killed_or_do_not_read_change_no_result(program: Program,
 @pytest.mark.timed
 def test_eight_pages_that_do_not_read_cost_under_a_millisecond_a_measurement() -> None:
     """In the time of the thread that measures: another busy program is not the page's doing."""
-    config, m = load_config(None, {}), measurement()
+    config, m, costs = load_config(None, {}), pictured(), []
     with PageController(None, port=0) as controller:
         watching = controller.begin({"": config})[""]
         worker = Adapted(watching, lambda *told: pytest.fail(str(told)))
@@ -105,7 +93,12 @@ def test_eight_pages_that_do_not_read_cost_under_a_millisecond_a_measurement() -
         streams = list(controller._broadcaster._subscribers)
         controller._broadcaster.publish("large", "x" * 200_000)
         until(lambda: all(stream._waiting for stream in streams))  # they are blocked
-        costs = costs_of(worker, m)
+        for _ in range(200):
+            began = time.thread_time()
+            worker.take(record_of(m))
+            worker.take(record_of(Matched(m)))
+            costs.append(time.thread_time() - began)
+            time.sleep(0.002)
         assert len(streams) == MAX_PAGES and all(stream._waiting for stream in streams)
         worker.end()
         for page in pages:

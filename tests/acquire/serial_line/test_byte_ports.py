@@ -1,4 +1,4 @@
-"""Ports as bytes: limits of a read, and terminal servers by RFC 854 and 2217."""
+"""Ports as bytes: limits of a read, TCP connections, and terminal servers by RFC 854 and 2217."""
 
 from __future__ import annotations
 
@@ -6,10 +6,21 @@ import socket
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from acquire.errors import DeviceError
-from acquire.serial_line.byte_ports import Rfc2217Port, Telnet, TtyPort, line_settings, setting
+from acquire.serial_line import byte_ports
+from acquire.serial_line.byte_ports import (
+    TcpPort,
+    Telnet,
+    TtyPort,
+    escaped,
+    line_settings,
+    setting,
+)
 from acquire.serial_line.ports import LineSettings, open_port
+from tests.adversary.peers import LINE, Rfc2217Peer, paced
 
 
 class Waiting:
@@ -36,6 +47,42 @@ class Waiting:
 def test_a_read_takes_no_more_than_it_may(wait: bool) -> None:
     port = TtyPort(Waiting(b"123456789"))
     assert [port.receive(4, wait=wait) for _ in range(4)] == [b"1234", b"5678", b"9", b""]
+
+
+@pytest.fixture
+def ends(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[TcpPort, socket.socket]]:
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        port = TcpPort("127.0.0.1", listening.getsockname()[1], 0.01)
+        end, _ = listening.accept()
+        yield port, end
+        end.close()
+        port.close()
+
+
+def test_a_connection_gives_what_is_there_up_to_the_limit(ends: tuple[TcpPort, socket.socket]) -> None:
+    port, end = ends
+    assert port.receive(10) == b"" and port.receive(10, wait=False) == b""
+    end.sendall(b"1234567")
+    assert port.receive(4) + port.receive(4) == b"1234567"
+    port.wake()
+    end.sendall(b"8")
+    assert port.receive(4) == b"8", "woken, and something has come"
+    port.write(b"command")
+    assert end.recv(100) == b"command"
+    option = port._socket.getsockopt
+    assert option(socket.IPPROTO_TCP, socket.TCP_NODELAY) and option(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
+
+
+def test_a_peer_that_takes_nothing_is_gone(
+    ends: tuple[TcpPort, socket.socket], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(byte_ports, "WRITE_S", 0.01)
+    with pytest.raises(TimeoutError, match="the other side takes no commands"):
+        ends[0].write(bytes(1 << 26))
+
+
+def test_a_wait_lasts_as_long_as_the_address_says() -> None:
+    assert (byte_ports.CONNECT_S, byte_ports.WRITE_S) == (3.0, 0.5)
 
 
 def command(number: int, *value: int) -> bytes:
@@ -91,6 +138,39 @@ def test_options_are_agreed_to_or_refused(sent: bytes, willing: bool, reply: byt
     telnet = Telnet()
     assert telnet.feed(sent) == b""
     assert (telnet.willing, telnet.take_replies()) == (willing, reply)
+
+
+@given(data=st.binary(max_size=300), cuts=st.lists(st.integers(1, 40), min_size=1, max_size=20))
+def test_escaped_data_comes_back_however_it_is_cut(data: bytes, cuts: list[int]) -> None:
+    telnet, sent, out = Telnet(), escaped(data), bytearray()
+    while sent:
+        size = cuts[len(sent) % len(cuts)]
+        out += telnet.feed(sent[:size])
+        sent = sent[size:]
+    assert bytes(out) == data
+
+
+@given(
+    data=st.lists(st.sampled_from([b"\xff", b"\xfa", b"\xf0", b"\xfb", b"\x2c", b"\xfd", b"1"]), max_size=400)
+)
+def test_no_server_makes_it_grow_or_fail(data: list[bytes]) -> None:
+    telnet = Telnet()
+    for byte in data:
+        telnet.feed(byte)
+    assert len(telnet.replies) <= 3 * 512 and len(telnet._begun) <= 64
+
+
+def test_a_negotiation_without_end_is_let_go() -> None:
+    telnet = Telnet()
+    telnet.feed(b"\xff\xfa" + b"x" * 100_000)
+    assert len(telnet._begun) <= 64
+    assert telnet.feed(b"1 N\r\n").endswith(b"1 N\r\n")
+
+
+def test_offers_are_answered_once() -> None:
+    telnet = Telnet()
+    telnet.feed(b"\xff\xfd\x18" * 50 + b"\xff\xfb\x01" * 50)
+    assert telnet.take_replies() == b"\xff\xfc\x18\xff\xfe\x01"
 
 
 OFFER = b"\xff\xfb\x2c\xff\xfd\x2c\xff\xfb\x00\xff\xfd\x00\xff\xfd\x03"
@@ -157,10 +237,20 @@ def test_a_terminal_server_gets_the_offer_the_line_and_data_with_every_255_doubl
 def test_a_server_that_does_not_answer_is_named(
     answers: bytes, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("acquire.serial_line.byte_ports.CONNECT_S", 0.02)
+    monkeypatch.setattr(byte_ports, "CONNECT_S", 0.02)
     made = Server(answers, monkeypatch)
+    url = f"rfc2217://127.0.0.1:{made.number}"
     with pytest.raises(DeviceError) as caught:
-        Rfc2217Port("127.0.0.1", made.number, line_settings(9600, 8, "N", 1), 0.1)
-    assert str(caught.value) == f"the other side {words}"
+        open_port(LineSettings(url))
+    assert str(caught.value) == f"{url}: the other side {words}"
     made.end.close()
     made.listening.close()
+
+
+def test_a_server_of_pyserial_gives_its_lines() -> None:
+    with Rfc2217Peer(paced(200.0)) as peer:
+        port = open_port(LineSettings(peer.url, 19200, 7, "E"))
+        heard = b"".join(port.receive(100) for _ in range(20))
+        port.write(b"\xff")
+        port.close()
+    assert LINE * 3 in heard
