@@ -23,6 +23,7 @@ from acquire.events import EventSink, device_event
 from acquire.files.headers import quantisation
 from acquire.files.picture import GRAYS, WEBCAM_WARNING, check_regular, is_utf8, to_gray
 from acquire.frame import QUANTISATION, CameraInfo, Frame, frozen
+from acquire.opencv.fields import rows_apart
 from acquire.settings import choice, number, read_settings, setting, whole
 from acquire.text import Message
 
@@ -38,6 +39,7 @@ _AS_JPEG = ("mjpg", "jpeg", "mjpa", "avrn")
 _COLOURED = 8.0
 _HEAD = 1 << 20  # bytes, with the tables of the first picture
 _COUNTED = ((0, b"RIFF"), (4, b"ftyp"))  # containers with the number of frames; others have but a duration
+_ROWS_EVERY, _ROWS_APART_PX = 4, 0.05  # pictures of which one is looked at; motion that is torn
 _MOST_COUNTED = 50_000_000  # bytes that are read through to count frames
 
 
@@ -78,7 +80,7 @@ class VideoFile(CameraBase):
             raise DataError(
                 "{path}: not a video that can be read, or cut off; try to play or convert it", path
             )
-        self._promised = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        self._promised, self._torn = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT)), 0
         self._fps = settings.fps or self._capture.get(cv2.CAP_PROP_FPS) or 25.0
         code = _fourcc(int(self._capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF)
         inter_frame = code.lower() not in INTRA
@@ -125,7 +127,10 @@ class VideoFile(CameraBase):
                 t = index / self._fps
             else:
                 t = stamp if stamp > t or index == 0 else t + 1 / self._fps
-            yield Frame(frozen(self._grey(picture, index)), index, t, "nominal", 0, 8, stamp)
+            image = self._grey(picture, index)
+            if index % _ROWS_EVERY == 1:
+                self._look_at_rows(image, index)
+            yield Frame(frozen(image), index, t, "nominal", 0, 8, stamp)
             index += 1
 
     def _is_grey(self, cv2: Any) -> bool:
@@ -157,6 +162,20 @@ class VideoFile(CameraBase):
         if image.shape != (self.info.height, self.info.width):
             raise DataError("{path}: frame {index} is of another size than the first", self._path, index)
         return image
+
+    def _look_at_rows(self, image: NDArray[Any], index: int) -> None:
+        """A warning, once, where odd and even rows are apart in two of the pictures that are looked at."""
+        self._torn += (apart := rows_apart(image)) > _ROWS_APART_PX
+        if self._torn == 2:
+            self._torn += 1
+            text = Message(
+                "{path}: interlaced: odd and even rows are {apart:.2f} px apart in picture {number}; what moves is "
+                "torn, take one field alone",
+                self._path,
+                apart,
+                index + self._settings.first,
+            )
+            device_event(self._on_event, self._address, text)
 
     def _count(self) -> int | None:
         """Frames of the file; None where only their number times their duration is known, and it is large."""

@@ -22,6 +22,8 @@ from acquire.frame import QUANTISATION
 from acquire.opencv.image_metadata import taken_times
 from acquire.opencv.images import find_images, picture_names, picture_times
 from acquire.opencv.video import FILM_WARNING
+from hw_mocks.deformation import Affine
+from hw_mocks.speckle import Speckle
 
 
 def picture(shape: tuple[int, int] = (12, 16), dtype: type = np.uint8) -> NDArray[Any]:
@@ -195,6 +197,22 @@ def test_a_film_of_more_than_8_bits_is_named(tmp_path: Path) -> None:
         assert [text.partition(",")[0] for text in camera.info.warnings] == ["film of 16 bits"], "it is grey"
     with open_camera(f"video:{film(tmp_path / 'b.mkv', 'FFV1')}") as camera:
         assert camera.info.warnings == (WEBCAM_WARNING,)
+
+
+@pytest.mark.parametrize("fields", [0.0, 0.5])
+def test_an_interlaced_film_is_named_once(tmp_path: Path, fields: float) -> None:
+    """``fields``: time between odd and even rows over that between pictures."""
+    speckle, told, size = Speckle((96, 128), radius=2.0, seed=5), list[Event](), (128, 96)
+    path = tmp_path / "a.avi"
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"MJPG"), 25, size)
+    for k in range(12):
+        early, late = (255 * speckle.render(Affine(0.1 * t, 0.3 * t), (96, 128)) for t in (k, k + fields))
+        picture = np.where(np.arange(96)[:, None] % 2, late, early)
+        writer.write(np.repeat(np.rint(picture).astype(np.uint8)[:, :, None], 3, axis=2))
+    writer.release()
+    with open_camera(f"video:{path}", told.append) as camera:
+        assert len(list(camera)) == 12
+    assert ["rows are 0.1" in event.text for event in told] == [True] * bool(fields)
 
 
 @pytest.mark.parametrize(("code", "name"), [("FFV1", "a.mkv"), ("VP80", "a.webm")])
