@@ -105,7 +105,7 @@ def test_missing_and_binary_files(tmp_path: Path) -> None:
         load_config(tmp_path / "none.toml", {})
     binary = tmp_path / "b.toml"
     binary.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ConfigError, match="cannot be read"):
+    with pytest.raises(ConfigError, match="is no text in UTF-8; save it so in an editor"):
         load_config(binary, {})
 
 
