@@ -186,6 +186,7 @@ FIGURES = (
        kind="strain"),
     _F("sigma_axial", "its standard uncertainty", "", "axial.sigma", output=4, kind="strain"),
     _F("strain_rate", "rate of axial over the last second, 1/s", "", "values", output=5),
+    _F("sigma_strain_rate", "its standard uncertainty, from the scatter", "", "values"),
     _F("age_s", "age of the strains", "", "axial.age", output=6),
     _F("state", "of the strains: live, old, unknown, not yet, paused, ended", "", "state", output=7),
     _F("stress_MPa", "force over the area of the section", "", "stress.value", output=9, load=True),

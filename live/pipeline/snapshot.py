@@ -81,7 +81,7 @@ class ChannelValues:
         if measurement is not None and step is not None:
             values |= {name: getattr(step, of) for name, of in _CHANNELS_OF_STEP.items()}
             values |= {name: getattr(measurement.burst, of) for name, of in _OF_BURST.items()}
-            values["strain_rate"] = self._rate(step.t, now.figure(AXIAL).value)
+            values["strain_rate"], values["sigma_strain_rate"] = self._rate(step.t, now.figure(AXIAL).value)
             for name in (f"gauge_{gauge}" for gauge in step.gauges):
                 figure = now.figure(name)
                 values |= {name: figure.value, f"sigma_{name}": figure.sigma}
@@ -92,19 +92,24 @@ class ChannelValues:
         """The channels that are words, of the last reading."""
         return {"state": str(self.now.figure(AXIAL).state), "force_state": str(self.now.figure(FORCE).state)}
 
-    def _rate(self, t: float, axial: float) -> float:
-        """The slope of the least-squares line through the last second, three points or more."""
+    def _rate(self, t: float, axial: float) -> tuple[float, float]:
+        """The slope of the least-squares line through the last second, three points or more, and its sigma.
+
+        Sigma is of the scatter about the line, so that a rate that changes within the second has a larger one.
+        """
         if math.isnan(axial):
-            return math.nan
+            return math.nan, math.nan
         if not self._recent or t > self._recent[-1][0]:
             self._recent.append((t, axial))
         while len(self._recent) > 3 and self._recent[0][0] < t - RATE_S:
             self._recent.popleft()
-        if len(self._recent) < 3:
-            return math.nan
-        mean_t = math.fsum(at for at, _ in self._recent) / len(self._recent)
+        if (n := len(self._recent)) < 3:
+            return math.nan, math.nan
+        mean_t, mean_e = (math.fsum(column) / n for column in zip(*self._recent, strict=True))
         spread = math.fsum((at - mean_t) ** 2 for at, _ in self._recent)
-        return math.fsum((at - mean_t) * e for at, e in self._recent) / spread if spread > 0 else math.nan
+        slope = math.fsum((at - mean_t) * e for at, e in self._recent) / spread
+        left = math.fsum((e - mean_e - slope * (at - mean_t)) ** 2 for at, e in self._recent)
+        return slope, math.sqrt(left / (n - 2) / spread)
 
 
 FORCE, STRESS, AXIAL, BURST, FPS, DISK = "force", "stress", "axial", "burst", "fps", "disk"

@@ -106,7 +106,7 @@ class PageConsumer(Consumer):
         self._start_t = now()
         self._t0 = math.nan
         self._channels: ChannelValues | None = None
-        self._rate = math.nan
+        self._rate = (math.nan, math.nan)  # and its sigma
         self._elongation_gauge, self._length_mm = elongation_length(config)
         self._due = {"state": 0.0, "picture": 0.0}
 
@@ -149,7 +149,8 @@ class PageConsumer(Consumer):
         self.curve.add([i.t - self._t0, stress, axial, *strains])
         self._limits.add(i.t, {FORCE: i.force, STRESS: stress, AXIAL: axial})
         if self._channels is not None:
-            self._rate = self._channels.read(measurement)["strain_rate"]
+            read = self._channels.read(measurement)
+            self._rate = read["strain_rate"], read["sigma_strain_rate"]
         # The measurement at the force of largest magnitude; without a force the last one.
         force = measurement.time_step.force
         self._peak_N = peak_force(self._peak_N, force)
@@ -244,7 +245,7 @@ class PageConsumer(Consumer):
             "figures": {name: self._figure(s, name) for name in (FORCE, STRESS, AXIAL)},
             "troubles": [printable(text) for text in s.troubles],
             "peak_N": s.peak_N,
-            "strain_rate": self._rate if s.figure(BURST).known else math.nan,
+            "strain_rate": self._rate if s.figure(BURST).known else None,
             "elongation_mm": self._elongation(s),
             "points": self.curve.position,
             "picture": {

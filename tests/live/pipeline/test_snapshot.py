@@ -7,6 +7,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from acquire.load_sample import LoadSample
@@ -172,7 +173,7 @@ def test_every_channel_has_the_value_of_its_name() -> None:
     )  # fmt: skip
     read = values().read(replace(m, time_step=step))
     assert set(read) == {*MEASURED_CHANNELS, "gauge_left", "sigma_gauge_left", "more"}
-    assert math.isnan(read.pop("strain_rate"))
+    assert math.isnan(read.pop("strain_rate")) and math.isnan(read.pop("sigma_strain_rate"))
     assert [math.isnan(read.pop(name)) for name in CYCLE_CHANNELS] == [True] * 5
     assert (read.pop("age_s"), read.pop("force_age_s")) == (pytest.approx(0.1), pytest.approx(0.3))
     wanted = {
@@ -191,6 +192,15 @@ def test_the_rate_needs_three_instants_and_looks_back_a_second() -> None:
     assert rates[2:5] == pytest.approx([0.0, 0.0, 0.0], abs=1e-15)
     assert 0 < rates[5] < rates[6] < rates[7] < 1e-3
     assert rates[8:] == pytest.approx([1e-3] * 5)
+
+
+def test_the_sigma_of_the_rate_is_that_of_the_scatter() -> None:
+    rng, asked, step = np.random.default_rng(3), values(), 1 / 30
+    read = [asked.read(at(k * step, 2e-5 * k * step + rng.normal(0, 5e-6))) for k in range(3000)]
+    off = [(one["strain_rate"] - 2e-5) / one["sigma_strain_rate"] for one in read[40::31]]
+    assert np.std(off) == pytest.approx(1.0, abs=0.15) and len(off) > 90
+    usual = np.median([one["sigma_strain_rate"] for one in read[40:]])
+    assert usual == pytest.approx(5e-6 / math.sqrt(31 * (31**2 - 1) / 12) / step, rel=0.03)
 
 
 def test_of_slow_measurements_three_make_a_rate_and_a_lost_one_has_none() -> None:

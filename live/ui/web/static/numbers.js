@@ -84,12 +84,14 @@ export function time(seconds) {
   return `${hours ? `${hours}:` : ""}${two(Math.floor(whole / 60) % 60)}:${two(whole % 60)}`;
 }
 
-// 2.5·10⁻⁴: one form for all rates.
-export function powered(value) {
-  if (value === 0) return "0";
-  const power = Math.floor(Math.log10(Math.abs(value)));
+// 2.5·10⁻⁴, or (2.5 ± 0.3)·10⁻⁴: one form for all rates.
+export function powered(value, sigma = 0) {
+  const most = Math.max(Math.abs(value), sigma);
+  if (most === 0) return "0";
+  const power = Math.floor(Math.log10(most)), one = 10 ** power;
   const above = [...String(power)].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("");
-  return `${fixed(value / 10 ** power, 1)}·10${above}`;
+  const text = sigma < 0.05 * one ? fixed(value / one, 1) : `(${fixed(value / one, 1)} ± ${fixed(sigma / one, 1)})`;
+  return `${text}·10${above}`;
 }
 
 // As short as four digits allow, without an exponent for what a person reads.

@@ -65,7 +65,7 @@ function show(value) {
   if (!$("pause").classList.contains("armed")) put(word, t(word.dataset.t));
   showFigures(value);
   put($("elongation"), value.elongation_mm == null ? "–" : fixed(value.elongation_mm, 4));
-  put($("strainrate"), value.strain_rate == null ? "–" : powered(value.strain_rate));
+  put($("strainrate"), value.strain_rate?.[0] == null ? "–" : powered(...value.strain_rate));
   showGauges(value);
   showSides(value.sides);
   showMachine(value);
