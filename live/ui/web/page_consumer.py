@@ -17,7 +17,7 @@ from acquire.clock import Clock
 from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
-from acquire.text import Message
+from acquire.text import Amount, Message
 from acquire.text.message import printable, share_text
 from analysis.evaluate import ExtensionGauge, LineGauge
 from live.config.gauges import complete_gauges, gauge_colours
@@ -107,7 +107,7 @@ class PageConsumer(Consumer):
         self._t0 = math.nan
         self._channels: ChannelValues | None = None
         self._rate = (math.nan, math.nan)  # and its sigma
-        self._elongation_gauge, self._length_mm = elongation_length(config)
+        self._elongation_gauge, self._length_mm, self._length_share = elongation_length(config)
         self._due = {"state": 0.0, "picture": 0.0}
 
     def attach(
@@ -246,7 +246,7 @@ class PageConsumer(Consumer):
             "troubles": [printable(text) for text in s.troubles],
             "peak_N": s.peak_N,
             "strain_rate": self._rate if s.figure(BURST).known else None,
-            "elongation_mm": self._elongation(s),
+            "elongation": self._elongation(s),
             "points": self.curve.position,
             "picture": {
                 "n": self._shown,
@@ -274,11 +274,13 @@ class PageConsumer(Consumer):
             limit = self._limits.of_range(figure.value, self._running.run_state.health.load_range_N)
         return shown(figure) | {"limit": limit}
 
-    def _elongation(self, s: Snapshot) -> float | None:
+    def _elongation(self, s: Snapshot) -> Amount | None:
         if self._length_mm is None:
             return None
-        name = f"gauge_{self._elongation_gauge}"
-        return self._length_mm * s.figure(name if name in s.figures else AXIAL).value
+        name, length_m = f"gauge_{self._elongation_gauge}", 1e-3 * self._length_mm
+        strain = s.figure(name if name in s.figures else AXIAL)
+        sigma = math.hypot(strain.sigma, self._length_share * strain.value)
+        return Amount("length", length_m * strain.value, length_m * sigma)
 
     def _state_name(self, s: Snapshot) -> str:
         if self._running is None:
@@ -302,21 +304,24 @@ class PageConsumer(Consumer):
         self._shown += 1
 
 
-def elongation_length(config: Config) -> tuple[str, float | None]:
-    """The gauge whose strain over its length is the elongation, "" for the axial strain, and the length in mm.
+def elongation_length(config: Config) -> tuple[str, float | None, float]:
+    """The gauge whose strain over its length is the elongation, "" for the axial strain; the length, mm.
+
+    Last, the relative standard uncertainty of the length, which is that of the scale.
 
     The line ``axial``, else the first ``extension``, where the scale is known; else the axial strain over the gauge
     length as given.
     """
     if px_per_mm := config.scale.px_per_mm:
+        share = (config.scale.sigma_mm_per_px or 0.0) * px_per_mm
         gauges = list(complete_gauges(config.gauges, config.specimen.first_axis))
         for gauge in gauges:
             if isinstance(gauge, LineGauge) and gauge.name == AXIAL:
-                return gauge.name, math.dist(gauge.start, gauge.end) / px_per_mm
+                return gauge.name, math.dist(gauge.start, gauge.end) / px_per_mm, share
         for gauge in gauges:
             if isinstance(gauge, ExtensionGauge):
-                return gauge.name, gauge.length / px_per_mm
-    return "", config.specimen.gauge_length_mm
+                return gauge.name, gauge.length / px_per_mm, share
+    return "", config.specimen.gauge_length_mm, 0.0
 
 
 def shown(figure: TimedFigure) -> dict[str, Any]:

@@ -3,7 +3,7 @@ import { $, el, fill, put } from "./base.js";
 import { clearCurves, showAges, updateCurves } from "./curves.js";
 import { key, putIcon } from "./icons.js";
 import { beginMap, showMap } from "./map.js";
-import { chooseStrainUnit, fixed, powered, quantityText, short, strainText, strainUnit, time, unitOf, withSigma } from "./numbers.js";
+import { chooseStrainUnit, fixed, powered, quantity, quantityText, short, strainText, strainUnit, time, unitOf, withSigma } from "./numbers.js";
 import { beginViews, cameras, noteFailed, received } from "./views.js";
 import { nameOfRegion, setAlong, t, told } from "./words.js";
 
@@ -64,7 +64,8 @@ function show(value) {
   word.dataset.t = isPaused ? "Resume" : "Pause";
   if (!$("pause").classList.contains("armed")) put(word, t(word.dataset.t));
   showFigures(value);
-  put($("elongation"), value.elongation_mm == null ? "–" : fixed(value.elongation_mm, 4));
+  const { value: longer, sigma } = value.elongation ? quantity(value.elongation) : { value: "–" };
+  put($("elongation"), sigma ? `${longer} ± ${sigma}` : longer);
   put($("strainrate"), value.strain_rate?.[0] == null ? "–" : powered(...value.strain_rate));
   showGauges(value);
   showSides(value.sides);

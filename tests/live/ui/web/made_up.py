@@ -61,7 +61,8 @@ def run_state(**more: Any) -> dict[str, Any]:
             "force": figure(8035.3, 0.9), "stress": figure(267.84e6, 3e4), "axial": figure(19.988e-2, 2e-5),
         },
         "axial": axial, "gauges": [{"name": "width", "value": -7.703e-2, "sigma": 2e-6, "reason": "", "part": ""}],
-        "strain_rate": [3.1e-3, 2e-4], "elongation_mm": 6.33, "points": [1, len(POINTS)], "picture": MAP, "events": [],
+        "strain_rate": [3.1e-3, 2e-4], "elongation": {"kind": "length", "value": 6.33e-3, "sigma": 18e-6},
+        "points": [1, len(POINTS)], "picture": MAP, "events": [],
         "facts": facts(), "sides": None, "valid": 3000, "zois": 3000,
         "part": "",
     } | more  # fmt: skip

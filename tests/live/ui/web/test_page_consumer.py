@@ -239,11 +239,15 @@ def test_the_length_of_an_elongation() -> None:
     line = {"gauges.axial": {"kind": "line", "start": [10, 20], "end": [10, 120]}}
     strips = {"gauges.whole": {"kind": "extension", "box": [10, 20, 60, 120], "along": "y"}}
     given, scale = {"specimen.gauge_length_mm": 50.0}, {"scale.mm_per_px": 0.1}
-    assert elongation_length(load_config(None, {**strips, **line, **scale})) == ("axial", pytest.approx(10.0))
+    assert elongation_length(load_config(None, {**strips, **line, **scale})) == (
+        "axial",
+        pytest.approx(10.0),
+        0,
+    )
     # Between the middles of the first and the last sixth.
-    assert elongation_length(load_config(None, {**strips, **scale})) == ("whole", pytest.approx(10.0))
-    assert elongation_length(load_config(None, line | given)) == ("", 50.0)
-    assert elongation_length(load_config(None, line)) == ("", None)
+    assert elongation_length(load_config(None, {**strips, **scale})) == ("whole", pytest.approx(10.0), 0)
+    assert elongation_length(load_config(None, line | given)) == ("", 50.0, 0)
+    assert elongation_length(load_config(None, line)) == ("", None, 0)
 
 
 def test_the_library_has_its_licence_and_origin() -> None:

@@ -95,10 +95,14 @@ def test_what_is_measured(paused: bool, name: str) -> None:
     assert (state["valid"], state["zois"], state["part"]) == (33, 34, "of 50 % of the area")
 
 
+SCALE = {"scale.mm_per_px": 0.1, "scale.sigma_mm_per_px": 3e-4}
+
+
 @pytest.mark.parametrize(
     ("gauges", "found", "mm"),
     [
         (STRIPS | {"scale.mm_per_px": 0.1}, {"axial": GaugeValue(4e-3, 1e-6)}, 50 * 0.1 * 4e-3),
+        (STRIPS | SCALE, {"axial": GaugeValue(4e-3, 1e-5)}, 50 * 0.1 * 4e-3),
         (STRIPS | {"scale.mm_per_px": 0.1}, {}, 50 * 0.1 * 1e-3),  # lost: the axial strain
         ({"specimen.gauge_length_mm": 80.0}, {}, 80 * 1e-3),
         (LINE | {"scale.mm_per_px": 0.1}, {"long": GaugeValue(4e-3, 1e-6)}, None),
@@ -108,8 +112,10 @@ def test_the_elongation_in_mm(gauges: dict[str, Any], found: dict[str, Any], mm:
     config = load_config(None, {**gauges, "specimen.axis": "y"})
     consumer, run = watched(config)
     run.run_state.history.add(replace(pictured().time_step, gauges=found))
-    shown = consumer.state()["elongation_mm"]
-    assert shown is None if mm is None else shown == pytest.approx(mm)
+    shown = consumer.state()["elongation"]
+    assert (shown and shown.value) == (mm and pytest.approx(1e-3 * mm))
+    if gauges == STRIPS | SCALE:
+        assert shown.sigma == pytest.approx(50 * 0.1e-3 * np.hypot(1e-5, 4e-3 * 0.003))
 
 
 def test_a_frame_is_shown_until_something_is_measured() -> None:
