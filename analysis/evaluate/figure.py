@@ -97,6 +97,18 @@ class Figure:
         """The figure in another unit: divided by a positive number."""
         return replace(self, value=self.value / other, low=self.low / other, high=self.high / other)
 
+    def times(self, other: Figure) -> Figure:
+        """The product with another figure, of independent error; its words are of this one."""
+        value = self.value * other.value
+        low, high = (
+            math.hypot(one * other.value, self.value * half)
+            for one, half in (
+                (self.value - self.low, other.value - other.low),
+                (self.high - self.value, other.high - other.value),
+            )
+        )
+        return replace(self, value=value, low=value - low, high=value + high)
+
     def limited(self, share: float, qualifier: str) -> Figure:
         """The figure with a limit of error beyond its interval, a ``share`` of its value."""
         beyond = share * abs(self.value)

@@ -268,7 +268,7 @@ def _events(run: RunFolder) -> Iterator[Parcel]:
 def _status(run: RunFolder) -> str:
     """The figures of the test and the final values of the gauges, as Markdown."""
     figures = evaluate_test(run.curve, tensile_options(run.specimen))
-    lines = figure_lines(figures, run.specimen, run.gauge_length_mm)
+    lines = figure_lines(figures, run.specimen, run.gauge_length)
     lines += [
         Message(
             "gauge **{name}** {strain} at the end", name, Amount("strain", gauge.value[-1], gauge.sigma[-1])

@@ -305,11 +305,11 @@ def _known_texts(rows: Mapping[str, TensileRow], keys: Sequence[str]) -> str:
 
 
 def figure_lines(
-    figures: TensileFigures, specimen: SpecimenConfig, length_mm: float | None = None
+    figures: TensileFigures, specimen: SpecimenConfig, length: Figure | None = None
 ) -> list[str]:
     """All figures as text: ``elastic_lines``, the elastic part, extensions, strain rates, and what is not known.
 
-    ``length_mm`` is that between the ends of the extension, where it is known; else the one given is taken.
+    ``length`` is that between the ends of the extension, mm, where it is known; else the one given is taken.
     """
     rows, span = _rows(figures, specimen), figures.span
     lines = elastic_lines(figures, specimen) or [line for line in [_known_texts(rows, _STRENGTHS)] if line]
@@ -325,7 +325,7 @@ def figure_lines(
                 figures.zero.how,
             )
         )  # fmt: skip
-    lines += plastic_lines(figures, specimen, length_mm)
+    lines += plastic_lines(figures, specimen, length)
     parts = Message("in the elastic part"), Message("after it")
     known = [
         Message("{rate:.3g} 1/s {when}", one.value, when) + (Message(" ({why})", one.why) if one.why else "")
@@ -338,13 +338,15 @@ def figure_lines(
 
 
 def plastic_lines(
-    figures: TensileFigures, specimen: SpecimenConfig, length_mm: float | None = None
+    figures: TensileFigures, specimen: SpecimenConfig, length: Figure | None = None
 ) -> list[str]:
     """Notes on the test, extensions with the elongation, true stress and strain at the highest force, r and n."""
     rows = _rows(figures, specimen)
     extensions, flow = _known_texts(rows, _EXTENSIONS), _known_texts(rows, _FLOW)
     if extensions:
-        extensions = joined("", (extensions, _elongation(figures, length_mm or specimen.gauge_length_mm)))
+        given = specimen.gauge_length_mm
+        length = length or (Figure.about(given, 0.0) if given else None)
+        extensions = joined("", (extensions, _elongation(figures, length)))
     return [*figures.notes, *(line for line in (extensions, _true_line(figures, specimen), flow) if line)]
 
 
@@ -361,17 +363,17 @@ def _true_line(figures: TensileFigures, specimen: SpecimenConfig) -> str:
     )
 
 
-def _elongation(figures: TensileFigures, length_mm: float | None) -> str:
+def _elongation(figures: TensileFigures, length: Figure | None) -> str:
     """The elongation at the highest force and at break, mm; empty without a gauge length."""
-    if not length_mm:
+    if length is None:
         return ""
     totals = ((Message("at the highest force"), figures.Agt), (Message("at break"), figures.At))
     known = [
-        Message("elongation {length} {when}", figure_text(one.over(1 / length_mm), 1, "mm"), when)
+        Message("elongation {length} {when}", figure_text(one.times(length), 1, "mm"), when)
         for when, one in totals
         if one.known
     ]
-    words = joined(", ", [Message("gauge length {length:.4g} mm", length_mm), *known])
+    words = joined(", ", [Message("gauge length {length:.4g} mm", length.value), *known])
     return Message("  ({words})", words)
 
 

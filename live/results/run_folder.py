@@ -26,7 +26,7 @@ from acquire.opening import Closing
 from acquire.record_mode import Crop
 from acquire.session import Session
 from acquire.text import Message
-from analysis.evaluate import Curve, LoadAxis, Track, load_axis
+from analysis.evaluate import Curve, Figure, LoadAxis, Track, load_axis
 from analysis.field import StrainField
 from live.config.cameras import FIELDS, SIDES
 from live.config.loading import from_dict
@@ -341,6 +341,12 @@ class RunFolder(Closing):
         described = self.gauges[AXIAL].described if AXIAL in self.gauges else None
         scale, length = self.mm_per_px, length_between(self.strain, self.load_axis.axis, described)
         return length * scale if scale and length > 0 else None
+
+    @property
+    def gauge_length(self) -> Figure | None:
+        """The same with the uncertainty of the scale, mm."""
+        length, sigma = self.gauge_length_mm, self._number("scale", "sigma_mm_per_px") or 0.0
+        return Figure.about(length, length * sigma / self.mm_per_px) if length and self.mm_per_px else None
 
     @cached_property
     def events(self) -> list[Event]:

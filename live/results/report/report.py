@@ -312,7 +312,7 @@ def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
     """The figures as text, how they were found, and why others are not known."""
     if not curve.has_load:
         return []
-    lines = [*figure_lines(curve.figures, run.specimen, run.gauge_length_mm), neck_line(run, curve)]
+    lines = [*figure_lines(curve.figures, run.specimen, run.gauge_length), neck_line(run, curve)]
     return [paragraph(told(line).replace("  ", ", ")) for line in lines if line]
 
 

@@ -181,5 +181,9 @@ def test_r_and_n_have_their_interval_and_the_elongation_its_length() -> None:
     text = "\n".join(figure_lines(figures, SpecimenConfig(area_mm2=40.0, gauge_length_mm=50.0)))
     length = 50 * figures.Agt.value
     assert f"gauge length 50 mm, elongation {length:.1f}" in text and "mm at the highest force" in text
+    own, of_length = 50 * (figures.Agt.high - figures.Agt.value), 1.96 * 0.003 * length
+    of_scale = "\n".join(figure_lines(figures, SpecimenConfig(area_mm2=40.0), Figure.about(50.0, 0.003 * 50)))
+    found = re.search(r"elongation ([\d.]+) ± ([\d.]+) mm at the highest force", of_scale)
+    assert found is not None and float(found[2]) == pytest.approx(math.hypot(own, of_length), rel=0.02)
     assert f"r = {rows['r'].text}  n = {rows['n'].text}" in text
     assert rows["n"].figure.value == pytest.approx(0.2, rel=2e-3)
