@@ -165,9 +165,10 @@ class VideoFile(CameraBase):
 
     def _look_at_rows(self, image: NDArray[Any], index: int) -> None:
         """A warning, once, where odd and even rows are apart in two of the pictures that are looked at."""
-        self._torn += (apart := rows_apart(image)) > _ROWS_APART_PX
+        if (apart := rows_apart(image)) <= _ROWS_APART_PX:
+            return
+        self._torn += 1
         if self._torn == 2:
-            self._torn += 1
             text = Message(
                 "{path}: interlaced: odd and even rows are {apart:.2f} px apart in picture {number}; what moves is "
                 "torn, take one field alone",

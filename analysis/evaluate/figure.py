@@ -100,14 +100,9 @@ class Figure:
     def times(self, other: Figure) -> Figure:
         """The product with another figure, of independent error; its words are of this one."""
         value = self.value * other.value
-        low, high = (
-            math.hypot(one * other.value, self.value * half)
-            for one, half in (
-                (self.value - self.low, other.value - other.low),
-                (self.high - self.value, other.high - other.value),
-            )
-        )
-        return replace(self, value=value, low=value - low, high=value + high)
+        below = math.hypot((self.value - self.low) * other.value, self.value * (other.value - other.low))
+        above = math.hypot((self.high - self.value) * other.value, self.value * (other.high - other.value))
+        return replace(self, value=value, low=value - below, high=value + above)
 
     def limited(self, share: float, qualifier: str) -> Figure:
         """The figure with a limit of error beyond its interval, a ``share`` of its value."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from acquire.addresses import parse_address, with_setting
@@ -70,37 +71,12 @@ def command(arguments: argparse.Namespace, print_line: PrintLine = print_line, a
     simulated = parse_address(arguments.load).scheme == "sim"
     if simulated:
         print_line(Message("simulated: the known load is put on and taken off by the simulation"))
-
-    def read(force_N: float, what: str) -> calibration.Point:
-        for _ in range(MAX_TRIES):
-            ask(told(Message("{what}, wait until it is still, then press Enter ", what)))
-            address = _raw(arguments.load)
-            address = with_setting(address, "weight_N", force_N) if simulated else address
-            cell = open_load(address, lambda event: print_line(about(word(event.level), event.text)))
-            received = check.listen(cell, arguments.seconds)
-            why_not = _unfit(received.samples)
-            if not why_not:
-                found = calibration.point(force_N, [sample.force for sample in received.samples])
-                print_line(
-                    Message(
-                        "  {value:.8g} on the line (noise {noise:.3g}, {n} readings)",
-                        *(found.value, found.noise, found.n),
-                    )
-                )
-                return found
-            print_line(Message("  not taken: {why}", why_not))
-        raise DataError(
-            "{load}: {n} times {why}; look at it with 'phasedic load-check'",
-            arguments.load,
-            MAX_TRIES,
-            why_not,
-        )
-
+    readings = _Readings(arguments.load, arguments.seconds, simulated, print_line, ask)
     points = [
-        read(0.0, Message("take off all load")),
-        read(known_N, Message("put on {force:.6g} N", known_N)),
+        readings.point(0.0, Message("take off all load")),
+        readings.point(known_N, Message("put on {force:.6g} N", known_N)),
+        readings.point(0.0, Message("take off all load again")),
     ]
-    points.append(read(0.0, Message("take off all load again")))
     found = calibration.fit(points)
     print_line(
         Message(
@@ -114,6 +90,40 @@ def command(arguments: argparse.Namespace, print_line: PrintLine = print_line, a
     calibration.save(found, Path(arguments.out), arguments.load)
     print_line(Message("kept in {path}; use it with calibration={path} in the address", arguments.out))
     return 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Readings:
+    """Readings of a load cell under known loads, each asked for until it is fit, ``MAX_TRIES`` times."""
+
+    load: str
+    seconds: float
+    simulated: bool
+    print_line: PrintLine
+    ask: Ask
+
+    def point(self, force_N: float, what: str) -> calibration.Point:
+        """A point of the calibration; raises DataError where no reading was fit."""
+        address = _raw(self.load)
+        address = with_setting(address, "weight_N", force_N) if self.simulated else address
+        for _ in range(MAX_TRIES):
+            self.ask(told(Message("{what}, wait until it is still, then press Enter ", what)))
+            cell = open_load(address, lambda event: self.print_line(about(word(event.level), event.text)))
+            samples = check.listen(cell, self.seconds).samples
+            why_not = _unfit(samples)
+            if not why_not:
+                found = calibration.point(force_N, [sample.force for sample in samples])
+                self.print_line(
+                    Message(
+                        "  {value:.8g} on the line (noise {noise:.3g}, {n} readings)",
+                        *(found.value, found.noise, found.n),
+                    )
+                )
+                return found
+            self.print_line(Message("  not taken: {why}", why_not))
+        raise DataError(
+            "{load}: {n} times {why}; look at it with 'phasedic load-check'", self.load, MAX_TRIES, why_not
+        )
 
 
 def _unfit(samples: Sequence[LoadSample]) -> str:

@@ -37,9 +37,8 @@ OF_FORCES = ("load.unit", "load.column", "load.decimal")
 
 def check_effect(given: Mapping[str, Any], config: Config) -> None:
     """Raises ConfigError for an option among ``given`` ("section.key" -> value) without effect in a live test."""
-    for key in given.keys() & _NEEDS.keys():
-        is_used, needs = _NEEDS[key]
-        if not is_used(config):
+    for key, (is_used, needs) in _NEEDS.items():
+        if key in given and not is_used(config):
             raise _unused(key, needs)
 
 

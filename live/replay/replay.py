@@ -205,18 +205,14 @@ def _run(
         ready = prepare_replay(source, config, request.source, screen, stopping)
     if stopping.is_set():
         raise KeyboardInterrupt
-    stored = StoredResults.of(request.parts, ready)
+    stored, with_load = StoredResults.of(request.parts, ready), len(source.loads) > 0
     bursts = _not_empty(stored.bursts() if stored else source.bursts, request, source.count)
-    check_channel(ready.plan.config, forces=len(source.loads) > 0)
+    check_channel(ready.plan.config, forces=with_load)
     folder = make_folder(ready.plan.config.output.dir, datetime.datetime.now(datetime.UTC))
     config = _with_final_folder(with_mask(ready.plan.config, ready.plan.mask, folder), request.final_folder)
+    history = History(config.specimen.axis)
     run_state = RunState(
-        event_log,
-        FrameCounts(),
-        source.loads,
-        History(config.specimen.axis),
-        specimen=config.specimen,
-        with_load=len(source.loads) > 0,
+        event_log, FrameCounts(), source.loads, history, specimen=config.specimen, with_load=with_load
     )
     write_names(request.source, folder / "pictures.csv")
     screen.print(Message("replaying {source} into {folder}", request.source, request.final_folder or folder))
@@ -240,11 +236,7 @@ def _run(
         run_state.health.ended = True
         outputs.end()
         folder = held.end()
-    lines, code = run.lines(took, folder), run.exit_code()
-    at_reference = math.nan if request.reference else source.loads.force_at(source.reference.t)
-    test = finished(folder, config, run_state, code, at_reference, source.start.monotonic, lines)
-    left_out = source.count.left_out if source.count else 0
-    return Replayed(folder, run_state, config, code, test, tuple(lines), left_out)
+    return run.replayed(config, folder, took)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -280,6 +272,14 @@ class _Run:
             text = Message("interrupted after {bursts}; the others are not measured", counted(done, "burst"))
             self.run_state.event_log.emit(EventKind.STOP, "phasedic", text, "warning")
         return time.perf_counter() - began
+
+    def replayed(self, config: Config, folder: Path, took: float) -> Replayed:
+        """The result, once the files in ``folder`` are closed."""
+        source, code, lines = self.source, self.exit_code(), self.lines(took, folder)
+        at_reference = math.nan if self.request.reference else source.loads.force_at(source.reference.t)
+        test = finished(folder, config, self.run_state, code, at_reference, source.start.monotonic, lines)
+        left_out = source.count.left_out if source.count else 0
+        return Replayed(folder, self.run_state, config, code, test, tuple(lines), left_out)
 
     def lines(self, took: float, folder: Path) -> list[str]:
         """What there is to say at the end: what failed and what was lost first, then counts and speed."""
